@@ -33,7 +33,7 @@ from islands.kernels.parameter_reduction import (
 )
 from islands.kernels.regressor_columns import Rows
 from islands.kernels.selection.err_selection import prune, prune_increments
-from islands.kernels.simulate import Layout, simulate
+from islands.kernels.simulation.simulate import Layout, simulate
 from islands.kernels.summation import total
 
 # The first three codes are the status codes of `simulate`.

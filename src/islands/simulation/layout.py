@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.kernels.simd import padded_size
-from islands.kernels.simulate import WIDTHS, Layout
+from islands.kernels.simulation.simulate import WIDTHS, Layout
 
 #: Fixed cost of an instruction, in units of its cost per lane.
 _OVERHEAD_LANES = 24
@@ -37,8 +37,8 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
     """
     if interval is not None and interval < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {interval}")
-    start, length = _intervals(record, warm_up, interval)
-    _check_warm_up(record.y, start, warm_up)
+    start, length = find_intervals(record, warm_up, interval)
+    check_warm_up(record.y, start, warm_up)
     signals = np.ascontiguousarray(np.vstack([record.y, record.u.T]))
     known = record.y[~np.isnan(record.y)]
     largest = float(np.abs(known).max()) if known.size else 0.0
@@ -65,10 +65,16 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
     return Layout(gathered, offset, lanes, width, start, length, width, warm_up, largest)
 
 
-def _intervals(
+def find_intervals(
     record: Dataset, warm_up: int, interval: int | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the first sample and the length of every interval, in time order."""
+    """Return the first predicted sample and the length of every interval, in time order.
+
+    Raises
+    ------
+    RecordError
+        No segment is longer than the warm-up.
+    """
     step = interval or record.samples
     starts = [np.arange(begin + warm_up, end, step) for begin, end in record.bounds]
     if not any(each.size for each in starts):
@@ -82,7 +88,14 @@ def _intervals(
     return start, np.minimum(step, np.concatenate(ends) - start)
 
 
-def _check_warm_up(y: NDArray[np.float64], start: NDArray[np.int64], warm_up: int) -> None:
+def check_warm_up(y: NDArray[np.float64], start: NDArray[np.int64], warm_up: int) -> None:
+    """Check that no output is missing in the warm-up before the first samples of the intervals.
+
+    Raises
+    ------
+    RecordError
+        The message names the sample.
+    """
     missing = np.concatenate([[0], np.cumsum(np.isnan(y))])
     bad = np.flatnonzero(missing[start] > missing[start - warm_up])
     if bad.size:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.kernels.interpreter import Program
-from islands.kernels.simulate import WIDTHS, Layout, simulate
+from islands.kernels.simulation.simulate import WIDTHS, Layout, simulate
 from islands.model.regressor import Regressor
 from islands.program.term_pool import link
 from islands.simulation.predictors import divergence_bound_of_range

@@ -21,7 +21,7 @@ from islands.kernels.interpreter import Program
 from islands.kernels.pair_table import clear, pair_table
 from islands.kernels.population import PopulationContext, empty_results, evaluate
 from islands.kernels.regressor_columns import Rows
-from islands.kernels.simulate import COMPLETE, Layout, simulate
+from islands.kernels.simulation.simulate import COMPLETE, Layout, simulate
 from islands.model.expression import Lagged
 from islands.performance.benchmark.clock import milliseconds
 from islands.performance.benchmark.workload import INTERVAL, WARM_UP, WorkloadModel

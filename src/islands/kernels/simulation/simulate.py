@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from islands.kernels.jit_cache import kernel
 from islands.kernels.simd import VECTOR, any_outside, load
-from islands.kernels.simulation_block import (
+from islands.kernels.simulation.simulation_block import (
     CHUNK,
     Chunk,
     allocate_workspace,

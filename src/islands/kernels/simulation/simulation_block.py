@@ -1,8 +1,8 @@
 """Simulation of one block of lanes in chunks of steps: the parts of `simulate`.
 
-A block is opened, simulated chunk by chunk and closed. `islands.kernels.simulate` defines lanes, rows and
-blocks. The functions are inlined and do not count references, so that a short block costs no more than its
-arithmetic.
+A block is opened, simulated chunk by chunk and closed. `islands.kernels.simulation.simulate` defines lanes,
+rows and blocks. The functions are inlined and do not count references, so that a short block costs no more
+than its arithmetic.
 """
 
 from typing import NamedTuple

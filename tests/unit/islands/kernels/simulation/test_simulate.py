@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
-from islands.kernels.simulate import ABANDONED, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
+from islands.kernels.simulation.simulate import ABANDONED, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
 from islands.kernels.summation import total
 from islands.model.expression import value
 from islands.model.model import make_model

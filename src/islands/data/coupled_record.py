@@ -1,0 +1,165 @@
+"""Record of several outputs of one system, which share the inputs and the time grid."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.channel_names import parse_channel_name
+from islands.data.dataset import Dataset
+from islands.data.missing_outputs import skip_missing_outputs
+from islands.data.split import split_data
+from islands.errors import RecordError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoupledRecord:
+    """One record per output, all with the same inputs, segments and sampling time.
+
+    Read each of them with ``read_record`` from the same file.
+
+    Attributes
+    ----------
+    records : tuple of Dataset
+        The inputs and one output each; at least two.
+
+    Raises
+    ------
+    RecordError
+        There are fewer than two outputs, an output occurs twice or is also an input, or the records have
+        other inputs, segments or sampling times.
+    """
+
+    records: tuple[Dataset, ...]
+
+    def __post_init__(self) -> None:
+        names = self.output_names
+        if len(names) < 2:
+            raise RecordError(f"a coupled record has at least two outputs, got {', '.join(names) or 'none'}")
+        first = self.records[0]
+        inputs = {parse_channel_name(name).base for name in first.input_names}
+        for record in self.records:
+            name = record.output_name
+            if names.count(name) > 1:
+                raise RecordError(f"the output {name} is given twice: name each output once")
+            if name in inputs:
+                raise RecordError(f"{name} is an input and an output: remove one of them")
+            if (record.input_names, record.dt, record.segments) != (
+                first.input_names,
+                first.dt,
+                first.segments,
+            ) or not np.array_equal(record.u, first.u):
+                raise RecordError(
+                    f"the records of {first.output_name} and {name} differ in their inputs, segments or "
+                    "sampling time: read all outputs with the same options"
+                )
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(record.output_name for record in self.records)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs, without the outputs."""
+        return self.records[0].input_names
+
+    @property
+    def dt(self) -> float:
+        """Sampling time in seconds."""
+        return self.records[0].dt
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return self.records[0].samples
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """The outputs, shape (samples, outputs). NaN marks a missing value."""
+        return np.column_stack([record.y for record in self.records])
+
+    def __len__(self) -> int:
+        return self.samples
+
+    def __repr__(self) -> str:
+        inputs, outputs = ", ".join(self.input_names), ", ".join(self.output_names)
+        return f"<CoupledRecord of {self.samples} samples of {self.dt:g} s: {inputs} to {outputs}>"
+
+    def map(self, function: Callable[[Dataset], Dataset]) -> "CoupledRecord":
+        """Return the record with a function applied to the record of every output."""
+        return CoupledRecord(tuple(map(function, self.records)))
+
+    def separate(self, place: int) -> Dataset:
+        """Return the record of one output, with the other outputs as further inputs.
+
+        Raises
+        ------
+        RecordError
+            A value of another output is missing.
+        """
+        record = self.records[place]
+        others = [other for other in self.records if other is not record]
+        return replace(
+            record,
+            u=np.column_stack([record.u, *(other.y for other in others)]),
+            input_names=(*record.input_names, *(other.output_name for other in others)),
+            input_units=(*record.input_units, *(other.output_unit for other in others)),
+        )
+
+    def skip_missing(self) -> "CoupledRecord":
+        """Return the record without the samples of which an output is missing.
+
+        The parts before and after them are segments, so that no regressor reads a missing value.
+
+        Raises
+        ------
+        RecordError
+            No sample has all outputs.
+        """
+        missing = np.isnan(self.y).any(axis=1)
+        if not missing.any():
+            return self
+        if missing.all():
+            raise RecordError("no sample has a value of every output: choose other outputs")
+        return self.map(
+            lambda record: skip_missing_outputs(replace(record, y=np.where(missing, np.nan, record.y)))
+        )
+
+
+def split_coupled(
+    record: CoupledRecord, validation: CoupledRecord | float
+) -> tuple[CoupledRecord, CoupledRecord]:
+    """Return estimation data and validation data, split at the same samples for every output.
+
+    Samples of which an output is missing are skipped.
+
+    Parameters
+    ----------
+    record : CoupledRecord
+    validation : CoupledRecord or float
+        Another record with the same columns, or the fraction at the end of every recording.
+
+    Raises
+    ------
+    RecordError
+        The validation data has other columns, units or another sampling time.
+    SettingsError
+        The fraction leaves a part empty, or the validation data has samples of the record.
+    """
+    record = record.skip_missing()
+    if isinstance(validation, CoupledRecord):
+        if validation.output_names != record.output_names:
+            raise RecordError(
+                f"the record has the outputs {', '.join(record.output_names)}, the validation data "
+                f"{', '.join(validation.output_names)}: give both the same outputs in one order"
+            )
+        held_out: list[Dataset | float] = list(validation.skip_missing().records)
+    else:
+        held_out = [validation] * len(record.records)
+    parts = [split_data(*pair) for pair in zip(record.records, held_out, strict=True)]
+    return (
+        CoupledRecord(tuple(part.estimation for part in parts)),
+        CoupledRecord(tuple(part.validation for part in parts)),
+    )

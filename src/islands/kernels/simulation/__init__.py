@@ -1,0 +1,1 @@
+"""Simulation of models in rows of lanes: one equation, or several that read each other."""

@@ -1,0 +1,126 @@
+"""Coupled model: one equation per output, each of which may read the past of all outputs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from islands.errors import ModelError
+from islands.model.expression import Apply, Expression, Lagged
+from islands.model.model import Model
+
+
+@dataclass(frozen=True, slots=True)
+class CoupledModel:
+    """One model per output. The other outputs are the last inputs of each, in the order of the outputs.
+
+    Attributes
+    ----------
+    models : tuple of Model
+        Equations of the outputs; at least two.
+
+    Raises
+    ------
+    ModelError
+        There are fewer than two equations, or their outputs, inputs, sampling times or averages do not agree.
+    """
+
+    models: tuple[Model, ...]
+
+    def __post_init__(self) -> None:
+        names = self.output_names
+        if len(names) < 2:
+            raise ModelError("a coupled model has at least two equations, for a single output use a Model")
+        if len(set(names)) < len(names):
+            raise ModelError(f"two equations have the same output: {', '.join(names)}")
+        first = self.models[0]
+        inputs = len(first.input_names) - (len(names) - 1)
+        for place, model in enumerate(self.models):
+            expected = (*self.input_names, *(name for name in names if name != names[place]))
+            if inputs < 1 or model.input_names != expected:
+                raise ModelError(
+                    f"the equation of {model.output_name} has the inputs {', '.join(model.input_names)}; "
+                    f"expected are inputs and then the other outputs, {', '.join(expected)}"
+                )
+            if (model.dt, model.average) != (first.dt, first.average):
+                raise ModelError(
+                    f"the equations of {first.output_name} and {model.output_name} have different sampling "
+                    "times: estimate both at the same rate"
+                )
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(model.output_name for model in self.models)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs, without the outputs."""
+        first = self.models[0]
+        return first.input_names[: len(first.input_names) - len(self.models) + 1]
+
+    @property
+    def dt(self) -> float | None:
+        """Sampling time in seconds. None if unspecified."""
+        return self.models[0].dt
+
+    @property
+    def average(self) -> int:
+        """Number of samples of a record whose mean is one sample of the model."""
+        return self.models[0].average
+
+    @property
+    def maximum_lag(self) -> int:
+        """Number of past samples that the model needs before its first prediction."""
+        return max(model.maximum_lag for model in self.models)
+
+    @property
+    def size(self) -> int:
+        """Number of terms of all equations."""
+        return sum(model.size for model in self.models)
+
+    @property
+    def leads(self) -> tuple[int, ...]:
+        """Number of samples that every channel is read early: outputs, then inputs."""
+        return (0,) * len(self.models) + self.models[0].leads[1 : 1 + len(self.input_names)]
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Parameters of all equations, one after the other.
+
+        Raises
+        ------
+        ModelError
+            The parameters have not been estimated.
+        """
+        return tuple(value for model in self.models for value in model.parameters)
+
+    def with_parameters(self, theta: Sequence[float]) -> "CoupledModel":
+        """Return a copy with other parameters of all equations, without standard errors."""
+        models, begin = [], 0
+        for model in self.models:
+            models.append(model.with_parameters(theta[begin : begin + model.size]))
+            begin += model.size
+        return replace(self, models=tuple(models))
+
+    def channels(self, place: int) -> tuple[int, ...]:
+        """Return the channel of the coupled model of every channel of one equation.
+
+        Channels of the coupled model are the outputs in their order and then the inputs.
+        """
+        outputs = len(self.models)
+        others = (other for other in range(outputs) if other != place)
+        return (place, *range(outputs, outputs + len(self.input_names)), *others)
+
+    def expressions(self, place: int) -> list[Expression]:
+        """Return the terms of one equation, without parameters, in the channels of the coupled model."""
+        channels = self.channels(place)
+        return [_read_channels(item.expression, channels) for item in self.models[place].regressors]
+
+
+def _read_channels(expression: Expression, channels: Sequence[int]) -> Expression:
+    """Replace channels. The arguments keep their order, so that a value keeps its last bits."""
+    match expression:
+        case Lagged(channel, lag):
+            return Lagged(channels[channel], lag)
+        case Apply(primitive, arguments):
+            return Apply(primitive, tuple(_read_channels(each, channels) for each in arguments))
+    return expression
