@@ -24,7 +24,8 @@ from islands.io.checkpoints import (
     write_checkpoint,
     write_hall,
 )
-from islands.io.records import fingerprint, read_record
+from islands.io.records import fingerprint, read_dataset
+from islands.io.records.reading_options import ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands.validation.metrics import metrics
 from islands_api.cli import options
@@ -166,11 +167,12 @@ def _read_data(
             raise RecordError(f"{name} has changed since the run began: restore the file, or start a new run")
     path = Path(job["record"])
     columns = (job["inputs"], job["output"], job["dt"])
-    data = read_record(path, *columns, parse_rows(job["rows"]))
-    held_out = options.validation(job["validation"], path, *columns, job["rows"])
+    reading = ReadingOptions(**job.get("reading", {}))
+    data = read_dataset(path, *columns, parse_rows(job["rows"]), options=reading)
+    held_out = options.validation(job["validation"], path, *columns, job["rows"], reading=reading)
     test_data: islands.Dataset | None = None
     if job["test"] is not None:
-        given = options.validation(job["test"], path, *columns, job["rows"], "--test")
+        given = options.validation(job["test"], path, *columns, job["rows"], "--test", reading)
         if isinstance(given, float):
             parts = islands.split(data, given)
             data, test_data = parts.estimation, parts.validation

@@ -8,7 +8,8 @@ import typer
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.io.models import read_model
-from islands.io.records import read_record
+from islands.io.records import read_dataset
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import overlap, parse_rows
 from islands.io.result_models import find_model_file
 from islands.io.simulator_spec.specification import SIMULATORS, LocalExtendedSpec, is_extended, parse_spec
@@ -16,7 +17,7 @@ from islands.model.model import Model
 from islands.systems.published_models import get_published_model
 
 Record = Annotated[
-    Path, typer.Argument(help="The record: CSV (any separator, decimal comma or point), NPZ, MAT or Parquet.")
+    Path, typer.Argument(help="The record: text, XLSX, NPZ, MAT, HDF5, Parquet, MDF or TDMS; also .gz, .zip.")
 ]
 Records = Annotated[
     list[Path],
@@ -102,6 +103,7 @@ def validation(
     dt: float | None,
     used: str | None = None,
     option: str = "--validation",
+    reading: ReadingOptions = DEFAULT_READING,
 ) -> Dataset | float:
     """Read ``--validation``: a fraction of the record's end, rows of the record's file, or another file.
 
@@ -111,6 +113,8 @@ def validation(
         The ``--rows`` used for estimation. Validation rows must not overlap them.
     option : str
         Name of the option in messages; ``--test`` is read in the same way.
+    reading : ReadingOptions
+        Options of reading, for all files.
 
     Raises
     ------
@@ -120,11 +124,11 @@ def validation(
     if text is None:
         return 0.25
     if Path(text).exists():
-        return read_record(text, inputs, output, dt)
+        return read_dataset(text, inputs, output, dt, options=reading)
     if ":" in text:
         if used is None or overlap(parse_rows(used), parse_rows(text)):
             raise SettingsError(f"{option} {text}: give --rows START:STOP, other samples for estimation")
-        return read_record(record, inputs, output, dt, parse_rows(text))
+        return read_dataset(record, inputs, output, dt, parse_rows(text), options=reading)
     try:
         return float(text)
     except ValueError:

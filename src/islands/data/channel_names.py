@@ -23,6 +23,27 @@ _UNIT = re.compile(
 #: Units of time that divide the unit before them.
 _DIVISORS = frozenset({"s", "s2", "min", "h"})
 
+#: Units in words, as instruments write them in a row of units.
+_WORDS = {
+    "second": "s",
+    "seconds": "s",
+    "sec": "s",
+    "msec": "ms",
+    "usec": "us",
+    "minute": "min",
+    "minutes": "min",
+    "hour": "h",
+    "hours": "h",
+    "volt": "V",
+    "volts": "V",
+    "ampere": "A",
+    "amp": "A",
+    "amps": "A",
+    "watt": "W",
+    "watts": "W",
+    "hertz": "Hz",
+}
+
 #: Spellings of the same symbol.
 _SPELLINGS = str.maketrans({"\N{MICRO SIGN}": "u", "μ": "u", "Ω": "ohm", "\N{OHM SIGN}": "ohm"})
 
@@ -88,6 +109,11 @@ def is_unit(text: str) -> bool:
 def normalise_unit(text: str) -> str:
     """Return a unit in one spelling: ``um`` for ``µm``, ``kohm`` for ``kΩ`` and ``kOhm``."""
     return text.translate(_SPELLINGS).replace("Ohm", "ohm")
+
+
+def spell_unit(text: str) -> str:
+    """Return the symbol of a unit that is written as a word (``Volt``), else the text itself."""
+    return _WORDS.get(text.lower(), text)
 
 
 def conversion_factor(unit: str, other: str) -> float | None:

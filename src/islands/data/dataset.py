@@ -38,6 +38,8 @@ class Dataset:
         Time of the first sample in seconds.
     sha256 : str
         Hexadecimal hash of the source file. Empty if unknown.
+    reading : tuple of str
+        What was done to the samples of the file, such as resampling, in this order.
 
     Raises
     ------
@@ -57,6 +59,7 @@ class Dataset:
     recordings: tuple[str, ...] = ()
     start: float = 0.0
     sha256: str = ""
+    reading: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         u = np.array(self.u, dtype=np.float64, order="C", ndmin=1)
@@ -229,6 +232,7 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
         segments=tuple(length for recording in recordings for length in recording.segments),
         recordings=_name_recordings(recordings),
         sha256="",
+        reading=tuple(step for recording in recordings for step in recording.reading),
     )
 
 

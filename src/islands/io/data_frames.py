@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.io.records.column_names import TIME_UNITS, find_column, looks_like_time, seconds_per_unit
-from islands.io.records.columnar import ColumnarFile
-from islands.io.records.reader import read_table
+from islands.io.records.formats.columnar import ColumnarFile
+from islands.io.records.table_reading import read_table
 
 if TYPE_CHECKING:
     import xarray

@@ -16,7 +16,8 @@ from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.facade.explain_residual import explain_residual
 from islands.io.diagnosis_json import as_json, diagnosis_document
-from islands.io.records import read_record
+from islands.io.records import read_dataset
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
@@ -24,6 +25,7 @@ from islands.io.simulator_spec.specification import ColumnSpec, innermost, parse
 from islands_api.cli import options
 from islands_api.cli.console import Display, compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
+from islands_api.cli.record_options import with_reading_options
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
 #: File of the result document.
@@ -36,6 +38,7 @@ EXTENDED = "extended.json"
 REPORT = "report.html"
 
 
+@with_reading_options
 def diagnose(
     record: options.Record,
     inputs: options.Inputs,
@@ -46,6 +49,7 @@ def diagnose(
     tolerance: options.Tolerances = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
+    reading: ReadingOptions = DEFAULT_READING,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     tested: Annotated[
         bool,
@@ -66,7 +70,7 @@ def diagnose(
         inner = innermost(spec)
         column = inner.column if isinstance(inner, ColumnSpec) else None
         data, columns = _read_record(
-            record, options.columns(inputs), channels or [], column, output_column, dt, rows
+            record, options.columns(inputs), channels or [], column, output_column, dt, rows, reading
         )
         simulator = make_simulator(spec, data, columns)
         tolerances = options.tolerances(tolerance or [])
@@ -147,11 +151,11 @@ def _read_record(
     output_column: str,
     dt: float | None,
     rows: str | None,
+    reading: ReadingOptions,
 ) -> tuple[Dataset, Mapping[str, Any]]:
     """Read the record, and separately the column of a simulation that was recorded in it."""
     extra = [] if column is None else [column]
-    whole = read_record(
-        record, [options.single_input(inputs), *channels, *extra], output_column, dt, parse_rows(rows)
-    )
+    names = [options.single_input(inputs), *channels, *extra]
+    whole = read_dataset(record, names, output_column, dt, parse_rows(rows), options=reading)
     kept = 1 + len(channels)
     return whole.first_inputs(kept), {} if column is None else {column: whole.u[:, kept]}

@@ -11,14 +11,17 @@ from islands.data.averaging import AUTO
 from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.io.records import read_record
+from islands.io.records import read_dataset
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands.model.candidate_library import LIBRARIES
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, progress
 from islands_api.cli.output_folder import check_folder, show_result
+from islands_api.cli.record_options import with_reading_options
 
 
+@with_reading_options
 def fit(
     record: options.Record,
     inputs: options.Inputs,
@@ -26,6 +29,7 @@ def fit(
     out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
+    reading: ReadingOptions = DEFAULT_READING,
     validation: Annotated[
         str | None,
         typer.Option(
@@ -72,8 +76,8 @@ def fit(
     compile_kernels()
     with progress("fit") as show:
         show("reading", 0.0)
-        data = read_record(record, names, output_column, dt, parse_rows(rows))
-        held_out = options.validation(validation, record, names, output_column, dt, rows)
+        data = read_dataset(record, names, output_column, dt, parse_rows(rows), options=reading)
+        held_out = options.validation(validation, record, names, output_column, dt, rows, reading=reading)
         began = perf_counter()
         result = islands.fit(
             data,

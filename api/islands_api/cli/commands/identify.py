@@ -7,9 +7,11 @@ import typer
 
 from islands.errors import SettingsError, lookup
 from islands.io.records import fingerprint
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands_api.cli import options
 from islands_api.cli.identify_run import RunOptions, load_run, run
 from islands_api.cli.output_folder import check_folder
+from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, with_search_options
 from islands_service.engines import ENGINES
 
@@ -17,17 +19,19 @@ from islands_service.engines import ENGINES
 RUN_OPTIONS = ("resume", "engine", "ray_address", "wall_time", "verbose")
 
 
+@with_reading_options
 @with_search_options
 def identify(
     context: typer.Context,
     record: Annotated[
-        Path | None, typer.Argument(help="The record: CSV, NPZ, MAT or Parquet. Not with --resume.")
+        Path | None, typer.Argument(help="The record: text, XLSX, NPZ, MAT, HDF5, ...; not with --resume.")
     ] = None,
     inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column; repeatable.")] = None,
     output_column: Annotated[str | None, typer.Option("--output", help="Output column.")] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
+    reading: ReadingOptions = DEFAULT_READING,
     validation: Annotated[
         str | None,
         typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
@@ -87,6 +91,7 @@ def identify(
             "output": output_column,
             "dt": dt,
             "rows": rows,
+            "reading": reading.changes(),
             "preset": search.preset,
             "seed": search.seed,
             "changes": dict(search.changes),

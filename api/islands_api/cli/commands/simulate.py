@@ -14,7 +14,8 @@ from islands.errors import SettingsError
 from islands.facade.fit import SHOOTING
 from islands.facade.results.model_simulation import simulate as run
 from islands.io.ensembles import read_bands
-from islands.io.records import read_record, write_simulation
+from islands.io.records import read_dataset, write_simulation
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands.io.result_models import ErrorMeasurement, find_model_file, read_error_measurement
 from islands.io.simulator_spec.factory import simulate_spec
@@ -23,8 +24,10 @@ from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output
+from islands_api.cli.record_options import with_reading_options
 
 
+@with_reading_options
 def simulate(
     model: options.ModelFile,
     record: options.Record,
@@ -42,6 +45,7 @@ def simulate(
     ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
+    reading: ReadingOptions = DEFAULT_READING,
     shooting: Annotated[
         int | None,
         typer.Option(
@@ -72,18 +76,19 @@ def simulate(
     if bands is not None and (mode != "free-run" or extended is not None):
         raise SettingsError("--bands are for free runs of models of a result folder")
     if extended is not None:
-        _simulate_extended(extended, record, mode, out, inputs, output_column, dt, rows)
+        _simulate_extended(extended, record, mode, out, inputs, output_column, dt, rows, reading)
         return
     chosen = options.model(model)
     # A model of means reads an input one mean early, not one sample.
     names = [parse_channel_name(name).base if chosen.average > 1 else name for name in chosen.input_names]
-    recorded = read_record(
+    recorded = read_dataset(
         record,
         options.columns(inputs or names),
         output_column or chosen.output_name,
         dt,
         parse_rows(rows),
         missing_output=True,
+        options=reading,
     )
     data = match_rate(chosen, recorded)
     if data is not recorded:
@@ -110,6 +115,7 @@ def _simulate_extended(
     output_column: str | None,
     dt: float | None,
     rows: str | None,
+    reading: ReadingOptions,
 ) -> None:
     """Simulate the extended simulation of a diagnosis, starting at the record's first samples."""
     if mode != "free-run":
@@ -117,7 +123,8 @@ def _simulate_extended(
     inner = innermost(spec)
     recorded = (inner.column,) if isinstance(inner, ColumnSpec) else ()
     driving = options.columns(inputs or list(spec.inputs))
-    whole = read_record(record, [*driving, *recorded], output_column or spec.output, dt, parse_rows(rows))
+    names = [*driving, *recorded]
+    whole = read_dataset(record, names, output_column or spec.output, dt, parse_rows(rows), options=reading)
     data = whole.first_inputs(len(driving))
     compile_kernels()
     y = simulate_spec(spec, data, dict.fromkeys(recorded, whole.u[:, -1]))

@@ -1,7 +1,7 @@
 """Records from and to files. Each format has one reader, listed in `READERS`. Read `reader` first."""
 
 from islands.io.records.preview import ColumnPreview, Preview, preview
-from islands.io.records.reader import READERS, fingerprint, read_columns, read_record
+from islands.io.records.reader import READERS, fingerprint, read_columns, read_dataset, read_record
 from islands.io.records.writer import write_record, write_simulation
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "fingerprint",
     "preview",
     "read_columns",
+    "read_dataset",
     "read_record",
     "write_record",
     "write_simulation",

@@ -2,9 +2,10 @@
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from types import MappingProxyType
 
-from islands.data.channel_names import AT_ONCE, parse_unit
+from islands.data.channel_names import AT_ONCE, normalise_unit, parse_unit, spell_unit
 from islands.errors import RecordError
 
 #: Units of time columns in seconds. A column without a unit is in seconds.
@@ -13,10 +14,20 @@ TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0
 #: Units with which a capital T means a temperature.
 TEMPERATURE_UNITS = ("K", "C", "degC", "°C", "F", "degF", "°F")
 
-_TIME = re.compile(r"t(_.*|\s*[\[(/].*)?|(?:time|zeit).*", re.IGNORECASE)
+_TIME = re.compile(
+    r"t(_.*|\s*[\[(/].*)?|(?:time|zeit|elapsed|date|datum|uhrzeit|x-axis).*|x_value|sec(?:ond)?s?",
+    re.IGNORECASE,
+)
 
 #: End of the name of a time column: its unit in any case, a number, or another word.
-_END = re.compile(r"[_\[(/]\s*([^_\[\](/)]*?)\s*[\])]?$")
+_END = re.compile(r"(?:[_\[(/]|\sin\s)\s*([^_\[\](/)]*?)\s*[\])]?$")
+
+#: Last words of names of time columns that are not a unit.
+_WORDS = ("time", "value", "stamp")
+
+
+#: Unit in brackets behind a name.
+_BRACKETED_UNIT = re.compile(r"\s*[\[(][^\[\]()]*[\])]")
 
 
 def split_structures(names: Iterable[str]) -> dict[str, str]:
@@ -30,14 +41,27 @@ def split_structures(names: Iterable[str]) -> dict[str, str]:
 
 
 def find_column(name: str, columns: Iterable[str]) -> str:
-    """Return the column of an input name: ``u_V`` for ``u_V+1``, unless a column has exactly that name."""
-    return name if name in tuple(columns) else name.removesuffix(AT_ONCE)
+    """Return the column of a name: ``u_V`` for ``u_V+1``, and ``u [V]`` for ``u`` if only one column fits.
+
+    A column with exactly the given name takes precedence.
+    """
+    columns = tuple(columns)
+    base = name.removesuffix(AT_ONCE)
+    if name in columns or base in columns:
+        return name if name in columns else base
+    fitting = [
+        column
+        for column in columns
+        if _BRACKETED_UNIT.fullmatch(column, len(base)) and column.startswith(base)
+    ]
+    return fitting[0] if len(fitting) == 1 else base
 
 
 def looks_like_time(name: str) -> bool:
-    """Return whether a column's name is ``t``, ``t_*``, ``t/*``, ``time*`` or ``Zeit*``.
+    """Return whether a column's name is ``t``, ``t_*``, ``t/*`` or begins with a word such as ``time``.
 
-    ``T_K`` is a temperature.
+    ``x-axis*``, ``X_Value`` and ``second`` are the names that oscilloscopes and LabVIEW write. ``T_K`` is a
+    temperature.
     """
     return bool(_TIME.fullmatch(name)) and not (name[0] == "T" and parse_unit(name) in TEMPERATURE_UNITS)
 
@@ -45,16 +69,22 @@ def looks_like_time(name: str) -> bool:
 def seconds_per_unit(name: str) -> float | None:
     """Return the unit of a time column in seconds, None if the unit is unknown."""
     end = _END.search(name)
-    return TIME_UNITS.get("" if end is None or end[1].isdigit() else end[1].lower())
+    text = "" if end is None else normalise_unit(spell_unit(end[1].lower()))
+    return TIME_UNITS.get("" if text.isdigit() or text in _WORDS else text)
 
 
 def time_column(
-    names: Collection[str], file: str, taken: Collection[str] = (), structure: str = ""
+    names: Collection[str],
+    file: str,
+    taken: Collection[str] = (),
+    structure: str = "",
+    clocks: Mapping[str, str] = MappingProxyType({}),
 ) -> str | None:
     """Return the name of the time column, None if the file has no time column.
 
     ``t``, ``time`` and names with a unit of time take precedence over other words that begin with ``time``,
-    so that a file may contain both ``timestamp`` and ``t_s``.
+    so that a file may contain both ``timestamp`` and ``t_s``. Columns of time stamps come last, because other
+    columns are more precise.
 
     Parameters
     ----------
@@ -67,6 +97,8 @@ def time_column(
     structure : str
         The structure of the output (see `split_structures`). A time column among its fields takes precedence
         over one at the top level; fields of other structures are ignored.
+    clocks : mapping of str to str
+        Columns of time stamps, with the columns of their dates.
 
     Raises
     ------
@@ -83,15 +115,23 @@ def time_column(
         candidates = [
             name
             for name, field in fields.items()
-            if looks_like_time(field) and seconds_per_unit(field) is not None
+            if name not in {*clocks, *clocks.values()}
+            and looks_like_time(field)
+            and seconds_per_unit(field) is not None
         ]
         preferred = [
             name for name in candidates if fields[name].lower() in {"t", "time"} or parse_unit(fields[name])
         ] or candidates
-        if len(preferred) > 1:
-            raise RecordError(
-                f"{file}: columns {' and '.join(preferred)} may all be the time: rename all but one"
-            )
-        if preferred:
-            return preferred[0]
-    return None
+        if found := _check_single(preferred, file):
+            return found
+    stamps = [name for name in clocks if name not in taken]
+    return _check_single([name for name in stamps if looks_like_time(name)] or stamps, file)
+
+
+def _check_single(candidates: Sequence[str], file: str) -> str | None:
+    if len(candidates) > 1:
+        raise RecordError(
+            f"{file}: columns {' and '.join(candidates)} may all be the time: name one by --time "
+            "(library: time=)"
+        )
+    return candidates[0] if candidates else None

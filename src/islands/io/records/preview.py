@@ -11,7 +11,8 @@ from islands.data.channel_names import parse_unit
 from islands.errors import RecordError
 from islands.io.records.column_names import split_structures, time_column
 from islands.io.records.reader import open_record
-from islands.io.records.sampling import find_sampling
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.sampling.sampling_time import find_sampling
 from islands.io.records.table import Columns, RowRange, Table
 from islands.io.records.validation import (
     MIN_SAMPLES,
@@ -76,7 +77,7 @@ class Preview:
     warnings: tuple[str, ...]
 
 
-def preview(path: str | Path) -> Preview:
+def preview(path: str | Path, options: ReadingOptions = DEFAULT_READING) -> Preview:
     """Describe every column of a file separately, and list the problems of the file.
 
     Raises
@@ -84,13 +85,13 @@ def preview(path: str | Path) -> Preview:
     RecordError
         The file does not exist or cannot be read. Problems of single columns do not raise.
     """
-    table, file = open_record(path), Path(path).name
+    table, file = open_record(path, options), Path(path).name
     columns, unread = _read_columns(table)
     groups = _group_by_length(columns)
     main = groups[0][0] if groups else None
     unmatched, unequal = _check_lengths(groups, columns, file)
     problems = unread | unmatched
-    time, dt, sampling_problem = _preview_sampling(table, columns, problems, main, file)
+    time, dt, sampling_problem = _preview_sampling(table, columns, problems, main, file, options.time)
     for name, column in columns.items():
         problems.setdefault(name, _find_problem(column, name, is_time=name == time))
     warnings = (
@@ -168,12 +169,13 @@ def _preview_sampling(
     problems: Mapping[str, str],
     main: str | None,
     file: str,
+    given: str | None,
 ) -> tuple[str | None, float | None, str]:
     """Return the time column, the sampling time in seconds, and the reason if the latter is unknown."""
     time = None
     structure = split_structures(table.names)[main] if main else ""
     try:
-        time = time_column(table.names, file, structure=structure)
+        time = given or time_column(table.names, file, structure=structure, clocks=table.clocks)
         source = time or main
         if source is not None and source in problems:
             return time, None, problems[source]
@@ -182,7 +184,7 @@ def _preview_sampling(
             check_values(known, time)
             if len(known.rows) < 2:  # no step; the message of `check_length` is more helpful
                 return time, None, ""
-        return time, find_sampling(table, known, time, None, structure)[0], ""
+        return time, find_sampling(table, known, time, None, structure, given is not None)[0], ""
     except RecordError as error:
         return time, None, str(error)
 

@@ -5,23 +5,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
-from islands.data.input_lead import advance_inputs
 from islands.errors import RecordError
-from islands.io.records.column_names import find_column, split_structures, time_column
-from islands.io.records.mat.mat_file import read_matlab
-from islands.io.records.npz import read_archive
-from islands.io.records.parquet import read_parquet
-from islands.io.records.sampling import find_sampling
+from islands.io.records.formats.mat.mat_file import read_matlab
+from islands.io.records.formats.npz import read_archive
+from islands.io.records.formats.parquet import read_parquet
+from islands.io.records.formats.text.text_table import read_delimited
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.table import Table
-from islands.io.records.text.text_table import read_delimited
-from islands.io.records.validation import check_choice, check_length, check_values, check_varies
+from islands.io.records.table_reading import read_table
 
 #: Readers by file suffix. To add a format, write a reader and add an entry.
-READERS: dict[str, Callable[[Path], Table]] = {
+READERS: dict[str, Callable[[Path, ReadingOptions], Table]] = {
     ".csv": read_delimited,
     ".txt": read_delimited,
     ".tsv": read_delimited,
@@ -39,15 +34,26 @@ def read_record(
     dt: float | None = None,
     rows: slice | None = None,
     missing_output: bool = False,
+    *,
+    names: Sequence[str] = (),
+    header: bool = True,
+    time: str | None = None,
+    sheet: str | None = None,
+    decimal: str | None = None,
+    dates: str | None = None,
+    timezone: str | None = None,
+    resample: float | None = None,
+    gaps: str | None = None,
 ) -> Dataset:
-    """Read inputs and an output from a file (CSV, NPZ, MAT or Parquet) and check them.
+    """Read inputs and an output from a file and check them.
 
-    A column named ``t``, ``t_*``, ``time*`` or ``Zeit*`` that is neither input nor output is the time, in the
-    unit of its name (s, ms, us, ns, min, h; s by default). The unit of a column is the end of its name:
-    ``u_V``, ``u [V]`` or ``u/V``. Encoding, header, row of units, separator and decimal comma of a text file
-    are inferred. In a MAT-file, a field
-    of a structure is the column ``run.u``, its time ``run.t``; a matrix ``x`` of a few channels gives the
-    columns ``x_1, x_2 ...``.
+    The formats are text (CSV), XLSX, NPZ, MAT, HDF5, Parquet, MDF and TDMS; a file may be compressed as
+    ``.gz`` or ``.zip``. A column named ``t``, ``t_*``, ``time*`` or ``Zeit*`` that is not chosen is the time,
+    in the unit of its name (s, ms, us, ns, min, h; s by default). A column of time stamps is the time if no
+    other is. The unit of a column is the end of its name: ``u_V``, ``u [V]`` or ``u/V``. Encoding, header,
+    row of units, separator, decimal comma and separators of thousands of a text file are inferred. In a
+    MAT-file, a field of a structure is the column ``run.u``, its time ``run.t``; a matrix ``x`` of a few
+    channels gives the columns ``x_1, x_2 ...``.
 
     A model reads past inputs only. If the output responds within the sample (a band-limited input sampled at
     the same instants), name the input ``u_V+1``: it is read one sample early, so that its u(k-1) is the input
@@ -59,84 +65,72 @@ def read_record(
         The file. Its suffix selects the reader from `READERS`.
     inputs : sequence of str
         Names of the input columns, in the order of the model's inputs; ``u_V+1`` reads the column u_V one
-        sample early.
+        sample early, ``u`` the column ``u [V]``.
     output : str
         Name of the output column.
     dt : float, optional
         Sampling time in seconds, for files that do not contain it. If the file contains it, both must agree
-        within 1 %. An NPZ or MAT file may contain it as a single number ``dt`` or ``Ts`` (seconds) or ``fs``
-        (hertz).
+        within 1 %; time stamps with jitter or few digits are then replaced. An NPZ or MAT file may contain it
+        as a single number ``dt`` or ``Ts`` (seconds) or ``fs`` (hertz).
     rows : slice, optional
         Samples to read, counted from 0 without the header. Samples outside are not checked.
     missing_output : bool
         Accept an output with missing values, which a free run needs in its warm-up only, and constant
         channels: a constant input can be simulated, although nothing can be estimated from it.
+    names : sequence of str, optional
+        Names of the columns of a table without a header, or in place of its header.
+    header : bool
+        Whether a table has a header. Without one and without ``names``, the columns are c1, c2, ...
+    time : str, optional
+        The time column, if its name does not tell. Without a unit it is in seconds.
+    sheet : str, optional
+        Sheet of a workbook, or group of an HDF5, MDF or TDMS file; by default the first with a table.
+    decimal : str, optional
+        Decimal mark, ``point`` or ``comma``; by default inferred from all numbers.
+    dates : str, optional
+        ``day-first`` or ``month-first`` for dates such as 3/4/2026; by default inferred from all dates.
+    timezone : str, optional
+        Time zone of time stamps without an offset, such as ``Europe/Berlin``, for changes to summer time.
+    resample : float, optional
+        Sampling time in seconds of a new uniform grid, by linear interpolation; before a coarser grid a
+        low-pass filter removes frequencies above half of the new rate.
+    gaps : str, optional
+        For gaps in the time and missing values: ``split`` makes each part a segment, ``interpolate`` fills
+        them linearly.
 
     Returns
     -------
     Dataset
-        One segment of float64 with the columns' names and units; ``start`` is the time of the first sample.
+        float64 with the columns' names and units; ``start`` is the time of the first sample; ``reading``
+        states what ``resample`` and ``gaps`` have done.
 
     Raises
     ------
     RecordError
         The record cannot be used as it is. The message names the row and the column and says what to do.
+    SettingsError
+        An option is invalid.
     """
-    record = read_table(open_record(path), Path(path).name, inputs, output, dt, rows, missing_output)
-    return replace(record, sha256=fingerprint(path))
+    options = ReadingOptions(tuple(names), header, time, sheet, decimal, dates, timezone, resample, gaps)
+    return read_dataset(path, inputs, output, dt, rows, missing_output, options)
 
 
-def read_table(
-    table: Table,
-    file: str,
+def read_dataset(
+    path: str | Path,
     inputs: Sequence[str],
     output: str,
     dt: float | None = None,
     rows: slice | None = None,
     missing_output: bool = False,
+    options: ReadingOptions = DEFAULT_READING,
 ) -> Dataset:
-    """Read inputs and an output from an open table and check them.
-
-    Parameters
-    ----------
-    table : Table
-    file : str
-        Name of the table in messages.
-    inputs, output, dt, rows, missing_output
-        As in `read_record`.
-
-    Raises
-    ------
-    RecordError
-        As in `read_record`.
-    """
-    inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
-    sources = [find_column(name, table.names) for name in inputs]
-    check_choice(table.names, sources, output, file)
-    structures = split_structures(table.names)
-    time = time_column(table.names, file, (*sources, output), structures[output])
-    columns = table.read((*sources, output, *([time] if time else [])), rows)
-    check_length(columns)
-    for name in columns.numbers:
-        check_values(columns, name, missing=missing_output and name == output)
-    step, start = find_sampling(table, columns, time, dt, structures[output])
-    for name in () if missing_output else (*sources, output):
-        check_varies(columns, name)
-    record = Dataset(
-        u=np.column_stack([columns.numbers[source] for source in sources]),
-        y=columns.numbers[output],
-        dt=step,
-        input_names=tuple(sources),
-        output_name=output,
-        input_units=tuple(parse_unit(source.removeprefix(structures[source])) for source in sources),
-        output_unit=parse_unit(output.removeprefix(structures[output])),
-        recordings=(file,),
-        start=step * columns.first if start is None else start,
-    )
-    return advance_inputs(record, [place for place, name in enumerate(inputs) if name != sources[place]])
+    """Read a record like `read_record`, with the options as one value."""
+    table, file = open_record(path, options), Path(path).name
+    record = read_table(table, file, inputs, output, dt, rows, missing_output, options)
+    return replace(record, sha256=fingerprint(path))
 
 
-def read_columns(path: str | Path) -> tuple[str, ...]:
+def read_columns(path: str | Path, options: ReadingOptions = DEFAULT_READING) -> tuple[str, ...]:
     """Return the names of the columns (NPZ and MAT: arrays) of a file, in the file's order.
 
     Raises
@@ -144,7 +138,7 @@ def read_columns(path: str | Path) -> tuple[str, ...]:
     RecordError
         The file does not exist or cannot be read.
     """
-    return open_record(path).names
+    return open_record(path, options).names
 
 
 def fingerprint(path: str | Path) -> str:
@@ -159,7 +153,7 @@ def fingerprint(path: str | Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def open_record(path: str | Path) -> Table:
+def open_record(path: str | Path, options: ReadingOptions = DEFAULT_READING) -> Table:
     """Open a file with the reader for its suffix.
 
     Raises
@@ -174,7 +168,7 @@ def open_record(path: str | Path) -> Table:
             f"{file.name}: files ending in '{file.suffix}' are not supported, only {', '.join(READERS)}: "
             "export the record to one of these"
         )
-    return reader(file)
+    return reader(file, options)
 
 
 def _check_readable(path: str | Path) -> Path:

@@ -19,7 +19,7 @@ class RowRange:
     file : str
         The file's name.
     counted : str
-        Unit of the numbers: ``"line"`` (the header is line 1) or ``"sample"`` (the first one is 0).
+        Unit of the numbers: ``"line"`` or ``"row"`` (the first is 1), or ``"sample"`` (the first is 0).
     numbers : sequence of int
         Line or sample number of every sample.
     """
@@ -52,11 +52,14 @@ class Columns:
         float64 arrays of equal length; missing cells are NaN.
     first : int
         Index of the first selected sample in the file, from 0.
+    clocks : frozenset of str
+        Columns of time stamps: their numbers are seconds after the first selected sample.
     """
 
     rows: RowRange
     numbers: Mapping[str, NDArray[np.float64]]
     first: int
+    clocks: frozenset[str] = frozenset()
 
 
 class Table(Protocol):
@@ -68,6 +71,11 @@ class Table(Protocol):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the columns in the file's order."""
+        ...
+
+    @property
+    def clocks(self) -> Mapping[str, str]:
+        """Columns of time stamps, with the column that contains their dates; empty if there is none."""
         ...
 
     def stated(self, structure: str) -> Mapping[str, float]:

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.io.records.table import Columns
@@ -28,7 +29,9 @@ def check_unique(names: Sequence[str], file: str) -> None:
         raise RecordError(f"{file} has several columns named {repeated[0]}: rename them in the header")
 
 
-def check_choice(names: Sequence[str], inputs: Sequence[str], output: str, file: str) -> None:
+def check_choice(
+    names: Sequence[str], inputs: Sequence[str], output: str, file: str, time: str | None = None
+) -> None:
     """Refuse an invalid choice of columns.
 
     Raises
@@ -45,7 +48,9 @@ def check_choice(names: Sequence[str], inputs: Sequence[str], output: str, file:
     repeated = [name for name, count in Counter(inputs).items() if count > 1]
     if repeated:
         raise RecordError(f"column {repeated[0]} is given as an input twice: name it once")
-    for name in (*inputs, output):
+    if time is not None and time in (*inputs, output):
+        raise RecordError(f"column {time} is given as the time and as an input or output: name another one")
+    for name in (*inputs, output, *([] if time is None else [time])):
         if name not in names:
             raise RecordError(
                 f"{file} has no column {name}; it has {_list_names(names)}{_suggest(name, names)}"
@@ -123,10 +128,31 @@ def check_values(columns: Columns, name: str, missing: bool = False) -> None:
             f"{rows.place(sample, name)} and all below, to {rows.row(-1)}, are empty or NaN: the channels "
             "have unequal lengths; complete the column or select the rows that are complete"
         )
+    count = int(absent.sum())
+    others = f", as are {count - 1} others of the column," if count > 1 else ""
     raise RecordError(
-        f"{rows.place(sample, name)} is empty or NaN: repair it, for example by interpolation, or select "
-        "rows without it"
+        f"{rows.place(sample, name)}{others} is empty or NaN: give --gaps interpolate to fill it or "
+        "--gaps split to leave the row out (library: gaps=), or select rows without it"
     )
+
+
+def check_repaired(values: NDArray[np.float64], name: str, file: str, missing: bool) -> None:
+    """Refuse a column without any value, and an infinite value.
+
+    Raises
+    ------
+    RecordError
+        A value is infinite, or is missing although missing values were to be repaired.
+    """
+    if len(values) < MIN_SAMPLES:
+        raise RecordError(
+            f"{file}: {len(values)} samples remain, and at least {MIN_SAMPLES} are needed: use a "
+            "longer record, a shorter --resample, or --gaps interpolate"
+        )
+    if np.isinf(values).any():
+        raise RecordError(f"{file}: column {name} has an infinite value: repair it or leave the row out")
+    if not missing and np.isnan(values).any():
+        raise RecordError(f"{file}: column {name} has no values: choose another column")
 
 
 def check_varies(columns: Columns, name: str) -> None:
@@ -138,7 +164,8 @@ def check_varies(columns: Columns, name: str) -> None:
         All values are equal.
     """
     rows, values = columns.rows, columns.numbers[name]
-    if values.min() == values.max():
+    values = values[~np.isnan(values)]
+    if values.size and values.min() == values.max():
         raise RecordError(
             f"{rows.file}: column {name} is constant, {values[0]:.6g} from {rows.row(0)} to {rows.row(-1)}: "
             "choose a column, or rows, that vary"

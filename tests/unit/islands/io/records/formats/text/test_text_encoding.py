@@ -6,7 +6,7 @@ import pytest
 
 from islands.errors import RecordError
 from islands.io.records import preview, read_record
-from islands.io.records.text.text_encoding import decode
+from islands.io.records.formats.text.text_encoding import decode
 from support.bad_records import changed, refusal
 
 WESTERN = "t [s];u [V];y [µm];Größe (m/s²);Temperatur [°C]\n0,1;1;2;3;4\n"

@@ -12,7 +12,7 @@ from pyarrow import parquet
 
 from islands.errors import RecordError
 from islands.io.records import read_columns, read_record
-from islands.io.records.parquet import read_parquet
+from islands.io.records.formats.parquet import read_parquet
 from islands.io.records.size_limits import MOST_SAMPLES
 
 SAMPLES = 60

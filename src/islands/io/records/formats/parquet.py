@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.io.records.column_names import seconds_per_unit
-from islands.io.records.columnar import ColumnarFile
+from islands.io.records.formats.columnar import ColumnarFile
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.size_limits import check_samples
 
 #: Rows decoded at a time. Memory use then depends on the stored pages, not on the row count that the file
@@ -22,7 +23,7 @@ _BATCH = 2**16
 _TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
-def read_parquet(path: Path) -> ColumnarFile:
+def read_parquet(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarFile:
     """Open a Parquet file. Columns are read on demand.
 
     Numbers and booleans become float64, nulls become NaN. Dates and times become numbers in the unit of the
@@ -34,6 +35,7 @@ def read_parquet(path: Path) -> ColumnarFile:
     RecordError
         The file is not a Parquet file or is damaged, or pyarrow is not installed.
     """
+    options.check_array_file(path.name)
     file = path.name
     if path.stat().st_size == 0:
         raise RecordError(f"{file} is empty: write it again")

@@ -1,7 +1,7 @@
 """Files with one array per column: the common part of NumPy archives, MAT-files and Parquet."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -34,12 +34,15 @@ class ColumnarFile:
         Returns the array with a given name as stored in the file; raises `RecordError`.
     scalars : sequence of str
         Arrays that may be single numbers. Those with a name in `SAMPLING` state the sampling.
+    clocks : mapping of str to str
+        See `islands.io.records.table.Table`.
     """
 
     file: str
     names: tuple[str, ...]
     load: Callable[[str], NDArray[Any]]
     scalars: Sequence[str] = ()
+    clocks: Mapping[str, str] = field(default_factory=dict)
 
     def stated(self, structure: str) -> Mapping[str, float]:
         """Return the sampling times stated in the file; see `islands.io.records.table.Table`."""

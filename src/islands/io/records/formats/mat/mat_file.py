@@ -3,9 +3,10 @@
 from pathlib import Path
 
 from islands.errors import RecordError
-from islands.io.records.columnar import ColumnarFile
-from islands.io.records.mat import v4, v5, v73
-from islands.io.records.mat.workspace import make_columns
+from islands.io.records.formats.columnar import ColumnarFile
+from islands.io.records.formats.mat import v4, v5, v73
+from islands.io.records.formats.mat.workspace import make_columns
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 
 #: Signature of HDF5 and its possible offsets. MATLAB writes a header of 512 bytes before it.
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -18,7 +19,7 @@ _OTHER_FORMATS = {
 }
 
 
-def read_matlab(path: Path) -> ColumnarFile:
+def read_matlab(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarFile:
     """Open a MAT-file.
 
     Vectors become columns with their names, fields of structures become ``run.u``, and matrices of a few
@@ -30,6 +31,7 @@ def read_matlab(path: Path) -> ColumnarFile:
     RecordError
         The file is not a MAT-file, is damaged, or has more variables than `workspace.MOST_VARIABLES`.
     """
+    options.check_array_file(path.name)
     file = path.name
     with path.open("rb") as stream:
         head = stream.read(_HDF5_STARTS[-1] + len(_HDF5))

@@ -1,13 +1,17 @@
 """Start of a table in a text file: its separator, the lines before it, its header and its row of units."""
 
 import csv
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
 
-from islands.data.channel_names import is_unit, parse_unit
+from islands.data.channel_names import is_unit, parse_unit, spell_unit
 from islands.errors import RecordError
-from islands.io.records.text.number_parsing import MISSING, is_number
+from islands.io.records.formats.text.number_format import is_number
+from islands.io.records.formats.text.number_parsing import is_missing
+from islands.io.records.formats.text.time_stamps import kind_of
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 
 #: Separators in order of preference. The comma follows the others because it may be a decimal mark; runs of
 #: blanks come last.
@@ -19,6 +23,11 @@ _COMMENTS = "#%!"
 #: Lines of samples that decide where a table starts, and lines that may precede it.
 _SAMPLES, _MOST_LINES = 5, 300
 
+_NO_HEADER = (
+    "add a header line, for example t_s,u_V,y_um, or give --no-header for the names c1, c2, ... or "
+    "--names a,b,c (library: header=False or names=)"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class TableStart:
@@ -28,27 +37,27 @@ class TableStart:
     ----------
     separator : str
         One of `SEPARATORS`.
-    header : int
-        Index of the line with the names.
+    header : int or None
+        Index of the line with the names; None if the file does not contain them.
     names : tuple of str
         Names of the columns, with the units of a row of units in brackets.
     first : int
         Index of the line after the header and the units.
     described : bool
-        Whether lines with a description of the measurement precede the header.
+        Whether lines with a description of the measurement precede the table.
     has_units : bool
         Whether a row of units follows the header.
     """
 
     separator: str
-    header: int
+    header: int | None
     names: tuple[str, ...]
     first: int
     described: bool
     has_units: bool
 
 
-def find_table(lines: Sequence[str], file: str) -> TableStart:
+def find_table(lines: Sequence[str], file: str, options: ReadingOptions = DEFAULT_READING) -> TableStart:
     """Find the header of a table.
 
     The header is the first line if one of the lines below is a sample with as many cells. Otherwise it is the
@@ -60,14 +69,22 @@ def find_table(lines: Sequence[str], file: str) -> TableStart:
         Lines of the file, of which at least one is not blank.
     file : str
         Name of the file, for messages.
+    options : ReadingOptions
+        Whether the table has a header, and the names if it has none.
 
     Raises
     ------
     RecordError
-        The samples have no header.
+        The samples have no header, or another number of columns than names are given.
     """
     top = next(index for index, line in enumerate(lines) if line.strip())
+    given = re.fullmatch(r"\ufeff?sep=(.)\s*", lines[top])  # a line for Excel
+    if given:
+        top = next((at for at in range(top + 1, len(lines)) if lines[at].strip()), top)
+    if not options.has_header:
+        return _find_without_header(lines, top, file, options.names)
     separator = _infer_separator(_uncomment(lines[top]), list(islice(_list_filled(lines, top + 1), _SAMPLES)))
+    separator = given[1] if given else separator
     cells, first = _read_row(lines, top, separator)
     start = top
     if not _fits(len(cells), lines, first, separator) and (found := _find_samples(lines, top)):
@@ -77,13 +94,31 @@ def find_table(lines: Sequence[str], file: str) -> TableStart:
     if first == len(lines) > start + 1:
         raise RecordError(f"{file}, line {start + 1}: is a quote never closed?")
     names = tuple(name.strip() for name in cells)
-    _check_header(names, file, start + 1)
     following = next((at for at in range(first, len(lines)) if lines[at].strip()), None)
     units = [] if following is None else _read_units(lines[following], separator)
     has_units = following is not None and len(units) == len(names)
+    _check_header(names, file, start + 1, has_units)
     if following is not None and has_units:
         names, first = tuple(map(_add_unit, names, units)), following + 1
     return TableStart(separator, start, names, first, start > top, has_units)
+
+
+def _find_without_header(lines: Sequence[str], top: int, file: str, given: tuple[str, ...]) -> TableStart:
+    """Find the samples of a table whose names are given or are c1, c2, ..."""
+    found = _find_samples(lines, top)
+    if found is None:
+        raise RecordError(
+            f"{file} has no lines of numbers: export the record as a table, one line per sample"
+        )
+    separator, samples = found
+    width = len(_split(lines[samples], separator))
+    names = given or tuple(f"c{number + 1}" for number in range(width))
+    if len(names) != width:
+        raise RecordError(
+            f"{file}, line {samples + 1} has {width} columns, and --names (library: names=) gives "
+            f"{len(names)}: name all columns in their order"
+        )
+    return TableStart(separator, None, names, samples, samples > top, False)
 
 
 def _read_row(lines: Sequence[str], at: int, separator: str) -> tuple[list[str], int]:
@@ -152,32 +187,36 @@ def _find_samples(lines: Sequence[str], top: int) -> tuple[str, int] | None:
 
 
 def _is_sample(cells: Sequence[str]) -> bool:
-    """Return whether all cells but one, which may be a time stamp, are numbers or missing."""
-    numbers = sum(is_number(cell) for cell in cells)
-    others = sum(not is_number(cell) and cell.strip().lower() not in MISSING for cell in cells)
-    return numbers > 0 and others <= 1
+    """Return whether the cells are numbers, time stamps or missing, except for one that is not the first.
+
+    A line of a description begins with text: ``Sample interval,4e-09``.
+    """
+    is_text = [not (is_number(cell) or is_missing(cell) or kind_of(cell)) for cell in cells]
+    return any(map(is_number, cells)) and sum(is_text) <= 1 and not is_text[0]
 
 
 def _find_header(lines: Sequence[str], top: int, samples: int, separator: str, file: str) -> int:
     """Return the index of the header above the samples; the line above may be a row of units."""
     width = len(_split(lines[samples], separator))
     above = [at for at in range(top, samples) if lines[at].strip()]
-    fitting = [at for at in above if len(_split(_uncomment(lines[at]), separator)) == width]
+    # The last column may be empty in all samples: a comment.
+    widths = {at: len(_split(_uncomment(lines[at]), separator)) for at in above}
+    fitting = [at for at in above if widths[at] in (width, width + 1)]
     if above == [top] or (fitting and fitting[0] == top and fitting[-1] != above[-1]):
         # Another number of cells, in all samples or in the first ones, is reported when they are read.
         return top
     if not fitting or fitting[-1] != above[-1]:
         raise RecordError(
             f"{file}, line {samples + 1} is the first sample, and the line above has no names of its {width} "
-            "columns: add a header line, for example t_s,u_V,y_um"
+            f"columns: {_NO_HEADER}"
         )
-    is_units = len(_read_units(lines[fitting[-1]], separator)) == width
+    is_units = len(_read_units(lines[fitting[-1]], separator)) == widths[fitting[-1]]
     return fitting[-2] if is_units and len(fitting) > 1 and fitting[-2] == above[-2] else fitting[-1]
 
 
 def _read_units(line: str, separator: str) -> list[str]:
     """Return the cells of a row of units without brackets; empty if it is not such a row."""
-    cells = [cell.strip().strip("[]()").strip() for cell in _split(_uncomment(line), separator)]
+    cells = [spell_unit(cell.strip().strip("[]()").strip()) for cell in _split(_uncomment(line), separator)]
     units = [cell for cell in cells if cell not in ("", "-")]
     return cells if units and all(map(is_unit, units)) else []
 
@@ -186,10 +225,8 @@ def _add_unit(name: str, unit: str) -> str:
     return name if unit in ("", "-") or parse_unit(name) else f"{name} [{unit}]"
 
 
-def _check_header(names: Sequence[str], file: str, line: int) -> None:
+def _check_header(names: Sequence[str], file: str, line: int, has_units: bool) -> None:
+    """Refuse a line of numbers as a header. A few names of channels may be numbers: ``x-axis,1,2``."""
     number = next((name for name in names if is_number(name)), None)
-    if number is not None:
-        raise RecordError(
-            f"{file}, line {line} contains the number {number} instead of a name: add a header line, "
-            "for example t_s,u_V,y_um"
-        )
+    if number is not None and not has_units and (_is_sample(names) or all(map(is_number, names))):
+        raise RecordError(f"{file}, line {line} contains the number {number} instead of a name: {_NO_HEADER}")

@@ -11,8 +11,8 @@ from scipy.sparse import csc_array
 
 from islands.errors import RecordError
 from islands.io.records import read_columns, read_record
-from islands.io.records.mat.mat_file import read_matlab
-from islands.io.records.mat.workspace import ADVICE, MOST_CHANNELS
+from islands.io.records.formats.mat.mat_file import read_matlab
+from islands.io.records.formats.mat.workspace import ADVICE, MOST_CHANNELS
 
 VERSIONS = ["4", "6", "7", "7.3"]
 WITH_STRUCTURES = VERSIONS[1:]

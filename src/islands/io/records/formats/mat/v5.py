@@ -19,7 +19,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.io.records.mat.workspace import DAMAGED, Variable
+from islands.io.records.formats.mat.workspace import DAMAGED, Variable
 from islands.io.records.size_limits import DENSEST, MOST_SAMPLES
 
 _HEADER = 128  # bytes before the first element
@@ -70,7 +70,7 @@ def read_variables(content: bytes) -> Iterator[Variable] | None:
     """Yield the variables and structure fields of a MAT-file of versions 5 to 7.
 
     Return None if the file has another format. The iterator raises one of
-    `islands.io.records.mat.workspace.DAMAGED` if the bytes are damaged.
+    `islands.io.records.formats.mat.workspace.DAMAGED` if the bytes are damaged.
     """
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     return None if order is None else _iterate_variables(_Span(content, order, _HEADER, len(content)))

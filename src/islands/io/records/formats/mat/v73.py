@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.io.records.mat.workspace import Variable
+from islands.io.records.formats.mat.workspace import Variable
 from islands.io.records.size_limits import check_samples, check_stored
 
 _DEFLATE = 1
@@ -24,7 +24,7 @@ _MAX_DEPTH = 32  # nested groups
 def read_variables(path: Path) -> Iterator[Variable]:
     """Yield the variables of a MAT-file of version 7.3 and the fields of its structures.
 
-    Raises one of `islands.io.records.mat.workspace.DAMAGED` if the file is damaged.
+    Raises one of `islands.io.records.formats.mat.workspace.DAMAGED` if the file is damaged.
     """
     import h5py  # noqa: PLC0415
 

@@ -8,7 +8,7 @@ import pytest
 
 from islands.errors import RecordError
 from islands.io.records import read_columns, read_record
-from islands.io.records.mat.workspace import ADVICE
+from islands.io.records.formats.mat.workspace import ADVICE
 from islands.io.records.size_limits import MOST_SAMPLES
 
 K = np.arange(60)
@@ -187,7 +187,7 @@ def test_the_nesting_of_structures_is_limited(write, refusal):
 
 
 def test_a_file_with_too_many_variables_is_refused(write, monkeypatch, refusal):
-    monkeypatch.setattr("islands.io.records.mat.workspace.MOST_VARIABLES", 50)
+    monkeypatch.setattr("islands.io.records.formats.mat.workspace.MOST_VARIABLES", 50)
     many = [numbers(f"v{index}", U) for index in range(48)]
     assert len(read_columns(write(*many[:47]))) == 50
     assert "bad.mat has more than 50 variables" in refusal(write(*many))

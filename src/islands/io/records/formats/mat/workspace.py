@@ -12,7 +12,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.columnar import ColumnarFile
+from islands.io.records.formats.columnar import ColumnarFile
 from islands.io.records.size_limits import check_samples
 from islands.io.records.validation import MIN_SAMPLES
 

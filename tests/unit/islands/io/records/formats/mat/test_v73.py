@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from islands.io.records import read_columns, read_record
-from islands.io.records.mat.mat_file import read_matlab
-from islands.io.records.mat.v73 import read_variables
-from islands.io.records.mat.workspace import ADVICE
+from islands.io.records.formats.mat.mat_file import read_matlab
+from islands.io.records.formats.mat.v73 import read_variables
+from islands.io.records.formats.mat.workspace import ADVICE
 
 K = np.arange(60)
 U, Y = K % 7 - 3.0, K * K % 11 + 0.5

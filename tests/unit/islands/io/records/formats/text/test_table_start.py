@@ -5,7 +5,7 @@ import pytest
 
 from islands.errors import RecordError
 from islands.io.records import preview, read_record
-from islands.io.records.text.table_start import find_table
+from islands.io.records.formats.text.table_start import find_table
 
 SAMPLES = [f"{k / 100:.2f};{k % 7};{k % 11}" for k in range(60)]
 

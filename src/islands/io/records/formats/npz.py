@@ -13,7 +13,8 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.columnar import ColumnarFile
+from islands.io.records.formats.columnar import ColumnarFile
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.size_limits import check_samples, check_stored
 
 #: Exceptions that NumPy and the standard library raise for damaged archives and for Python objects in valid
@@ -25,7 +26,7 @@ UNREADABLE = (ValueError, OSError, EOFError, RuntimeError, struct.error, zipfile
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
-def read_archive(path: Path) -> ColumnarFile:
+def read_archive(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarFile:
     """Open a NumPy archive.
 
     Raises
@@ -33,6 +34,7 @@ def read_archive(path: Path) -> ColumnarFile:
     RecordError
         The file is not a NumPy archive, is empty or is damaged.
     """
+    options.check_array_file(path.name)
     if path.stat().st_size == 0:
         raise RecordError(f"{path.name} is empty: write it again with numpy.savez")
     if not zipfile.is_zipfile(path):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.io.records.mat.workspace import Variable
+from islands.io.records.formats.mat.workspace import Variable
 
 _HEADER = 20  # bytes before the name
 _TYPES = {0: "f8", 1: "f4", 2: "i4", 3: "i2", 4: "u2", 5: "u1"}

@@ -1,0 +1,134 @@
+"""Options of reading a record, for what a file leaves open: names, table, number format, dates, sampling."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from math import isfinite
+from typing import Any
+from zoneinfo import ZoneInfo
+
+from islands.errors import SettingsError
+
+#: Characters of the decimal marks by the values of ``decimal``.
+DECIMAL_MARKS = {"point": ".", "comma": ","}
+
+#: Values of ``dates``: the order of day and month in dates such as 3/4/2026.
+DATE_ORDERS = ("day-first", "month-first")
+
+#: Values of ``gaps``.
+GAPS = ("split", "interpolate")
+
+
+def _option(help_text: str, default: Any = None) -> Any:
+    return field(default=default, metadata={"help": help_text})
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingOptions:
+    """Options of reading a file. The options of the command line are generated from the fields.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the columns of a table without a header, or instead of its header.
+    header : bool
+        Whether a text table or a sheet has a header. Without one, and without ``names``, the columns are c1,
+        c2, ...
+    time : str, optional
+        The time column; by default it is found by its name.
+    sheet : str, optional
+        Sheet of a workbook, or group of an HDF5, MDF or TDMS file; by default the first with a table.
+    decimal : str, optional
+        ``point`` or ``comma``; by default inferred.
+    dates : str, optional
+        ``day-first`` or ``month-first``; by default inferred from all dates of a column.
+    timezone : str, optional
+        Time zone of time stamps without an offset, such as ``Europe/Berlin``.
+    resample : float, optional
+        Sampling time in seconds to which the record is resampled.
+    gaps : str, optional
+        ``split`` makes a segment of each part between gaps, ``interpolate`` fills them.
+
+    Raises
+    ------
+    SettingsError
+        A value is invalid.
+    """
+
+    names: tuple[str, ...] = _option("Names of the columns of a table without header, as a,b,c.", ())
+    header: bool = _option("The table has no header: its columns are c1, c2, ...", True)
+    time: str | None = _option("Time column, if its name does not tell.")
+    sheet: str | None = _option("Sheet of a workbook, or group of a file; by default the first with a table.")
+    decimal: str | None = _option("Decimal mark: point or comma; by default inferred.")
+    dates: str | None = _option("Order in dates such as 3/4/2026: day-first or month-first.")
+    timezone: str | None = _option("Time zone of time stamps without offset, as Europe/Berlin.")
+    resample: float | None = _option("Resample to this sampling time in seconds.")
+    gaps: str | None = _option("Gaps and missing values: split into segments, or interpolate.")
+
+    def __post_init__(self) -> None:
+        names = tuple(name.strip() for name in self.names)
+        if not all(names) or len(set(names)) < len(names):
+            raise SettingsError(f"--names {','.join(names)}: give every column another name")
+        object.__setattr__(self, "names", names)
+        _check_choice("decimal", self.decimal, DECIMAL_MARKS)
+        _check_choice("dates", self.dates, DATE_ORDERS)
+        _check_choice("gaps", self.gaps, GAPS)
+        if self.resample is not None and not (isfinite(self.resample) and self.resample > 0):
+            raise SettingsError(f"--resample is a number of seconds above 0, got {self.resample}")
+        _check_timezone(self.timezone)
+
+    @property
+    def has_header(self) -> bool:
+        """Whether the names are in the file."""
+        return self.header and not self.names
+
+    @property
+    def decimal_mark(self) -> str | None:
+        """The decimal mark as a character, None if it is inferred."""
+        return None if self.decimal is None else DECIMAL_MARKS[self.decimal]
+
+    def check_array_file(self, file: str, sheets: bool = False) -> None:
+        """Refuse options of tables for a file of arrays, whose names and numbers are certain.
+
+        Raises
+        ------
+        SettingsError
+            An option does not apply.
+        """
+        given = {
+            "--names": self.names,
+            "--no-header": not self.header,
+            "--decimal": self.decimal,
+            "--dates": self.dates,
+            "--sheet": None if sheets else self.sheet,
+        }
+        for option, value in given.items():
+            if value:
+                raise SettingsError(f"{file} is not a table of text: leave {option} out")
+
+    def changes(self) -> Mapping[str, Any]:
+        """Return the options that differ from the default, as JSON values."""
+        given = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in given.items()
+            if value != getattr(DEFAULT_READING, name)
+        }
+
+
+def _check_choice(option: str, value: str | None, choices: Sequence[str] | Mapping[str, str]) -> None:
+    if value is not None and value not in choices:
+        raise SettingsError(f"--{option} is {' or '.join(choices)}, got {value!r}")
+
+
+def _check_timezone(name: str | None) -> None:
+    try:
+        if name is not None:
+            ZoneInfo(name)
+    except (OSError, ValueError, LookupError) as error:
+        raise SettingsError(
+            f"--timezone {name} is not a time zone of this machine: give a name such as Europe/Berlin or UTC"
+        ) from error
+
+
+#: Options of a file that is read without further information.
+DEFAULT_READING = ReadingOptions()

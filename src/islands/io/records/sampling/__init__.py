@@ -1,0 +1,1 @@
+"""Sampling of a record: its time column, gaps, and a uniform grid."""

@@ -1,0 +1,93 @@
+"""Inputs and an output of an open table, with checks for all that would make an identification fail."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from islands.data.channel_names import AT_ONCE, parse_unit
+from islands.data.dataset import Dataset
+from islands.data.input_lead import advance_inputs
+from islands.io.records.column_names import find_column, split_structures, time_column
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.sampling.recording import UniformRecording
+from islands.io.records.sampling.repair import make_uniform
+from islands.io.records.sampling.sampling_time import find_sampling, make_recording
+from islands.io.records.table import Table
+from islands.io.records.validation import (
+    check_choice,
+    check_length,
+    check_repaired,
+    check_values,
+    check_varies,
+)
+
+
+def read_table(
+    table: Table,
+    file: str,
+    inputs: Sequence[str],
+    output: str,
+    dt: float | None = None,
+    rows: slice | None = None,
+    missing_output: bool = False,
+    options: ReadingOptions = DEFAULT_READING,
+) -> Dataset:
+    """Read inputs and an output from an open table and check them.
+
+    Parameters
+    ----------
+    table : Table
+    file : str
+        Name of the table in messages.
+    inputs, output, dt, rows, missing_output
+        As in `islands.io.records.reader.read_record`.
+    options : ReadingOptions
+        The time column, and the repair of irregular sampling.
+
+    Raises
+    ------
+    RecordError
+        The record cannot be used as it is.
+    """
+    inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
+    sources = [find_column(name, table.names) for name in inputs]
+    output = find_column(output, table.names)
+    check_choice(table.names, sources, output, file, options.time)
+    structures = split_structures(table.names)
+    structure = structures[output]
+    clock = options.time or time_column(table.names, file, (*sources, output), structure, table.clocks)
+    columns = table.read(tuple(dict.fromkeys((*sources, output, *([clock] if clock else [])))), rows)
+    check_length(columns)
+    required = [name for name in columns.numbers if not (missing_output and name == output)]
+    if options.gaps is None:
+        for name in columns.numbers:
+            check_values(columns, name, missing=name not in required)
+    values = np.column_stack([columns.numbers[name] for name in (*sources, output)])
+    if options.gaps is None and options.resample is None:
+        step, start = find_sampling(table, columns, clock, dt, structure, options.time is not None)
+        found = UniformRecording(values, step, step * columns.first if start is None else start, (), ())
+    else:
+        recording = make_recording(table, columns, values, clock, dt, structure, options.time is not None)
+        places = [place for place, name in enumerate((*sources, output)) if name in required]
+        found = make_uniform(recording, places, options.gaps, options.resample)
+        for name, column in zip((*sources, output), found.values.T, strict=True):
+            check_repaired(column, name, file, missing=name not in required)
+    for name in () if missing_output else (*sources, output):
+        check_varies(columns, name)
+    record = Dataset(
+        u=found.values[:, :-1],
+        y=found.values[:, -1],
+        dt=found.dt,
+        input_names=tuple(sources),
+        output_name=output,
+        input_units=tuple(parse_unit(source.removeprefix(structures[source])) for source in sources),
+        output_unit=parse_unit(output.removeprefix(structure)),
+        segments=found.segments,
+        recordings=(file,) * max(1, len(found.segments)),
+        start=found.start,
+        reading=found.steps,
+    )
+    advanced = [
+        place for place, name in enumerate(inputs) if name.endswith(AT_ONCE) and name != sources[place]
+    ]
+    return advance_inputs(record, advanced)
