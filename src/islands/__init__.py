@@ -31,6 +31,7 @@ _PUBLIC = {
     "facade.fit": ("fit",),
     "facade.identify": ("identify",),
     "facade.results.fitted_model": ("FittedModel",),
+    "facade.results.model_analysis": ("linear_system",),
     "facade.results.model_simulation": ("simulate",),
     "facade.results.result": ("Result",),
     "facade.results.saved_result": ("SavedModel", "SavedResult", "read_result"),
@@ -38,9 +39,12 @@ _PUBLIC = {
     "io.models": ("read_model", "write_model"),
     "io.records": ("read_record", "write_record"),
     "model.model": ("Model", "make_model"),
+    "model.operating_point": ("static_characteristic",),
     "model.parsing": ("parse",),
     "model.primitives": ("PRIMITIVES",),
+    "model.sympy_expression": ("to_sympy",),
     "model.user_primitive": ("primitive",),
+    "simulation.step_response": ("step_response",),
 }
 _MODULES = {name: module for module, names in _PUBLIC.items() for name in names}
 

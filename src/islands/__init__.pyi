@@ -24,6 +24,7 @@ from islands.facade.explain_residual import explain_residual as explain_residual
 from islands.facade.fit import fit as fit
 from islands.facade.identify import identify as identify
 from islands.facade.results.fitted_model import FittedModel as FittedModel
+from islands.facade.results.model_analysis import linear_system as linear_system
 from islands.facade.results.model_simulation import simulate as simulate
 from islands.facade.results.result import Result as Result
 from islands.facade.results.saved_result import SavedModel as SavedModel
@@ -36,8 +37,11 @@ from islands.io.records import read_record as read_record
 from islands.io.records import write_record as write_record
 from islands.model.model import Model as Model
 from islands.model.model import make_model as make_model
+from islands.model.operating_point import static_characteristic as static_characteristic
 from islands.model.parsing import parse as parse
 from islands.model.primitives import PRIMITIVES as PRIMITIVES
+from islands.model.sympy_expression import to_sympy as to_sympy
 from islands.model.user_primitive import primitive as primitive
+from islands.simulation.step_response import step_response as step_response
 
 __version__: str

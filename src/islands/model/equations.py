@@ -35,14 +35,14 @@ def equation(model: Model, digits: int = 6) -> str:
 
 def _plain_terms(model: Model, digits: int) -> list[str]:
     parts = []
-    for position, expression in enumerate(_written(model)):
+    for position, expression in enumerate(expressions_of_record(model)):
         weight = f"theta{position + 1}" if model.theta is None else f"{model.theta[position]:.{digits}g}"
         constant = expression == Constant(1.0)
         parts.append(weight if constant else f"{weight}*{plain_factor(expression, model.inputs)}")
     return parts
 
 
-def _written(model: Model) -> list[Expression]:
+def expressions_of_record(model: Model) -> list[Expression]:
     """Return the expressions of the regressors in the columns of the record, without a lead."""
     leads = model.leads
     if not any(leads):
@@ -87,7 +87,7 @@ def signal_names(model: Model) -> tuple[str, ...]:
 
 def named_term(model: Model, position: int) -> str:
     """Write one regressor of a model with the column names of its record."""
-    return _name_signals(plain_factor(_written(model)[position], model.inputs), model)
+    return _name_signals(plain_factor(expressions_of_record(model)[position], model.inputs), model)
 
 
 def named_statement(text: str, model: Model) -> str:
@@ -116,7 +116,7 @@ def _name_signals(text: str, model: Model) -> str:
 def latex_equation(model: Model, digits: int = 6) -> str:
     """Write a model as one line of LaTeX without dollar signs."""
     parts = []
-    for position, expression in enumerate(_written(model)):
+    for position, expression in enumerate(expressions_of_record(model)):
         weight = (
             rf"\theta_{{{position + 1}}}"
             if model.theta is None
@@ -150,7 +150,7 @@ def mathml_equation(model: Model, digits: int = 6) -> str:
 def _mathml_terms(model: Model, digits: int) -> list[str]:
     """Return the terms of the model, each with its sign."""
     parts = []
-    for position, expression in enumerate(_written(model)):
+    for position, expression in enumerate(expressions_of_record(model)):
         number = f"theta{position + 1}" if model.theta is None else f"{model.theta[position]:.{digits}g}"
         if model.theta is None:
             weight = f"<msub><mi>&#x3B8;</mi><mn>{position + 1}</mn></msub>"

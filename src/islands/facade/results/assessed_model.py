@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
+from islands.facade.results.model_analysis import AnalysedModel
 from islands.facade.results.model_simulation import predict, record_of_model, simulate
 from islands.facade.results.notebook_html import render_html
 from islands.io.export import export, write_export
-from islands.model.equations import equation, latex_equation
-from islands.model.model import Model
 from islands.simulation.predictors import Simulation
 from islands.validation.metrics import Metrics
 from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from islands.io.data_frames import RecordLike
 
 
-class AssessedModel(ABC):
+class AssessedModel(AnalysedModel, ABC):
     """A model with its rank, its errors, and the settings of the simulations that measured them.
 
     Attributes
@@ -51,16 +50,12 @@ class AssessedModel(ABC):
 
     __slots__ = ()
 
-    # Declared only: at run time a property here would be the default of a field of a dataclass.
+    # Declared only, as in `AnalysedModel`.
     if TYPE_CHECKING:
 
         @property
         def rank(self) -> int:
             """Rank of the model."""
-
-        @property
-        def model(self) -> Model:
-            """Regressors, parameters, standard errors."""
 
         @property
         def metrics(self) -> Mapping[str, Mapping[str, Metrics]]:
@@ -78,10 +73,6 @@ class AssessedModel(ABC):
         def prediction_bands(self) -> PredictionBands | None:
             """Prediction bands of every level."""
 
-        @property
-        def output_unit(self) -> str:
-            """Unit of the output."""
-
     @property
     @abstractmethod
     def validation(self) -> Dataset:
@@ -92,16 +83,6 @@ class AssessedModel(ABC):
         ModelError
             The result was read from a folder, which has no data.
         """
-
-    @property
-    def equation(self) -> str:
-        """Equation as plain text."""
-        return equation(self.model)
-
-    @property
-    def latex(self) -> str:
-        """Equation in LaTeX."""
-        return latex_equation(self.model)
 
     def predict(
         self,

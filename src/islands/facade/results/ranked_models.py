@@ -35,7 +35,7 @@ class RankedModels(ABC, Generic[M]):
 
     __slots__ = ()
 
-    # Declared only, as in `AssessedModel`.
+    # Declared only, as in `AnalysedModel`.
     if TYPE_CHECKING:
 
         @property
