@@ -11,7 +11,7 @@ from typing import Any
 import typer
 from rich.table import Table
 
-from islands.io.model_table import LEGEND, MARK
+from islands.io.result_text.model_table import LEGEND, MARK
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView

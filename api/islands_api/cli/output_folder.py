@@ -32,4 +32,4 @@ def check_folder(folder: Path, force: bool, result: str = "result.json") -> None
 def show_result(result: "Result", folder: Path) -> None:
     """Print the summary and the files of a result."""
     output.print(str(result), markup=False)
-    output.print(f"{folder}/: result.json, models/, figures/, summary.txt", markup=False)
+    output.print(f"{folder}/: result.json, models/, figures/, summary.txt, method.txt", markup=False)

@@ -21,9 +21,9 @@ from islands.io.checkpoints import (
     state_document,
     state_from_document,
 )
-from islands.io.model_description import describe
 from islands.io.models import model_json
 from islands.io.result_folder import result_document
+from islands.io.result_text.model_description import describe
 from islands.model.equations import equation
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import parse_identification

@@ -9,8 +9,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup
 
 from islands.evolution.search_result import SearchResult
-from islands.io.model_description import describe
-from islands.io.model_table import LEGEND, columns, number, rows
+from islands.io.result_text.model_description import describe
+from islands.io.result_text.model_table import LEGEND, columns, number, rows
 from islands.model.equations import mathml_equation, named_term
 
 #: Environment of the HTML templates.

@@ -15,7 +15,7 @@ from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.certificates import certificates_document
 from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import terms_document, write_model
-from islands.io.summary_text import summary
+from islands.io.result_text.summary_text import method_text, summary
 from islands.model.equations import equation, latex_equation
 from islands.validation.assessment import PARTS
 from islands.validation.ensemble import Ensemble
@@ -176,7 +176,7 @@ def residual_structure_document(structure: ResidualStructure) -> dict[str, Any]:
 
 
 def write_result(found: SearchResult, folder: Path) -> None:
-    """Write ``models/NN.json``, ``summary.txt`` and, last, ``result.json``.
+    """Write ``models/NN.json``, ``summary.txt``, ``method.txt`` and, last, ``result.json``.
 
     Remove the model files of an earlier result in the same folder.
     """
@@ -187,6 +187,7 @@ def write_result(found: SearchResult, folder: Path) -> None:
     for rank, entry in enumerate(found.models, start=1):
         write_model(entry.model, models / f"{rank:02d}.json")
     (folder / "summary.txt").write_text(summary(found), encoding="utf-8")
+    (folder / "method.txt").write_text(method_text(found), encoding="utf-8")
     (folder / "result.json").write_text(result_json(found), encoding="utf-8")
 
 

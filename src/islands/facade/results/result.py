@@ -7,9 +7,9 @@ from islands.evolution.search_result import SearchResult
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
 from islands.facade.results.ranked_models import RankedModels, write_validation_key
-from islands.io.model_description import describe
 from islands.io.result_folder import content_sha256, write_result
-from islands.io.summary_text import summary
+from islands.io.result_text.model_description import describe
+from islands.io.result_text.summary_text import summary
 from islands.validation.recommendation import Recommendation
 
 
@@ -37,7 +37,7 @@ class Result(RankedModels[FittedModel]):
         return Result(replace(self.search_result, search=replace(self.search_result.search, wall_s=seconds)))
 
     def save(self, folder: str | Path) -> Path:
-        """Write ``result.json``, ``models/``, ``figures/`` (of the recommended model) and ``summary.txt``."""
+        """Write ``result.json``, the models, the figures of the recommended model, and the texts."""
         from islands.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
         from islands.figures.style import save  # noqa: PLC0415
 

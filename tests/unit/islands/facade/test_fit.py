@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset, join
+from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.io.result_folder import record_document, result_json
-from islands.io.summary_text import summary
+from islands.io.result_text.summary_text import summary
 from islands.model.equations import equation, latex_equation
-from islands.model.rendering import plain
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 from support.undrawn import undrawn_figures
 
@@ -31,11 +30,8 @@ def piezo(samples=600, seed=0, noise=0.002, **changes):
     return Dataset(u, y, **({"dt": 0.01, "input_names": ("u_V",), "output_name": "y_um"} | changes))
 
 
-TANK = {"y(k-1)": 0.6, "u(k-1)": 0.5, "u(k-1)^2": -0.2}
-
-
 def tank(samples=400, seed=0, size=1.0):
-    """Return a record of y(k) = 0.6 y(k-1) + 0.5 u(k-1) - 0.2 u(k-1)^2 + e(k)."""
+    """Return a record of a smooth first-order system."""
     rng = np.random.default_rng(seed)
     u, y = size * rng.uniform(-1, 1, samples), np.zeros(samples)
     for k in range(1, samples):
@@ -138,7 +134,13 @@ def test_result_is_saved_as_a_folder(result, tmp_path):
     with undrawn_figures():
         folder = result.with_wall_time(2.0).save(tmp_path / "new" / "out")
     assert folder == tmp_path / "new" / "out"
-    assert {path.name for path in folder.iterdir()} == {"result.json", "models", "figures", "summary.txt"}
+    assert {path.name for path in folder.iterdir()} == {
+        "result.json",
+        "models",
+        "figures",
+        "summary.txt",
+        "method.txt",
+    }
     figures = {path.name for path in (folder / "figures").iterdir()}
     assert figures >= {"free-run.svg", "loop.svg", "hold.svg", "residuals.svg"}
     search = json.loads((folder / "result.json").read_text())["search"]
@@ -233,19 +235,6 @@ def test_validation_data_need_the_same_inputs_and_sampling_time():
 
 
 # Records of every kind.
-
-
-def test_several_recordings_are_fitted_together():
-    parts = tuple(tank(samples, seed) for seed, samples in enumerate((100, 3, 160, 2, 140)))
-    made = islands.fit(join(parts), library="polynomial", max_terms=4)
-    assert made.search_result.record.segments == (100, 3, 160, 2, 140)
-    assert made.search_result.split.estimation.segments == (75, 2, 120, 2, 105)
-    assert list(made.search_result.recommended.assessment.recordings["validation"]) == ["1", "2", "3", "5"]
-    # Each recording has a warm-up of three samples.
-    assert made.search_result.search.full_set["bytes"] == 8 * 84 * (72 + 117 + 102)
-    model = {m.model.size: m.model for m in made.models}[3]
-    terms = {plain(item.expression): theta for item, theta in zip(model.regressors, model.theta, strict=True)}
-    assert terms == {name: pytest.approx(theta, abs=0.02) for name, theta in TANK.items()}
 
 
 def test_two_inputs_are_fitted_by_every_library():
@@ -377,21 +366,6 @@ def test_too_short_record_raises_an_error_with_advice(samples, error, message):
 @pytest.mark.ci
 def test_shortest_possible_record_is_fitted():
     assert islands.fit(tank(24), library="polynomial").models
-
-
-def test_a_law_is_found_in_a_record_with_missing_outputs():
-    y = tank().y.copy()
-    y[[3, 50, 51, 52, 120, 200, 350, 361]] = np.nan
-    made = islands.fit(with_output(tank(), y), library="polynomial", max_terms=4)
-    model = {m.model.size: m.model for m in made.models}[3]
-    terms = {plain(item.expression): theta for item, theta in zip(model.regressors, model.theta, strict=True)}
-    assert terms == {name: pytest.approx(theta, abs=0.02) for name, theta in TANK.items()}
-    assert "Missing outputs: 8 of 400 samples are skipped" in summary(made.search_result)
-
-
-def test_a_record_without_any_output_raises_record_error():
-    with pytest.raises(RecordError, match="is missing in every sample: choose another output"):
-        islands.fit(with_output(tank(), np.full(400, np.nan)))
 
 
 def test_output_of_zeros_raises_settings_error():

@@ -13,7 +13,7 @@ from islands.data.dataset import Dataset
 from islands.evolution.search_result import RankedModel
 from islands.io.models import read_model, terms_document
 from islands.io.result_folder import content_sha256, result_json, write_result
-from islands.io.summary_text import summary
+from islands.io.result_text.summary_text import summary
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 LOST = EvaluationOutcome(Status.DIVERGED, "|y| left 1e+06 at sample 17")
@@ -209,7 +209,11 @@ def test_a_record_without_a_file_has_the_hash_of_its_numbers():
 def test_the_folder_has_a_file_per_model_a_summary_and_a_result(findings, tmp_path):
     write_result(findings, tmp_path / "out")
     files = sorted(str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out").rglob("*.*"))
-    assert files == [*(f"models/0{rank}.json" for rank in range(1, 5)), "result.json", "summary.txt"]
+    assert files == [
+        "method.txt",
+        *(f"models/0{rank}.json" for rank in range(1, 5)),
+        *("result.json", "summary.txt"),
+    ]
     for rank, entry in enumerate(findings.models, start=1):
         assert read_model(tmp_path / "out" / "models" / f"0{rank}.json") == entry.model
     assert (tmp_path / "out" / "result.json").read_text() == result_json(findings)
@@ -233,7 +237,7 @@ def test_model_files_do_not_depend_on_the_folder_or_the_clock(findings, tmp_path
         (tmp_path / name).mkdir()
         monkeypatch.chdir(tmp_path / name)
         write_result(replace(findings, search=replace(findings.search, wall_s=seconds)), tmp_path / name)
-    names = ["summary.txt", *(f"models/0{rank}.json" for rank in range(1, 5))]
+    names = ["summary.txt", "method.txt", *(f"models/0{rank}.json" for rank in range(1, 5))]
     for name in names:
         assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
     assert str(tmp_path) not in "".join((tmp_path / "here" / name).read_text() for name in names)

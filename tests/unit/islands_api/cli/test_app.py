@@ -174,10 +174,11 @@ def test_read_only_folder_is_rejected(tmp_path, monkeypatch):
 
 def test_fit_prints_the_models_and_the_output_folder(fitted):
     out = fitted
-    assert "120 samples, 0.01 s: u_V to y_um" in out
     evaluations = json.loads(Path("out/result.json").read_text())["search"]["evaluations"]
-    assert f"{evaluations} models estimated: {evaluations} ok" in out
-    assert "out/: result.json, models/, figures/, summary.txt" in out
+    method = Path("out/method.txt").read_text()
+    assert method.startswith("120 samples, 0.01 s: u_V to y_um\n")
+    assert f"{evaluations} models estimated: {evaluations} ok" in method
+    assert "out/: result.json, models/, figures/, summary.txt, method.txt" in out
     assert Path("out/summary.txt").read_text() in out
     assert json.loads(Path("out/result.json").read_text())["search"]["wall_s"] > 0.0
 

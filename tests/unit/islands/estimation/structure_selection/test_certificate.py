@@ -17,7 +17,7 @@ from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import make_selection_problem, select_forward
 from islands.estimation.structure_selection.certificate import certify, combine_certificates
 from islands.io.result_folder import result_document
-from islands.io.summary_text import summary
+from islands.io.result_text.summary_text import method_text
 from islands.model.candidate_library import candidates
 from islands.model.expression import Lagged
 from islands.program.regressor_matrix import regressor_matrix
@@ -145,10 +145,10 @@ def test_fit_reports_the_gap_of_every_model():
         expected = 100.0 * max(0.0, 1.0 - entry["bound"] / errors[entry["terms"]])
         assert entry["gap_percent"] == pytest.approx(expected)
         assert entry["proved"] == (entry["gap_percent"] < 1e-4)
-    assert "possible reduction of the one-step error" in summary(found.search_result)
+    assert "possible reduction of the one-step error" in method_text(found.search_result)
 
 
 def test_fit_without_nodes_has_no_certificate():
     found = islands.fit(measured(), library="polynomial", degree=1, max_terms=2, certificate=0)
     assert result_document(found.search_result)["search"]["certificates"] == []
-    assert "possible reduction" not in summary(found.search_result)
+    assert "possible reduction" not in method_text(found.search_result)

@@ -10,7 +10,7 @@ import islands
 from islands.errors import ModelError, SettingsError
 from islands.io.checkpoints import read_checkpoint, state_document, state_from_document, write_checkpoint
 from islands.io.result_folder import result_json
-from islands.io.summary_text import summary
+from islands.io.result_text.summary_text import method_text
 from islands.model.primitives import PRIMITIVES
 from islands.model.rendering import plain
 from support.own_primitive import DEAD_ZONE, LAW, SEARCH, record
@@ -39,7 +39,7 @@ def test_result_records_the_name_and_the_source(result):
     settings = json.loads(result_json(result.search_result))["settings"]
     assert settings["primitives"] == ["mul", "dead_zone"]
     assert settings["own_primitives"]["dead_zone"].startswith("def dead_zone(a):\n    return max(")
-    assert "def dead_zone" not in summary(result.search_result)
+    assert "def dead_zone" not in method_text(result.search_result)
 
 
 def test_result_without_own_primitives_has_no_sources():

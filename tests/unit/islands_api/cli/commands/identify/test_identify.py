@@ -24,11 +24,12 @@ from support.identify_runs import COLUMNS, DEEPEST, SMALL, STEPWISE, TWO, models
 def test_run_writes_a_result_and_a_checkpoint_only(run, with_figures, tmp_path):
     code, out, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--seed", "4")
     assert (code, error) == (0, "")
-    assert "out/: result.json, models/, figures/, summary.txt" in out
+    assert "out/: result.json, models/, figures/, summary.txt, method.txt" in out
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "checkpoint.json",
         "figures",
         "hall.json",
+        "method.txt",
         "models",
         "result.json",
         "summary.txt",

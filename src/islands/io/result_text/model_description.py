@@ -42,39 +42,50 @@ _HINTS = {
 def describe(found: SearchResult) -> list[str]:
     """Describe the recommended model in sentences: equation, error, uses, failures and next steps.
 
-    Every statement is about a quantity of the assessment.
+    Every statement is about a quantity of the assessment. The equation and the units are indented.
     """
-    entry, recommendation = found.recommended, found.recommendation
-    choice, physics = (*recommendation.reasons, "")[:2]
-    rank, count = recommendation.rank, len(found.models)
-    lines = [
-        f"Recommended: model {rank} of {count}, size {entry.model.size}: {choice}.",
-        f"    {named_equation(entry.model)}",
-        _describe_units(found),
+    return [
+        describe_choice(found),
+        f"    {named_equation(found.recommended.model)}",
+        f"    {describe_units(found)}",
+        *describe_findings(found),
+    ]
+
+
+def describe_choice(found: SearchResult) -> str:
+    """State which model is recommended, and the first reason."""
+    recommendation, size = found.recommendation, found.recommended.model.size
+    return (
+        f"Recommended: model {recommendation.rank} of {len(found.models)}, size {size}: "
+        f"{recommendation.reasons[0]}."
+    )
+
+
+def describe_units(found: SearchResult) -> str:
+    """State the units of the columns, the sampling time and direct feedthrough."""
+    record = found.record
+    columns = zip(
+        signal_names(found.recommended.model), (record.output_unit, *record.input_units), strict=True
+    )
+    units = ", ".join(f"{name} in {unit}" for name, unit in columns if unit)
+    return f"{f'{units}; ' if units else ''}{_describe_rate(found)}.{_describe_feedthrough(found)}"
+
+
+def describe_findings(found: SearchResult) -> list[str]:
+    """Describe errors, uncertainty, uses, failures and next steps of the recommended model."""
+    entry = found.recommended
+    physics = (*found.recommendation.reasons, "")[1]
+    good = [*_list_uses(entry), *([physics] if physics and not physics.startswith("no model") else [])]
+    bad = [*([physics] if physics.startswith("no model") else []), *_list_failures(found, entry)]
+    return [
         _describe_error(found, entry),
         *_describe_recordings(found, entry),
         *_describe_uncertainty(found, entry),
         *_describe_constraints(entry),
-    ]
-    good = [*_list_uses(entry), *([physics] if physics and not physics.startswith("no model") else [])]
-    bad = [*([physics] if physics.startswith("no model") else []), *_list_failures(found, entry)]
-    return [
-        *lines,
         f"Good for: {'; '.join(good) or 'no use: every check failed'}.",
         f"Fails at: {'; '.join(bad) or 'none of the checks'}.",
         f"Next: {'; '.join(_list_next_steps(found, entry))}.",
     ]
-
-
-def _describe_units(found: SearchResult) -> str:
-    record = found.record
-    columns = zip(
-        signal_names(found.recommended.model),
-        (record.output_unit, *record.input_units),
-        strict=True,
-    )
-    units = ", ".join(f"{name} in {unit}" for name, unit in columns if unit)
-    return f"    {f'{units}; ' if units else ''}{_describe_rate(found)}.{_describe_feedthrough(found)}"
 
 
 def _describe_feedthrough(found: SearchResult) -> str:

@@ -7,7 +7,7 @@ import pytest
 
 import islands
 from islands.evolution.search_result import RankedModel
-from islands.io.model_table import columns, number, rows, table
+from islands.io.result_text.model_table import columns, number, rows, table
 from islands.simulation.outcome import EvaluationOutcome, Status
 from support.searches import record
 

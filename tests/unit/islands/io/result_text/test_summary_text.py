@@ -7,10 +7,10 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
-from islands.io.model_description import describe
-from islands.io.model_table import table
-from islands.io.summary_text import summary
-from islands.model.equations import named_term
+from islands.io.result_text.model_description import describe
+from islands.io.result_text.model_table import table
+from islands.io.result_text.summary_text import method_text, summary
+from islands.model.equations import named_equation, named_term
 from islands.model.model import make_model
 from islands.model.parsing import parse
 from islands.simulation.outcome import EvaluationOutcome, Status
@@ -47,20 +47,25 @@ def errors(findings, validation, **others):
 
 
 def test_the_summary_begins_with_sentences_and_contains_the_table(findings):
-    lines = summary(findings).splitlines()
-    sentences = describe(findings)
-    assert lines[: len(sentences)] == sentences
-    rest = lines[len(sentences) + 1 :]
-    assert rest[0] == "300 samples, 0.1 s: u_V to y_um"
+    text = summary(findings)
+    lines = text.splitlines()
+    first, _equation, *sentences = describe(findings)
+    for sentence in (first, *sentences):
+        assert sentence.strip() in " ".join(text.split())
+    assert lines[-6:-1] == table(findings)
+    assert lines[-1].startswith("* recommended; ranked by")
+    assert max(map(len, lines)) <= 80
+
+
+def test_the_method_has_settings_numbers_and_all_equations(findings):
+    lines = method_text(findings).splitlines()
+    assert lines[0] == "300 samples, 0.1 s: u_V to y_um"
     count = findings.search.evaluations
-    end = rest.index(f"{count} models estimated: {count} ok")
-    assert "library phi-polynomial" in rest[1]
-    assert rest[end - 1].endswith("seed 7")
-    assert max(map(len, rest[: end + 9])) <= 80
-    assert rest[end + 1].startswith("full polynomial set: 462 candidates, a matrix of 1 MB")
-    assert rest[end + 3 : end + 8] == table(findings)
-    assert rest[end + 8].startswith("* recommended; ranked by")
-    assert rest[-4].startswith(" 1  y(k) = 1*y(k-1) ")
+    end = lines.index(f"{count} models estimated: {count} ok")
+    assert "library phi-polynomial" in lines[1]
+    assert lines[end - 1].endswith("seed 7")
+    assert lines[end + 1].startswith("full polynomial set: 462 candidates, a matrix of 1 MB")
+    assert [line[4:] for line in lines[-4:]] == [named_equation(entry.model) for entry in findings.models]
 
 
 def test_the_equation_has_the_names_and_units_of_the_record(findings):
@@ -184,7 +189,6 @@ def test_constraints_of_the_user_are_stated_with_the_names_of_the_record(finding
     found = islands.fit(named[:400], constraints=statements, average=1, **settings).search_result
     lines = summary(found).splitlines()
     assert "Constraints that the model meets: [valve(k-1)] >= 0; gain(valve) = 0." in lines
-    assert "y is T_K, u1 is heat_W, u2 is valve:" in lines
     checks = [
         replace(check, value=value, met=False)
         for check, value in zip(found.recommended.assessment.constraints, (-0.5, nan), strict=True)
@@ -198,5 +202,5 @@ def test_constraints_of_the_user_are_stated_with_the_names_of_the_record(finding
 
 def test_an_empty_estimator_is_named_in_the_settings(findings):
     chosen = replace(findings, settings=dict(findings.settings) | {"estimator": "", "own_primitives": {}})
-    assert "estimator by validation," in " ".join(summary(chosen).split())
-    assert "own_primitives" not in summary(chosen)
+    assert "estimator by validation," in " ".join(method_text(chosen).split())
+    assert "own_primitives" not in method_text(chosen)

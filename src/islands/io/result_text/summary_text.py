@@ -1,0 +1,53 @@
+"""Texts of a result: the summary for a terminal, and the method, which is written to a file only."""
+
+from islands.evolution.search_result import SearchResult
+from islands.io.certificates import summarise_certificates
+from islands.io.result_text.model_description import describe_choice, describe_findings, describe_units
+from islands.io.result_text.model_table import LEGEND, table
+from islands.io.result_text.text_layout import term_table, wrap
+from islands.model.equations import named_equation
+
+
+def summary(found: SearchResult) -> str:
+    """Return the summary as lines of at most 80 characters, unless a name is longer."""
+    lines = [
+        *wrap(describe_choice(found)),
+        "",
+        *term_table(found.recommended.model),
+        "",
+        *wrap(describe_units(found)),
+        *(line for sentence in describe_findings(found) for line in wrap(sentence)),
+        "",
+        *table(found),
+        LEGEND,
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def method_text(found: SearchResult) -> str:
+    """Return data, settings, number of models, bounds, and the equations of all models, one in a line."""
+    record, search = found.record, found.search
+    outcomes = ", ".join(f"{count} {name}" for name, count in search.outcomes.items())
+    full = search.full_set
+    lines = [
+        f"{record.samples} samples, {record.dt:g} s: {', '.join(record.input_names)} to {record.output_name}",
+        *wrap(_describe_settings(found)),
+        f"{search.evaluations} models estimated: {outcomes}",
+        f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB",
+        *(line for text in summarise_certificates(found) for line in wrap(text)),
+        "",
+        "Equations by rank, with the columns of the record:",
+        *(f"{rank:2d}  {named_equation(entry.model)}" for rank, entry in enumerate(found.models, start=1)),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _describe_settings(found: SearchResult) -> str:
+    settings = {name: value for name, value in found.settings.items() if name != "own_primitives"}
+    settings["seed"] = found.seed
+    return ", ".join(f"{name} {_format_setting(name, value)}" for name, value in settings.items())
+
+
+def _format_setting(name: str, value: object) -> str:
+    text = " ".join(map(str, value)) if isinstance(value, tuple | list) else str(value)
+    return text or ("by validation" if name == "estimator" else "none")

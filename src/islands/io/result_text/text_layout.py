@@ -1,0 +1,63 @@
+"""Layout of text for a terminal: wrapped paragraphs, and an equation with one term in each line."""
+
+from textwrap import fill
+
+from islands.model.equations import named_term, signal_names
+from islands.model.model import Model
+
+#: Largest number of characters of a line.
+WIDTH = 80
+
+_HEADING = "standard error"
+
+#: Text in place of the standard error of a parameter that the constraints determine.
+_FIXED = "fixed"
+
+
+def wrap(text: str, indent: str = "  ") -> list[str]:
+    """Return a paragraph as lines of at most `WIDTH` characters; those after the first are indented."""
+    return fill(
+        text, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    ).splitlines()
+
+
+def term_table(model: Model) -> list[str]:
+    """Return the equation as lines of at most 80 characters, unless a factor is longer.
+
+    Parameters
+    ----------
+    model : Model
+        Model with parameters.
+    """
+    errors = model.standard_errors
+    heading = "" if errors is None else _HEADING
+    lines = [f"{signal_names(model)[0]}(k) =".ljust(WIDTH - len(heading)) + heading]
+    for position, theta in enumerate(model.parameters):
+        error = "" if errors is None else (f"{errors[position]:.2g}" if errors[position] else _FIXED)
+        term = named_term(model, position)
+        weight = f"  {'-' if theta < 0 else '+'} {abs(theta):<11.6g}"
+        lines += _break_term(weight if term == "1" else f"{weight} * {term}", error, len(weight) + 3)
+    return [line.rstrip() for line in lines]
+
+
+def _break_term(text: str, error: str, indent: int) -> list[str]:
+    """Return a term with its standard error at the right; a long term is broken between its factors."""
+    first, *factors = _split_factors(text)
+    lines = [first]
+    for factor in factors:
+        if len(lines[-1] + factor) < WIDTH - len(error):
+            lines[-1] += factor
+        else:
+            lines.append(" " * indent + factor)
+    return [*lines[:-1], lines[-1].ljust(WIDTH - len(error) - 1) + f" {error}"]
+
+
+def _split_factors(text: str) -> list[str]:
+    """Split a product before every multiplication sign that is outside of brackets."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(character, 0)
+        if character == "*" and depth == 0:
+            parts.append("")
+        parts[-1] += character
+    return parts
