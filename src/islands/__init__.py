@@ -13,6 +13,7 @@ from typing import Any
 #: Public names by defining module. A module is imported on first use, because the compiler of the kernels
 #: takes half a second to import. `__init__.pyi` is generated from this table.
 _PUBLIC = {
+    "data.coupled_record": ("CoupledRecord",),
     "data.dataset": ("Dataset", "join"),
     "data.split": ("Split", "split"),
     "discrepancy.detectability": ("self_test",),
@@ -25,6 +26,8 @@ _PUBLIC = {
     "evolution.migration.topology": ("TOPOLOGIES",),
     "evolution.presets": ("PRESETS",),
     "evolution.settings": ("Settings",),
+    "facade.coupled.coupled_identification": ("fit_coupled", "identify_coupled"),
+    "facade.coupled.coupled_result": ("CoupledResult",),
     "facade.diagnose": ("diagnose", "function_simulator"),
     "facade.engine_choice": ("Ray",),
     "facade.explain_residual": ("explain_residual",),
@@ -36,6 +39,7 @@ _PUBLIC = {
     "facade.results.result": ("Result",),
     "facade.results.saved_result": ("SavedModel", "SavedResult", "read_result"),
     "io.data_frames": ("as_record",),
+    "io.export.coupled.coupled_document": ("read_coupled_model", "write_coupled_model"),
     "io.models": ("read_model", "write_model"),
     "io.records": ("read_record", "write_record"),
     "model.model": ("Model", "make_model"),
@@ -45,6 +49,7 @@ _PUBLIC = {
     "model.sympy_expression": ("to_sympy",),
     "model.user_primitive": ("primitive",),
     "simulation.step_response": ("step_response",),
+    "simulation.coupled_model": ("CoupledModel",),
 }
 _MODULES = {name: module for module, names in _PUBLIC.items() for name in names}
 

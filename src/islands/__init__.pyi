@@ -1,4 +1,5 @@
 # Made by islands._make_stub().
+from islands.data.coupled_record import CoupledRecord as CoupledRecord
 from islands.data.dataset import Dataset as Dataset
 from islands.data.dataset import join as join
 from islands.data.split import Split as Split
@@ -17,6 +18,9 @@ from islands.estimation.estimator_table import ESTIMATORS as ESTIMATORS
 from islands.evolution.migration.topology import TOPOLOGIES as TOPOLOGIES
 from islands.evolution.presets import PRESETS as PRESETS
 from islands.evolution.settings import Settings as Settings
+from islands.facade.coupled.coupled_identification import fit_coupled as fit_coupled
+from islands.facade.coupled.coupled_identification import identify_coupled as identify_coupled
+from islands.facade.coupled.coupled_result import CoupledResult as CoupledResult
 from islands.facade.diagnose import diagnose as diagnose
 from islands.facade.diagnose import function_simulator as function_simulator
 from islands.facade.engine_choice import Ray as Ray
@@ -31,6 +35,8 @@ from islands.facade.results.saved_result import SavedModel as SavedModel
 from islands.facade.results.saved_result import SavedResult as SavedResult
 from islands.facade.results.saved_result import read_result as read_result
 from islands.io.data_frames import as_record as as_record
+from islands.io.export.coupled.coupled_document import read_coupled_model as read_coupled_model
+from islands.io.export.coupled.coupled_document import write_coupled_model as write_coupled_model
 from islands.io.models import read_model as read_model
 from islands.io.models import write_model as write_model
 from islands.io.records import read_record as read_record
@@ -42,6 +48,7 @@ from islands.model.parsing import parse as parse
 from islands.model.primitives import PRIMITIVES as PRIMITIVES
 from islands.model.sympy_expression import to_sympy as to_sympy
 from islands.model.user_primitive import primitive as primitive
+from islands.simulation.coupled_model import CoupledModel as CoupledModel
 from islands.simulation.step_response import step_response as step_response
 
 __version__: str

@@ -4,10 +4,10 @@ import numpy as np
 
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
-from islands.model.coupled_model import CoupledModel
 from islands.model.expression import value
 from islands.model.model import make_model
 from islands.model.parsing import parse
+from islands.simulation.coupled_model import CoupledModel
 
 
 def equation(terms, inputs, output, dt=0.1):

@@ -133,7 +133,7 @@ def identify(
     for entry in _own_primitives(settings):
         row_address(entry)  # compile it before the search starts
     stage("sampling rate and direct feedthrough", 0.0)
-    trial, least = _make_trial_library(settings), settings.maximum_lag + _MIN_RESIDUALS
+    trial, least = make_trial_library(settings), settings.maximum_lag + _MIN_RESIDUALS
     split, count = select_rate(split_data(record, validation), settings.average, trial, least)
     split = select_feedthrough(split, settings.feedthrough, trial.at_rate(count))
     _check_validation_length(split.validation, settings)
@@ -190,7 +190,8 @@ def _describe(settings: Settings) -> dict[str, Any]:
     return document
 
 
-def _make_trial_library(settings: Settings) -> TrialLibrary:
+def make_trial_library(settings: Settings) -> TrialLibrary:
+    """Return the library and the constraints of the models that compare sampling rates."""
     if settings.library:
         name, degree, lags = settings.library, settings.library_degree, settings.library_lags
     else:

@@ -42,7 +42,7 @@ def matlab_source(model: Model) -> str:
     """
     inputs = signals(model)[1:]
     definitions = [matlab_definition(primitive) for primitive in functions(model)]
-    term_texts = terms(model, lambda name, lag: f"{name}(k-{lag})" if lag else f"{name}(k)", _name)
+    term_texts = terms(model, lambda name, lag: f"{name}(k-{lag})" if lag else f"{name}(k)", matlab_name)
     return _FILE.format(
         heading=heading(model, "%"),
         inputs=", ".join(inputs),
@@ -65,8 +65,9 @@ def matlab_definition(primitive: Primitive) -> str:
     """
     arguments = ", ".join("ab"[: primitive.arity])
     text = textwrap.indent(body(primitive, "matlab"), "  ")
-    return f"function r = {_name(primitive)}({arguments})\n{text}\nend\n"
+    return f"function r = {matlab_name(primitive)}({arguments})\n{text}\nend\n"
 
 
-def _name(primitive: Primitive) -> str:
+def matlab_name(primitive: Primitive) -> str:
+    """Return the name of a primitive's MATLAB function."""
     return f"f_{primitive.name}"

@@ -109,9 +109,9 @@ def heading(model: Model, mark: str) -> str:
         f"NARX model: {equation(model)}", width=100, subsequent_indent="    ", break_long_words=False
     )
     # The names stay on one line: in C, a line that ends with a backslash continues on the next one.
-    return "\n".join(f"{mark} {line}".rstrip() for line in [*lines, "", description(model, _quote)])
+    return "\n".join(f"{mark} {line}".rstrip() for line in [*lines, "", description(model, quote_name)])
 
 
-def _quote(name: str) -> str:
+def quote_name(name: str) -> str:
     """Return a name as a JSON string: ASCII, no line breaks, and no asterisk that could end a C comment."""
     return json.dumps(name).replace("*", r"\u002a")

@@ -54,13 +54,13 @@ def python_source(model: Model) -> str:
     """
     used = functions(model)
     inputs = signals(model)[1:]
-    term_texts = terms(model, lambda name, lag: f"{name}[k-{lag}]" if lag else f"{name}[k]", _name)
-    sources = [_function_source(primitive) for primitive in used]
+    term_texts = terms(model, lambda name, lag: f"{name}[k-{lag}]" if lag else f"{name}[k]", python_name)
+    sources = [function_source(primitive) for primitive in used]
     return _MODULE.format(
         equation=equation(model),
-        description=description(model, _quote),
+        description=description(model, escape_name),
         lag=model.maximum_lag,
-        constants="".join(f"{name} = {value}\n" for name, value in _required_globals(used).items()),
+        constants="".join(f"{name} = {value}\n" for name, value in required_globals(used).items()),
         functions="\n\n".join(sources) + ("\n\n" if sources else ""),
         inputs=", ".join(inputs),
         first_input=inputs[0],
@@ -68,18 +68,25 @@ def python_source(model: Model) -> str:
     )
 
 
-def _name(primitive: Primitive) -> str:
+def python_name(primitive: Primitive) -> str:
+    """Return the name of a primitive's Python function."""
     return f"_{primitive.name}"
 
 
-def _quote(name: str) -> str:
+def escape_name(name: str) -> str:
     """Return a column name escaped for a docstring, on one line."""
     escaped = name.replace("\\", r"\\").replace('"', r"\"")
     return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in escaped)
 
 
-def _function_source(primitive: Primitive) -> str:
-    """Return the source of a primitive's scalar function, renamed to ``_name(primitive)``."""
+def function_source(primitive: Primitive) -> str:
+    """Return the source of a primitive's scalar function, with an underscore before its name.
+
+    Raises
+    ------
+    ModelError
+        The source is not available, or is not a function definition.
+    """
     try:
         source = textwrap.dedent(inspect.getsource(primitive.scalar))
     except (OSError, TypeError) as error:
@@ -94,8 +101,14 @@ def _function_source(primitive: Primitive) -> str:
     return re.sub(r"def \w+", f"def _{primitive.name}", source, count=1)
 
 
-def _required_globals(primitives: Sequence[Primitive]) -> dict[str, str]:
-    """Return the module-level names that the functions use, with their Python source."""
+def required_globals(primitives: Sequence[Primitive]) -> dict[str, str]:
+    """Return the module-level names that the functions use, with their Python source.
+
+    Raises
+    ------
+    ModelError
+        A function uses a global other than ``math`` and numbers, or a name of the exported module.
+    """
     reserved = {"math": "math", "MAXIMUM_LAG": "", "predict": "", "simulate": ""}
     reserved |= {f"_{primitive.name}": "" for primitive in primitives}
     found: dict[str, str] = {}

@@ -9,8 +9,8 @@ from islands.data.averaging import average_samples
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands.model.coupled_model import CoupledModel
 from islands.simulation.coupled_free_run import CoupledSimulator, coupled_free_run
+from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.outcome import Status
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record, simulate_scalar

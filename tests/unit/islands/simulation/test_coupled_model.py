@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from islands.errors import ModelError
-from islands.model.coupled_model import CoupledModel
+from islands.simulation.coupled_model import CoupledModel
 from support.coupled_systems import TWO_MASSES, equation
 
 ONE, TWO = TWO_MASSES.models

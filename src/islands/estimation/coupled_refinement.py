@@ -1,0 +1,136 @@
+"""Joint refinement of all equations of a coupled model on the error of their common simulation.
+
+Each equation is estimated with the measured values of the other outputs. Their noise biases the parameters,
+and the coupled simulation feeds errors from one equation to the other. Damped Gauss-Newton steps
+(Levenberg 1944, Marquardt 1963) minimise the error of the simulation that the model is used for.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.coupled_record import CoupledRecord
+from islands.estimation.constrained_least_squares import null_space
+from islands.estimation.parameter_constraints import constraint
+from islands.estimation.shooting_residual import inner_products
+from islands.kernels.summation import dot
+from islands.simulation.coupled_free_run import CoupledSimulator
+from islands.simulation.coupled_model import CoupledModel
+from islands.simulation.outcome import EvaluationOutcome
+
+#: Step of a central difference in units of the magnitudes of the parameters.
+_DIFFERENCE_STEP = 1e-5
+
+#: Initial damping, its factors after a failed and a successful step, and its largest value.
+_DAMPING, _INCREASE, _DECREASE, _MAX_DAMPING = 1e-3, 10.0, 0.2, 1e9
+
+#: Refinement ends when a step reduces the squared error by a smaller relative amount.
+_MIN_GAIN = 1e-6
+
+
+def refine_coupled(
+    model: CoupledModel,
+    record: CoupledRecord,
+    interval: int | None,
+    warm_up: int,
+    constraints: str = "none",
+    max_steps: int = 20,
+) -> CoupledModel | None:
+    """Refine the parameters of all equations on the simulation error of all outputs.
+
+    The error of every output counts relative to its range.
+
+    Parameters
+    ----------
+    model : CoupledModel
+        Model with parameters that meet the constraints.
+    record : CoupledRecord
+        Estimation data with the sampling time of the model, without missing outputs.
+    interval : int or None
+        Length of a shooting interval in samples. None is the free run.
+    warm_up : int
+        Number of samples before the first prediction of every interval.
+    constraints : str
+        Constraints of every equation. The refined equations meet them.
+    max_steps : int
+        Maximum number of accepted steps.
+
+    Returns
+    -------
+    CoupledModel or None
+        None if the simulation of the model diverges, a constraint forces a parameter to zero, or no step
+        reduces the error.
+    """
+    directions = _find_directions(model, constraints)
+    residual = _CoupledResidual(model, record, interval, warm_up)
+    theta = np.array(model.parameters)
+    error = residual(theta)
+    if directions is None or error is None:
+        return None
+    damping, steps = _DAMPING, 0
+    normal, gradient = residual.normal_equations(theta, error, directions)
+    while steps < max_steps and damping < _MAX_DAMPING:
+        damped = normal + damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
+        candidate = theta - directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
+        trial = residual(candidate)
+        if trial is None or not _square(trial) < _square(error):
+            damping *= _INCREASE
+            continue
+        gain = 1.0 - _square(trial) / _square(error)
+        theta, error, damping, steps = candidate, trial, damping * _DECREASE, steps + 1
+        if gain < _MIN_GAIN:
+            break
+        normal, gradient = residual.normal_equations(theta, error, directions)
+    return model.with_parameters(theta.tolist()) if steps else None
+
+
+class _CoupledResidual:
+    """Simulation error of all outputs, each divided by its range, as a function of the parameters."""
+
+    def __init__(
+        self, model: CoupledModel, record: CoupledRecord, interval: int | None, warm_up: int
+    ) -> None:
+        self._simulate = CoupledSimulator(model, record, interval, warm_up)
+        self._y = record.y
+        self._scale = np.array([each.output_range or 1.0 for each in record.records])
+
+    def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        simulated = self._simulate(theta)
+        if not simulated.outcome:
+            return None
+        known = ~np.isnan(simulated.y[:, 0])
+        return np.ascontiguousarray(((simulated.y - self._y)[known] / self._scale).T).reshape(-1)
+
+    def normal_equations(
+        self, theta: NDArray[np.float64], error: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return J'J and J'r for steps along the directions; a direction that diverges contributes zeros."""
+        jacobian = np.zeros((directions.shape[1], error.size))
+        for row, direction in zip(jacobian, directions.T, strict=True):
+            ahead, behind = (self(theta + sign * _DIFFERENCE_STEP * direction) for sign in (1.0, -1.0))
+            if ahead is not None and behind is not None:
+                row[:] = (ahead - behind) / (2.0 * _DIFFERENCE_STEP)
+        return inner_products(jacobian, error, 0, error.size)
+
+
+def _square(error: NDArray[np.float64]) -> float:
+    return float(dot(error, 0, error, 0, error.size))
+
+
+def _find_directions(model: CoupledModel, constraints: str) -> NDArray[np.float64] | None:
+    """Return the free directions of all parameters, shape (terms, free); None if a term is forced to zero."""
+    directions: NDArray[np.float64] = np.zeros((model.size, 0))
+    begin = 0
+    for single in model.models:
+        constrained = constraint(constraints).constrain(single.regressors)
+        if isinstance(constrained, EvaluationOutcome) or constrained.regressors != single.regressors:
+            return None
+        theta = np.array(single.parameters)
+        unit = np.where(theta == 0.0, 1.0, np.abs(theta))
+        found = null_space(constrained.S * unit, constrained.c)
+        if isinstance(found, EvaluationOutcome):
+            return None
+        block = np.zeros((model.size, found[1].shape[1]))
+        block[begin : begin + single.size] = unit[:, None] * found[1]
+        directions = np.hstack([directions, block])
+        begin += single.size
+    return directions

@@ -1,0 +1,1 @@
+"""Identification of several outputs of one system: one equation each, simulated together."""

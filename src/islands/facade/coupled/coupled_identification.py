@@ -1,0 +1,267 @@
+"""`fit_coupled` and `identify_coupled`: one equation per output, chosen and refined for a common free run."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import inf
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+
+from islands.data.averaging import AUTO, average_samples
+from islands.data.coupled_record import CoupledRecord, split_coupled
+from islands.data.dataset import Dataset
+from islands.data.split import Split
+from islands.errors import SettingsError
+from islands.estimation.coupled_refinement import refine_coupled
+from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.evolution.engine import Engine
+from islands.evolution.presets import resolve_settings
+from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.facade.coupled.coupled_result import CoupledResult
+from islands.facade.coupled.coupled_selection import choose_equations, measure_error
+from islands.facade.engine_choice import Ray
+from islands.facade.fit import fit
+from islands.facade.identify import identify, make_trial_library
+from islands.facade.rate_selection import TrialLibrary, select_rate
+from islands.facade.results.result import Result
+from islands.facade.setting_changes import SettingChanges
+from islands.io.data_frames import as_record
+from islands.model.candidate_library import get_library
+from islands.simulation.coupled_model import CoupledModel
+
+if TYPE_CHECKING:
+    from islands.io.data_frames import FrameLike
+
+
+class FitOptions(TypedDict, total=False):
+    """Options of `fit` for every output; `fit` describes each of them."""
+
+    library: str
+    degree: int | None
+    lags: int | None
+    max_terms: int
+    constraints: str | None
+    estimator: str
+    average: int | str
+    feedthrough: str
+    shooting: int | None
+    certificate: int
+
+
+def fit_coupled(
+    record: "CoupledRecord | FrameLike",
+    *,
+    inputs: str | Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    dt: float | None = None,
+    validation: "CoupledRecord | FrameLike | float" = 0.25,
+    refine_together: bool = True,
+    seed: int = 0,
+    progress: ProgressCallback = ignore_progress,
+    **options: Unpack[FitOptions],
+) -> CoupledResult:
+    """Fit one equation per output by subset selection, for a simulation of all outputs together.
+
+    Every output is fitted by `fit` with the measured values of the other outputs as further inputs, which it
+    reads from sample k-1 on. Of the models of each size, `choose_equations` takes those with the least error
+    of the common free run on the validation data. Then all parameters are refined on the common free run of
+    the estimation data; the refined parameters are kept if the error on the validation data is smaller.
+
+    Parameters
+    ----------
+    record : CoupledRecord or data frame
+        Data without missing inputs; a frame needs ``inputs`` and ``outputs``.
+    inputs, outputs
+        Names of the columns of a frame. ``u+1`` is an input that the outputs respond to within the sample.
+    dt : float, optional
+        Sampling time in seconds. A frame with a time does not need it.
+    validation : CoupledRecord, data frame or float
+        Data that choose the equations: a separate record, or the fraction at the end of ``record``.
+    refine_together : bool
+        Whether all parameters are refined together.
+    seed : int
+        Seed of the results.
+    progress : callable, optional
+        Called with a message and the completed fraction.
+    **options
+        Options of `fit`. The default library is ``polynomial``; ``constraints`` are an entry of
+        ``CONSTRAINTS`` and hold for every equation; ``feedthrough`` is ``no``.
+
+    Returns
+    -------
+    CoupledResult
+
+    Raises
+    ------
+    SettingsError
+        A setting is unknown, out of range or not for several outputs, or an output has no model.
+    RecordError
+        The record is too short or incomplete, an output is given twice or is also an input, or the
+        validation data has other columns or another sampling time.
+    """
+    chosen: dict[str, Any] = {"library": "polynomial", **options}
+    _check_constraints(chosen.get("constraints"), chosen)
+    entry = get_library(chosen["library"])
+    degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
+    trial = TrialLibrary(
+        chosen["library"],
+        entry.degree if degree is None else degree,
+        entry.lags if lags is None else lags,
+        constraints or entry.constraints,
+    )
+    find = partial(fit, seed=seed)
+    data = _read_data(record, inputs, outputs, dt, validation)
+    return _couple(data, chosen, trial, trial.lags + 3, refine_together, progress, "progress", find)
+
+
+def identify_coupled(
+    record: "CoupledRecord | FrameLike",
+    *,
+    inputs: str | Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    dt: float | None = None,
+    validation: "CoupledRecord | FrameLike | float" = 0.25,
+    refine_together: bool = True,
+    preset: str = "narx",
+    seed: int = 0,
+    stage: ProgressCallback = ignore_progress,
+    engine: Engine | Ray | str | None = None,
+    **changes: Unpack[SettingChanges],
+) -> CoupledResult:
+    """Identify one equation per output by evolution, for a simulation of all outputs together.
+
+    As `fit_coupled`, with `identify` for every output.
+
+    Parameters
+    ----------
+    record, inputs, outputs, dt, validation, refine_together
+        As for `fit_coupled`.
+    preset : str
+        An entry of ``PRESETS``.
+    seed : int
+        Seed of the random generator; the same seed gives the same result, bit for bit.
+    stage : callable, optional
+        Called with a message and the completed fraction of each stage.
+    engine : str, Ray or Engine, optional
+        What runs the islands, as for `identify`.
+    **changes
+        Settings that differ from the preset; ``constraints`` and ``feedthrough`` as for `fit_coupled`.
+
+    Returns
+    -------
+    CoupledResult
+
+    Raises
+    ------
+    SettingsError, RecordError
+        As `fit_coupled`.
+    """
+    chosen: dict[str, Any] = dict(changes)
+    settings = resolve_settings(
+        preset,
+        {name: tuple(value) if isinstance(value, list) else value for name, value in chosen.items()},
+    )
+    _check_constraints(settings.constraints, chosen)
+    chosen.setdefault("average", settings.average)
+    find = partial(identify, preset=preset, seed=seed, engine=engine)
+    trial = make_trial_library(settings)
+    data = _read_data(record, inputs, outputs, dt, validation)
+    return _couple(data, chosen, trial, settings.maximum_lag + 3, refine_together, stage, "stage", find)
+
+
+def _check_constraints(constraints: str | None, options: dict[str, Any]) -> None:
+    if constraints is not None and constraints not in CONSTRAINTS:
+        raise SettingsError(
+            f"the constraints {constraints!r} are for one output: with several, each equation numbers its "
+            f"inputs differently; take {', '.join(CONSTRAINTS)}"
+        )
+    if options.setdefault("feedthrough", "no") != "no":
+        raise SettingsError(
+            "feedthrough is 'no' with several outputs, so that they do not depend on each other within a "
+            "sample: name the inputs that act within the sample with +1, as u+1"
+        )
+
+
+def _read_data(
+    record: "CoupledRecord | FrameLike",
+    inputs: str | Sequence[str],
+    outputs: Sequence[str],
+    dt: float | None,
+    validation: "CoupledRecord | FrameLike | float",
+) -> tuple[CoupledRecord, CoupledRecord]:
+    """Return estimation data and validation data, at the sampling time of the record."""
+
+    def read(data: Any) -> CoupledRecord:
+        if isinstance(data, CoupledRecord):
+            return data
+        if isinstance(data, Dataset):
+            raise SettingsError("a Dataset has one output: give a CoupledRecord, one Dataset per output")
+        return CoupledRecord(tuple(as_record(data, None, dt, inputs=inputs, output=name) for name in outputs))
+
+    held_out = validation if isinstance(validation, int | float) else read(validation)
+    return split_coupled(read(record), held_out)
+
+
+def _couple(
+    data: tuple[CoupledRecord, CoupledRecord],
+    options: dict[str, Any],
+    trial: TrialLibrary,
+    least: int,
+    refine_together: bool,
+    progress: ProgressCallback,
+    callback: str,
+    find: Callable[..., Result],
+) -> CoupledResult:
+    """Search every output, choose the equations and refine them."""
+    estimation, validation = data
+    names = estimation.output_names
+    splits = [Split(estimation.separate(place), validation.separate(place)) for place in range(len(names))]
+    progress("sampling rate", 0.0)
+    # The equations have one sampling time: the shortest that one of them needs.
+    average = options.get("average", AUTO)
+    options["average"] = min(select_rate(split, average, trial, least)[1] for split in splits)
+    results = []
+    for name, split in zip(names, splits, strict=True):
+        shown = {callback: partial(_report, progress, name)}
+        results.append(find(split.estimation, validation=split.validation, **shown, **options))
+    progress("choice of the equations", 0.0)
+    estimation, validation = (
+        part.map(partial(average_samples, count=options["average"])) for part in (estimation, validation)
+    )
+    warm_up = max(entry.ranked_model.assessment.warm_up for result in results for entry in result.models)
+    ranked = [[entry.model for entry in result.models] for result in results]
+    choice = choose_equations(ranked, [result.best.rank for result in results], validation, warm_up)
+    model = CoupledModel(tuple(models[rank - 1] for models, rank in zip(ranked, choice.ranks, strict=True)))
+    refined = None
+    if refine_together and choice.error < inf:
+        progress("refinement of all equations", 0.0)
+        shooting = results[0].search_result.shooting_interval
+        constraints = str(results[0].search_result.settings["constraints"])
+        refined = _refine(model, estimation, validation, shooting, warm_up, constraints, choice.error)
+    return CoupledResult(
+        refined or model, tuple(results), choice.ranks, refined is not None, estimation, validation, warm_up
+    )
+
+
+def _refine(
+    model: CoupledModel,
+    estimation: CoupledRecord,
+    validation: CoupledRecord,
+    shooting: int,
+    warm_up: int,
+    constraints: str,
+    error: float,
+) -> CoupledModel | None:
+    """Refine first over shooting intervals and then over the free run; return the model if it is better."""
+    best, started = None, model
+    for interval in (shooting, None):
+        found = refine_coupled(started, estimation, interval, warm_up, constraints)
+        if found is None:
+            continue
+        started = found
+        reached = measure_error(found, validation, warm_up)
+        if reached < error:
+            best, error = found, reached
+    return best
+
+
+def _report(progress: ProgressCallback, name: str, message: str, fraction: float | None = None) -> None:
+    progress(f"{name}: {message}", fraction)

@@ -1,0 +1,121 @@
+"""Several outputs: the true equations, one free run, and settings that are for one output only."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.data.coupled_record import CoupledRecord
+from islands.errors import RecordError, SettingsError
+from islands.facade.coupled.coupled_identification import fit_coupled, identify_coupled
+from islands.io.export.coupled.coupled_document import read_coupled_model
+from islands.simulation.coupled_free_run import coupled_free_run
+from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
+
+#: A small search.
+FAST = {"degree": 2, "lags": 2, "max_terms": 4, "average": 1, "certificate": 0}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return fit_coupled(make_coupled_record(PREY, samples=150), **FAST)
+
+
+def test_without_noise_the_true_equations_are_found() -> None:
+    linear = fit_coupled(
+        make_coupled_record(TWO_MASSES, samples=150), **(FAST | {"degree": 1, "max_terms": 4})
+    )
+    for chosen, true in zip(linear.model.models, TWO_MASSES.models, strict=True):
+        assert chosen.regressors == true.regressors
+        np.testing.assert_allclose(chosen.parameters, true.parameters, rtol=1e-6)
+
+
+def test_without_noise_the_free_run_has_no_error(found) -> None:
+    assert found.model.size <= 7
+    for errors in found.metrics.values():
+        assert errors["validation"]["free_run"].mape < 1e-6
+        assert errors["estimation"]["one_step_ahead"].mape < 1e-6
+
+
+def test_the_errors_are_those_of_the_common_free_run(found) -> None:
+    simulated = coupled_free_run(found.model, found.validation, found.warm_up)
+    for place, name in enumerate(found.model.output_names):
+        rmse = found.metrics[name]["validation"]["free_run"].rmse
+        assert rmse**2 == pytest.approx(simulated.mean_squared_errors[place], rel=1e-9)
+
+
+@pytest.mark.ci
+def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> None:
+    folder = found.save(tmp_path / "result")
+    assert read_coupled_model(folder) == found.model
+    document = json.loads((folder / "result.json").read_text())
+    assert [each["name"] for each in document["outputs"]] == ["y1", "y2"]
+    for each in document["outputs"]:
+        assert (
+            json.loads((folder / each["folder"] / "result.json").read_text())["schema"] == "islands.result/1"
+        )
+        assert (folder / "figures" / f"free-run-{each['folder'].removeprefix('outputs/')}.svg").exists()
+    assert "y1(k) = " in (folder / "summary.txt").read_text()
+
+
+@pytest.mark.ci
+def test_a_data_frame_has_the_result_of_a_record(found) -> None:
+    record = make_coupled_record(PREY, samples=150)
+    frame = {"u": record.records[0].u[:, 0], "y1": record.y[:, 0], "y2": record.y[:, 1]}
+    again = fit_coupled(frame, inputs="u", outputs=["y1", "y2"], dt=0.1, **FAST)
+    assert again.model == found.model
+
+
+@pytest.mark.ci
+def test_noise_is_not_amplified_by_the_coupling() -> None:
+    record = make_coupled_record(TWO_MASSES, samples=500, noise=0.02)
+    alone, together = (
+        fit_coupled(record, refine_together=each, library="polynomial", **(FAST | {"degree": 1}))
+        for each in (False, True)
+    )
+    clean = make_coupled_record(TWO_MASSES, samples=500, seed=2)
+
+    def error(result):
+        return np.sqrt(coupled_free_run(result.model, clean).mean_squared_errors).max()
+
+    assert together.refined
+    assert error(together) < 0.5 * error(alone)
+
+
+@pytest.mark.ci
+def test_an_evolution_has_the_same_result_for_the_same_seed() -> None:
+    record = make_coupled_record(PREY, samples=150)
+    settings = {"population": 8, "generations": 1, "max_terms": 3, "average": 1, "library_degree": 2}
+    first, second = (identify_coupled(record, seed=3, **settings) for _ in range(2))
+    assert first.model == second.model
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"constraints": "gain = 2"}, "each equation numbers its inputs differently"),
+        ({"feedthrough": "yes"}, r"as u\+1"),
+        ({"library": "cubic"}, "library"),
+    ],
+)
+def test_settings_for_one_output_are_refused(options, message) -> None:
+    with pytest.raises(SettingsError, match=message):
+        fit_coupled(make_coupled_record(PREY), **options)
+
+
+def test_a_record_of_one_output_is_refused() -> None:
+    record = make_coupled_record(PREY)
+    with pytest.raises(SettingsError, match="give a CoupledRecord"):
+        fit_coupled(record.records[0])
+    with pytest.raises(RecordError, match="at least two outputs"):
+        fit_coupled({"u": record.y[:, 0], "y": record.y[:, 1]}, inputs="u", outputs=["y"], dt=0.1)
+
+
+@pytest.mark.ci
+def test_missing_outputs_are_skipped_for_all() -> None:
+    record = make_coupled_record(PREY, samples=150)
+    holed = np.where(np.isin(np.arange(150), (50, 120)), np.nan, record.y[:, 0])
+    found = fit_coupled(CoupledRecord((replace(record.records[0], y=holed), record.records[1])), **FAST)
+    assert found.estimation.samples + found.validation.samples == record.samples - 2
+    assert found.metrics["y2"]["validation"]["free_run"].mape < 1e-6
