@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from types import MappingProxyType
 
-from islands.data.channel_names import AT_ONCE, normalise_unit, parse_unit, spell_unit
+from islands.data.channel_names import AT_ONCE, is_unit, normalise_unit, parse_unit, spell_unit
 from islands.errors import RecordError
 
 #: Units of time columns in seconds. A column without a unit is in seconds.
@@ -55,6 +55,12 @@ def find_column(name: str, columns: Iterable[str]) -> str:
         if _BRACKETED_UNIT.fullmatch(column, len(base)) and column.startswith(base)
     ]
     return fitting[0] if len(fitting) == 1 else base
+
+
+def append_unit(name: str, unit: str) -> str:
+    """Return a name with its unit in brackets, unless the name has one or the text is not a unit."""
+    unit = spell_unit(unit.strip())
+    return f"{name} [{unit}]" if unit and is_unit(unit) and not parse_unit(name) else name
 
 
 def looks_like_time(name: str) -> bool:

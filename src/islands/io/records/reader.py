@@ -3,13 +3,19 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
+from islands.io.records.formats.excel import read_workbook
+from islands.io.records.formats.hdf5 import read_hdf5
 from islands.io.records.formats.mat.mat_file import read_matlab
+from islands.io.records.formats.mdf import read_mdf
 from islands.io.records.formats.npz import read_archive
+from islands.io.records.formats.packed import PACKED, open_packed
 from islands.io.records.formats.parquet import read_parquet
+from islands.io.records.formats.tdms import read_tdms
 from islands.io.records.formats.text.text_table import read_delimited
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.table import Table
@@ -24,6 +30,13 @@ READERS: dict[str, Callable[[Path, ReadingOptions], Table]] = {
     ".npz": read_archive,
     ".mat": read_matlab,
     ".parquet": read_parquet,
+    ".xlsx": read_workbook,
+    ".xlsm": read_workbook,
+    ".h5": read_hdf5,
+    ".hdf5": read_hdf5,
+    ".mf4": read_mdf,
+    ".mdf": read_mdf,
+    ".tdms": read_tdms,
 }
 
 
@@ -162,11 +175,17 @@ def open_record(path: str | Path, options: ReadingOptions = DEFAULT_READING) -> 
         The file does not exist, cannot be read, or its suffix is not in `READERS`.
     """
     file = _check_readable(path)
+    if file.suffix.lower() in PACKED:
+        return open_packed(file, READERS, partial(_open_file, options=options))
+    return _open_file(file, options)
+
+
+def _open_file(file: Path, options: ReadingOptions) -> Table:
     reader = READERS.get(file.suffix.lower())
     if reader is None:
         raise RecordError(
-            f"{file.name}: files ending in '{file.suffix}' are not supported, only {', '.join(READERS)}: "
-            "export the record to one of these"
+            f"{file.name}: files ending in '{file.suffix}' are not supported, only {', '.join(READERS)}, "
+            "also compressed as .gz or .zip: export the record to one of these"
         )
     return reader(file, options)
 

@@ -78,6 +78,11 @@ class Table(Protocol):
         """Columns of time stamps, with the column that contains their dates; empty if there is none."""
         ...
 
+    @property
+    def others(self) -> str:
+        """Which table of the file is read, and which others it has; empty if there is one."""
+        ...
+
     def stated(self, structure: str) -> Mapping[str, float]:
         """Return the sampling times that the file states as single numbers, in seconds, by array name.
 

@@ -52,7 +52,7 @@ def read_table(
     inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
     sources = [find_column(name, table.names) for name in inputs]
     output = find_column(output, table.names)
-    check_choice(table.names, sources, output, file, options.time)
+    check_choice(table.names, sources, output, file, options.time, table.others)
     structures = split_structures(table.names)
     structure = structures[output]
     clock = options.time or time_column(table.names, file, (*sources, output), structure, table.clocks)

@@ -30,7 +30,12 @@ def check_unique(names: Sequence[str], file: str) -> None:
 
 
 def check_choice(
-    names: Sequence[str], inputs: Sequence[str], output: str, file: str, time: str | None = None
+    names: Sequence[str],
+    inputs: Sequence[str],
+    output: str,
+    file: str,
+    time: str | None = None,
+    others: str = "",
 ) -> None:
     """Refuse an invalid choice of columns.
 
@@ -53,7 +58,8 @@ def check_choice(
     for name in (*inputs, output, *([] if time is None else [time])):
         if name not in names:
             raise RecordError(
-                f"{file} has no column {name}; it has {_list_names(names)}{_suggest(name, names)}"
+                f"{file} has no column {name}; it has "
+                f"{_list_names(names)}{_suggest(name, names)}{'; ' if others else ''}{others}"
             )
 
 

@@ -20,7 +20,7 @@ SAMPLING: dict[str, Callable[[float], float]] = {
 }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class ColumnarFile:
     """A file of arrays. Arrays are loaded on demand.
 
@@ -34,7 +34,7 @@ class ColumnarFile:
         Returns the array with a given name as stored in the file; raises `RecordError`.
     scalars : sequence of str
         Arrays that may be single numbers. Those with a name in `SAMPLING` state the sampling.
-    clocks : mapping of str to str
+    clocks, others
         See `islands.io.records.table.Table`.
     """
 
@@ -43,6 +43,7 @@ class ColumnarFile:
     load: Callable[[str], NDArray[Any]]
     scalars: Sequence[str] = ()
     clocks: Mapping[str, str] = field(default_factory=dict)
+    others: str = ""
 
     def stated(self, structure: str) -> Mapping[str, float]:
         """Return the sampling times stated in the file; see `islands.io.records.table.Table`."""
@@ -68,11 +69,12 @@ class ColumnarFile:
             RowRange(self.file, "sample", chosen),
             {name: channel[chosen.start : chosen.stop] for name, channel in channels.items()},
             chosen.start,
+            frozenset(name for name in names if name in self.clocks),
         )
 
     def remarks(self, names: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002
-        """Return no remarks: nothing is inferred from arrays."""
-        return ()
+        """Return which table of the file is read; nothing is inferred from arrays."""
+        return (self.others,) if self.others else ()
 
 
 def _check_positive(array: NDArray[Any], name: str, file: str) -> float:

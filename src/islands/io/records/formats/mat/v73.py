@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from islands.io.records.formats.mat.workspace import Variable
 from islands.io.records.size_limits import check_samples, check_stored
 
-_DEFLATE = 1
-_FILTERS = {_DEFLATE, 2, 3}  # deflate, shuffle and Fletcher's checksum; MATLAB uses no others
+_DEFLATE, _LZF = 1, 32000
+_FILTERS = {_DEFLATE, _LZF, 2, 3}  # also shuffle and Fletcher's checksum
 _MAX_DEPTH = 32  # nested groups
 
 
@@ -106,17 +106,27 @@ def _read_numbers(path: Path, place: tuple[str, ...]) -> NDArray[Any]:
         dataset = file["/".join(place)]
         if "MATLAB_empty" in dataset.attrs:
             return np.empty((0, 0))
-        _check_declared_size(dataset, ".".join(place), path)
+        check_dataset_size(dataset, ".".join(place), path)
         return np.asarray(dataset[()]).T
 
 
-def _check_declared_size(dataset: Any, column: str, path: Path) -> None:
-    """Check the shape and the chunk size against the stored bytes. A chunk is decompressed as a whole."""
+def check_dataset_size(dataset: Any, column: str, path: Path) -> None:
+    """Check the shape and the chunk size against the stored bytes. A chunk is decompressed as a whole.
+
+    Raises
+    ------
+    RecordError
+        The declared size is impossible or too large.
+    ValueError
+        A filter is not supported.
+    """
     properties = dataset.id.get_create_plist()
     filters = [properties.get_filter(index)[0] for index in range(properties.get_nfilters())]
     if unknown := set(filters) - _FILTERS:
-        raise ValueError(f"it is compressed by a filter that MATLAB does not use, number {min(unknown)}")
+        raise ValueError(f"it is compressed by the filter number {min(unknown)}: save it with gzip")
     samples = max(dataset.size, math.prod(dataset.chunks or (0,)))
     check_samples(samples, column, path.name)
     stored = min(dataset.id.get_storage_size(), path.stat().st_size)
-    check_stored(samples * dataset.dtype.itemsize, stored, _DEFLATE in filters, column, path.name)
+    check_stored(
+        samples * dataset.dtype.itemsize, stored, bool({_DEFLATE, _LZF} & set(filters)), column, path.name
+    )

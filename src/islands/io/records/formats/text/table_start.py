@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
 
-from islands.data.channel_names import is_unit, parse_unit, spell_unit
+from islands.data.channel_names import is_unit, spell_unit
 from islands.errors import RecordError
+from islands.io.records.column_names import append_unit
 from islands.io.records.formats.text.number_format import is_number
 from islands.io.records.formats.text.number_parsing import is_missing
 from islands.io.records.formats.text.time_stamps import kind_of
@@ -87,7 +88,9 @@ def find_table(lines: Sequence[str], file: str, options: ReadingOptions = DEFAUL
     separator = given[1] if given else separator
     cells, first = _read_row(lines, top, separator)
     start = top
-    if not _fits(len(cells), lines, first, separator) and (found := _find_samples(lines, top)):
+    # A spreadsheet fills the lines of a description up to the width of the table with empty cells.
+    is_header = all(cell.strip() for cell in cells) and _fits(len(cells), lines, first, separator)
+    if not is_header and (found := _find_samples(lines, top)):
         separator, samples = found
         start = _find_header(lines, top, samples, separator, file)
         cells, first = _read_row(lines, start, separator)
@@ -99,7 +102,7 @@ def find_table(lines: Sequence[str], file: str, options: ReadingOptions = DEFAUL
     has_units = following is not None and len(units) == len(names)
     _check_header(names, file, start + 1, has_units)
     if following is not None and has_units:
-        names, first = tuple(map(_add_unit, names, units)), following + 1
+        names, first = tuple(map(append_unit, names, units)), following + 1
     return TableStart(separator, start, names, first, start > top, has_units)
 
 
@@ -186,6 +189,12 @@ def _find_samples(lines: Sequence[str], top: int) -> tuple[str, int] | None:
     return None
 
 
+def has_samples(lines: Sequence[str]) -> bool:
+    """Return whether the first lines of a table contain samples."""
+    top = next((index for index, line in enumerate(lines) if line.strip()), None)
+    return top is not None and _find_samples(lines, top) is not None
+
+
 def _is_sample(cells: Sequence[str]) -> bool:
     """Return whether the cells are numbers, time stamps or missing, except for one that is not the first.
 
@@ -219,10 +228,6 @@ def _read_units(line: str, separator: str) -> list[str]:
     cells = [spell_unit(cell.strip().strip("[]()").strip()) for cell in _split(_uncomment(line), separator)]
     units = [cell for cell in cells if cell not in ("", "-")]
     return cells if units and all(map(is_unit, units)) else []
-
-
-def _add_unit(name: str, unit: str) -> str:
-    return name if unit in ("", "-") or parse_unit(name) else f"{name} [{unit}]"
 
 
 def _check_header(names: Sequence[str], file: str, line: int, has_units: bool) -> None:

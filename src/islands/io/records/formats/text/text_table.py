@@ -30,7 +30,7 @@ from islands.io.records.table import Columns, RowRange, select
 _DECIDING = 20
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class DelimitedText:
     """A text table that is split into cells, which are not converted yet.
 
@@ -50,6 +50,8 @@ class DelimitedText:
         Decimal mark, order of dates, time zone.
     notes : tuple of str
         What was inferred about the file as a whole.
+    others : str
+        Other tables of the file; see `islands.io.records.table.Table`.
     """
 
     names: tuple[str, ...]
@@ -59,6 +61,7 @@ class DelimitedText:
     clocks: Mapping[str, str]
     options: ReadingOptions = DEFAULT_READING
     notes: tuple[str, ...] = ()
+    others: str = ""
 
     def stated(self, structure: str) -> Mapping[str, float]:  # noqa: ARG002
         """Return an empty mapping: a text table cannot state a sampling time."""

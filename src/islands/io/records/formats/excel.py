@@ -1,0 +1,123 @@
+"""Workbooks of Excel (.xlsx, .xlsm), read by openpyxl (extra `excel`). A sheet is read like a text table."""
+
+import csv
+import zipfile
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from datetime import date, datetime, time, timedelta
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from islands.errors import RecordError
+from islands.io.records.formats.text.table_start import has_samples
+from islands.io.records.formats.text.text_table import DelimitedText, split_table
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.size_limits import check_archive
+
+#: Exceptions of openpyxl and the standard library for damaged workbooks.
+_DAMAGED = (
+    KeyError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    OSError,
+    EOFError,
+    SyntaxError,
+    zipfile.BadZipFile,
+)
+
+
+def read_workbook(path: Path, options: ReadingOptions = DEFAULT_READING) -> DelimitedText:
+    """Read a sheet of a workbook: the given one, or the first that contains a table.
+
+    Formulas have the values that the workbook stores.
+
+    Raises
+    ------
+    RecordError
+        The file is not a workbook or is damaged, has no such sheet, no sheet contains a table, or openpyxl is
+        not installed.
+    """
+    file = path.name
+    try:
+        from openpyxl import load_workbook  # noqa: PLC0415
+        from openpyxl.utils.exceptions import InvalidFileException  # noqa: PLC0415
+    except ImportError as error:
+        raise RecordError(f"{file}: install islands[excel] to read XLSX, or save the sheet as CSV") from error
+    if not zipfile.is_zipfile(path):
+        raise RecordError(f"{file} is not a workbook of the format XLSX: save it again as XLSX or as CSV")
+    check_archive(path)
+    try:
+        book = load_workbook(path, read_only=True, data_only=True, keep_links=False)
+        try:
+            names = [sheet.title for sheet in book.worksheets]
+            chosen = _choose_sheets(names, options.sheet, file)
+            name, lines = _find_table((name, book[name]) for name in chosen)
+        finally:
+            book.close()
+    except (*_DAMAGED, InvalidFileException) as error:
+        raise RecordError(f"{file} is damaged or not a workbook ({error}): save it again") from error
+    if not lines:
+        raise RecordError(
+            f"{file} has no sheet with a table of numbers; its sheets are {', '.join(names)}: name "
+            "the sheet by --sheet (library: sheet=)"
+        )
+    others = [other for other in names if other != name]
+    table = split_table(lines, f"{file}, sheet {name}", "row", options)
+    if not others:
+        return table
+    listed = f"the sheet {name} of {file} is read; other sheets (--sheet): {', '.join(others)}"
+    return replace(table, notes=(listed, *table.notes), others=listed)
+
+
+def _choose_sheets(names: Sequence[str], sheet: str | None, file: str) -> Sequence[str]:
+    """Return the sheets that may contain the table."""
+    if sheet is None:
+        return names
+    if sheet not in names:
+        raise RecordError(f"{file} has no sheet {sheet}; its sheets are {', '.join(names)}")
+    return [sheet]
+
+
+def _find_table(sheets: Iterator[tuple[str, Any]]) -> tuple[str, list[str]]:
+    """Return the name and the lines of the first sheet with a table; the lines are empty if none has one."""
+    name = ""
+    for name, sheet in sheets:
+        sheet.reset_dimensions()  # the stated size may be wrong
+        lines = _list_lines(sheet)
+        if has_samples(lines):
+            return name, lines
+    return name, []
+
+
+def _list_lines(sheet: Any) -> list[str]:
+    """Return the rows of a sheet as lines with tabulators between the cells."""
+    lines = []
+    width = 0
+    rows = [[_as_text(value) for value in row] for row in sheet.iter_rows(values_only=True)]
+    for row in rows:
+        width = max(width, len(row))
+    for row in rows:
+        stream = StringIO()
+        csv.writer(stream, delimiter="\t", lineterminator="\n").writerow([*row, *[""] * (width - len(row))])
+        lines.append(stream.getvalue())
+    return lines
+
+
+def _as_text(value: Any) -> str:
+    match value:
+        case None:
+            return ""
+        case bool():
+            return str(int(value))
+        case datetime():
+            return value.isoformat(" ")
+        case date() | time():
+            return value.isoformat()
+        case timedelta():
+            return repr(value.total_seconds())
+        case str():
+            return " ".join(value.split())
+        case _:
+            return repr(value)

@@ -1,0 +1,118 @@
+"""HDF5 files (.h5, .hdf5): the datasets of one group. References to other files are never followed."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.errors import RecordError
+from islands.io.records.column_names import append_unit
+from islands.io.records.formats.columnar import ColumnarFile
+from islands.io.records.formats.groups import choose_group
+from islands.io.records.formats.mat.v73 import check_dataset_size
+from islands.io.records.formats.mat.workspace import DAMAGED, MOST_VARIABLES, Variable, make_columns
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.validation import MIN_SAMPLES
+
+_MAX_DEPTH = 32
+
+#: Attributes with the unit of a dataset.
+_UNITS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
+
+
+def read_hdf5(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarFile:
+    """Open an HDF5 file.
+
+    The columns are the datasets of a group, or the fields of a dataset of records. A dataset with two
+    dimensions gives a column for each channel: ``x_1``, ``x_2``, ... The unit of a dataset is its attribute
+    ``unit`` or ``units``.
+
+    Raises
+    ------
+    RecordError
+        The file is not an HDF5 file or is damaged, or it has no such group.
+    """
+    import h5py  # noqa: PLC0415
+
+    options.check_array_file(path.name, sheets=True)
+    try:
+        if not h5py.is_hdf5(path):
+            raise RecordError(f"{path.name} is not an HDF5 file: write it again")
+        with h5py.File(path, "r", locking=False) as file:
+            groups = dict(_iterate_tables(file, "/", 0))
+        tables = {name: _is_table(variables) for name, variables in groups.items()}
+        group, others = choose_group(tables, options.sheet, path.name)
+        variables = [
+            Variable(append_unit(key, member[2]), member[0], member[1], partial(_read, path, group, key))
+            for key, member in groups[group].items()
+        ]
+    except DAMAGED as error:
+        raise RecordError(f"{path.name} is damaged or truncated ({error}): save it again") from error
+    return replace(make_columns(variables, path.name), others=others)
+
+
+def _iterate_tables(
+    group: Any, name: str, depth: int
+) -> Iterator[tuple[str, Mapping[str, tuple[str, tuple[int, ...], str]]]]:
+    """Yield groups and datasets of records by path, with kind, shape and unit of each column."""
+    import h5py  # noqa: PLC0415
+
+    if depth > _MAX_DEPTH or len(group) > MOST_VARIABLES:
+        raise ValueError(f"groups are nested more than {_MAX_DEPTH} deep or contain too many members")
+    columns: dict[str, tuple[str, tuple[int, ...], str]] = {}
+    inner = []
+    for key in group:
+        hard = group.id.links.get_info(key.encode()).type == h5py.h5l.TYPE_HARD
+        member = group[key] if hard else None
+        place = key if name == "/" else f"{name}/{key}"
+        if isinstance(member, h5py.Group):
+            inner.append((member, place))
+        elif isinstance(member, h5py.Dataset) and member.dtype.names:
+            fields = {
+                each: (_kind(member, member.dtype[each]), member.shape, "") for each in member.dtype.names
+            }
+            yield place, fields
+        elif isinstance(member, h5py.Dataset):
+            columns[key] = (_kind(member, member.dtype), member.shape or (), _unit(member))
+        elif member is None:
+            columns[key] = ("link", (), "")
+    if columns:
+        yield name, columns
+    for member, place in inner:
+        yield from _iterate_tables(member, place, depth + 1)
+
+
+def _kind(dataset: Any, dtype: np.dtype[Any]) -> str:
+    if dataset.is_virtual or dataset.external:
+        return "link"
+    return "" if dtype.kind in "fiub" else str(dtype)
+
+
+def _unit(dataset: Any) -> str:
+    for name in _UNITS:
+        value = dataset.attrs.get(name)
+        if value is not None:
+            return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    return ""
+
+
+def _is_table(columns: Mapping[str, tuple[str, tuple[int, ...], str]]) -> bool:
+    """Return whether there are two or more channels."""
+    shapes = [
+        shape for kind, shape, _ in columns.values() if not kind and max(shape, default=0) >= MIN_SAMPLES
+    ]
+    return len(shapes) > 1 or any(len(shape) == 2 and min(shape) > 1 for shape in shapes)
+
+
+def _read(path: Path, group: str, key: str) -> NDArray[Any]:
+    import h5py  # noqa: PLC0415
+
+    with h5py.File(path, "r", locking=False) as file:
+        parent = file[group]
+        dataset = parent if isinstance(parent, h5py.Dataset) else parent[key]
+        check_dataset_size(dataset, key, path)
+        return np.asarray(dataset[key] if dataset is parent else dataset[()])

@@ -1,0 +1,98 @@
+"""MDF files of test benches and loggers (.mf4, .mdf), read by asammdf (extra `mdf`)."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.errors import RecordError
+from islands.io.records.column_names import append_unit
+from islands.io.records.formats.columnar import ColumnarFile
+from islands.io.records.formats.groups import choose_group
+from islands.io.records.formats.mat.workspace import DAMAGED
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.size_limits import check_samples, check_stored
+from islands.io.records.validation import MIN_SAMPLES
+
+#: Name of the column with the times of a group.
+_TIME = "t_s"
+
+
+def read_mdf(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarFile:
+    """Open an MDF file: the channels of one channel group, with the times of the group as the column t_s.
+
+    Raises
+    ------
+    RecordError
+        The file is not an MDF file or is damaged, has no such group, or asammdf is not installed.
+    """
+    options.check_array_file(path.name, sheets=True)
+    with _open(path) as file:
+        numbers = _name_groups(file)
+        tables = {
+            name: len(file.groups[number].channels) > 1
+            and file.groups[number].channel_group.cycles_nr >= MIN_SAMPLES
+            for name, number in numbers.items()
+        }
+        group, others = choose_group(tables, options.sheet, path.name)
+        number = numbers[group]
+        master = file.masters_db.get(number)
+        loads = {} if master is None else {_TIME: partial(_read_times, path, number)}
+        for place, channel in enumerate(file.groups[number].channels):
+            name = _name_channel(channel)
+            if place != master and name not in loads:
+                loads[name] = partial(_read_channel, path, number, place, name)
+    return ColumnarFile(path.name, tuple(loads), lambda name: loads[name](), (), {}, others)
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[Any]:
+    try:
+        from asammdf import MDF  # noqa: PLC0415
+        from asammdf.blocks.utils import MdfException  # noqa: PLC0415
+    except ImportError as error:
+        raise RecordError(
+            f"{path.name}: install islands[mdf] to read MDF, or export the record as CSV"
+        ) from error
+    try:
+        with MDF(path) as file:
+            yield file
+    except (*DAMAGED, MdfException) as error:
+        raise RecordError(f"{path.name} is damaged or not an MDF file ({error}): write it again") from error
+
+
+def _name_groups(file: Any) -> dict[str, int]:
+    """Return the numbers of the channel groups by name; a group without a name has its number."""
+    numbers: dict[str, int] = {}
+    for number, group in enumerate(file.groups):
+        name = getattr(group.channel_group, "acq_name", "") or str(number)
+        numbers[name if name not in numbers else f"{name} ({number})"] = number
+    return numbers
+
+
+def _name_channel(channel: Any) -> str:
+    conversion = getattr(channel, "conversion", None)
+    unit = getattr(channel, "unit", "") or getattr(conversion, "unit", "")
+    return append_unit(str(channel.name), str(unit or ""))
+
+
+def _read_times(path: Path, number: int) -> NDArray[Any]:
+    with _open(path) as file:
+        _check_size(file, path, number, _TIME)
+        return np.asarray(file.get_master(number))
+
+
+def _read_channel(path: Path, number: int, place: int, name: str) -> NDArray[Any]:
+    with _open(path) as file:
+        _check_size(file, path, number, name)
+        return np.asarray(file.get(group=number, index=place).samples)
+
+
+def _check_size(file: Any, path: Path, number: int, name: str) -> None:
+    group = file.groups[number].channel_group
+    check_samples(group.cycles_nr, name, path.name)
+    check_stored(group.cycles_nr * group.samples_byte_nr, path.stat().st_size, True, name, path.name)

@@ -1,0 +1,82 @@
+"""TDMS files of LabVIEW (.tdms), read by npTDMS (extra `tdms`)."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.errors import RecordError
+from islands.io.records.column_names import append_unit
+from islands.io.records.formats.columnar import ColumnarFile
+from islands.io.records.formats.groups import choose_group
+from islands.io.records.formats.mat.workspace import DAMAGED
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.size_limits import check_samples, check_stored
+from islands.io.records.validation import MIN_SAMPLES
+
+#: Array with the sampling time of the waveforms of a group.
+_STEP = "dt"
+
+
+def read_tdms(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarFile:
+    """Open a TDMS file: the channels of one group. Waveforms state their sampling time.
+
+    Raises
+    ------
+    RecordError
+        The file is not a TDMS file or is damaged, has no such group, or npTDMS is not installed.
+    """
+    options.check_array_file(path.name, sheets=True)
+    with _open(path) as file:
+        groups = {group.name: group.channels() for group in file.groups()}
+        tables = {
+            name: sum(len(channel) >= MIN_SAMPLES and channel.dtype.kind in "fiubM" for channel in channels)
+            > 1
+            for name, channels in groups.items()
+        }
+        group, others = choose_group(tables, options.sheet, path.name)
+        names = {_name_channel(channel): channel.name for channel in groups[group]}
+        clocks = {_name_channel(channel): "" for channel in groups[group] if channel.dtype.kind == "M"}
+        steps = {channel.properties.get("wf_increment") for channel in groups[group]} - {None, 0.0}
+    loads = {name: partial(_read, path, group, channel) for name, channel in names.items()}
+    scalars = []
+    if len(steps) == 1 and _STEP not in loads:
+        loads[_STEP] = partial(np.array, [float(steps.pop())])
+        scalars.append(_STEP)
+    return ColumnarFile(path.name, tuple(loads), lambda name: loads[name](), scalars, clocks, others)
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[Any]:
+    try:
+        from nptdms import TdmsFile  # noqa: PLC0415
+    except ImportError as error:
+        raise RecordError(
+            f"{path.name}: install islands[tdms] to read TDMS, or export the record as CSV"
+        ) from error
+    try:
+        with TdmsFile.open(path) as file:
+            yield file
+    except DAMAGED as error:
+        raise RecordError(f"{path.name} is damaged or not a TDMS file ({error}): write it again") from error
+
+
+def _name_channel(channel: Any) -> str:
+    return append_unit(str(channel.name), str(channel.properties.get("unit_string", "")))
+
+
+def _read(path: Path, group: str, name: str) -> NDArray[Any]:
+    with _open(path) as file:
+        channel = file[group][name]
+        check_samples(len(channel), name, path.name)
+        # Scaled channels are stored with fewer bytes than they have when they are read, but with one or more.
+        check_stored(len(channel), path.stat().st_size, False, name, path.name)
+        values = np.asarray(channel[:])
+    if values.dtype.kind == "M":
+        elapsed: NDArray[Any] = (values - values[:1]) / np.timedelta64(1, "s")
+        return elapsed
+    return values
