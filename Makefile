@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo test ci nightly lint bench docs wheel clean
+.PHONY: setup demo test ci nightly lint bench docs wheel wheel-matrix clean
 
 setup: .venv/ready
 
@@ -55,6 +55,10 @@ docs: setup
 
 wheel: setup
 	$(BIN)/python -m build --no-isolation --wheel --outdir dist .
+
+# The wheel on Python 3.11, 3.12 and 3.13, with all extras and with the core only: a quarter of an hour, and an index of packages.
+wheel-matrix: setup
+	.ci/wheel-matrix
 
 clean:
 	rm -rf .venv build dist demo-out bench-out site

@@ -27,7 +27,7 @@ def test_invalid_trials_are_rejected() -> None:
 @pytest.mark.ci
 def test_trials_are_counted_by_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The trials run in this process, one after the other."""
-    pool = "islands_api.cli.commands.trials.ray_pool"
+    pool = "islands_service.runtime.parallel_map.ray_pool"
     monkeypatch.setattr(pool, lambda _workers, _address: nullcontext(map))
     command = ("trials", "--core", "column", "--effects", "offset", "--count", 1, "--clean", 1)
     more = ("--open-set", 0, "--seconds", 10, "--seed", 8, "--json", tmp_path / "trials.json")

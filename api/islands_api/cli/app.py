@@ -2,34 +2,67 @@
 
 import os
 import sys
+from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import version
+from types import MappingProxyType
 from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
-from islands.errors import IslandsError
+from islands.errors import IslandsError, SettingsError
 from islands_api.cli.console import errors
 
 #: Environment variables that set the number of threads of linear algebra libraries.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
-#: Commands, in the order of the help. Each is a file with a function or a group of the command's name.
-COMMANDS = (
-    *("identify", "fit", "diagnose", "simulate", "show", "demo"),
-    *("bench", "trials", "systems", "serve", "jobs", "keys"),
+#: Commands and their descriptions, in the order of the help. Each is a file with a function or a group of the
+#: command's name. The help shows these descriptions, so that it does not import the commands.
+COMMANDS: Mapping[str, str] = MappingProxyType(
+    {
+        "identify": "Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR continues.",
+        "fit": "Fit small models to a record by subset selection and least squares, and assess them.",
+        "diagnose": "Find the errors of a simulation on a record, name their causes, and measure the gain of "
+        "correction.",
+        "simulate": "Simulate a model on a record. A free run needs only the first samples of the output.",
+        "show": "Show or write a model as an equation, a program, a block for a simulator, or JSON.",
+        "demo": "Identify the record of the paper's case 1 and compare the models with those of the paper.",
+        "bench": "Measure evaluations, kernels and whole searches on this machine, which should be otherwise "
+        "idle.",
+        "trials": "Inject effects into simulated records, diagnose them, and count how often they are found "
+        "and named.",
+        "systems": "Simulated systems: list them, make records of them.",
+        "serve": "Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next "
+        "start.",
+        "jobs": "Jobs of a service: submit, diagnose, list, show, watch, cancel, resume, result.",
+        "keys": "API keys of a service: create, list, revoke.",
+    }
+)
+
+#: Extra of ``pyproject.toml`` by the package that it installs.
+EXTRAS: Mapping[str, str] = MappingProxyType(
+    {
+        "ray": "ray",
+        **dict.fromkeys(("alembic", "fastapi", "prometheus_client", "pydantic_settings"), "service"),
+        **dict.fromkeys(("python_multipart", "sqlalchemy", "starlette", "structlog", "uvicorn"), "service"),
+    }
 )
 
 
 class Commands(TyperGroup):
     """Group that imports a command on demand, so that ``islands jobs`` does not load the kernels."""
 
+    _is_listing = False
+
     def invoke(self, ctx: Any) -> Any:
         """Run the command. Report an error in one line and exit with code 2, or 130 if interrupted."""
         try:
-            return super().invoke(ctx)
+            try:
+                return super().invoke(ctx)
+            except ModuleNotFoundError as error:
+                raise explain_missing_package(error, str(ctx.invoked_subcommand)) from error
         except (IslandsError, OSError) as error:
             errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False)
             sys.exit(2)
@@ -42,16 +75,44 @@ class Commands(TyperGroup):
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
-        """Return a command, or None if no command has the name."""
+        """Return a command, or None if no command has the name.
+
+        Raises
+        ------
+        SettingsError
+            The packages of the command are not installed.
+        """
         if cmd_name not in COMMANDS:
             return None
-        group = getattr(import_module(f"islands_api.cli.commands.{cmd_name}"), cmd_name)
+        if self._is_listing:
+            return TyperCommand(cmd_name, help=COMMANDS[cmd_name])
+        try:
+            module = import_module(f"islands_api.cli.commands.{cmd_name}")
+        except ModuleNotFoundError as error:
+            raise explain_missing_package(error, cmd_name) from error
+        group = getattr(module, cmd_name)
         if not isinstance(group, typer.Typer):
             function, group = group, typer.Typer(pretty_exceptions_enable=False)
             group.command(name=cmd_name)(function)
         command = typer.main.get_command(group)
         command.name = cmd_name
         return command
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help from the table, without importing the commands."""
+        self._is_listing = True
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            self._is_listing = False
+
+
+def explain_missing_package(error: ModuleNotFoundError, command: str) -> Exception:
+    """Return an error that names the extra with a missing package; the same error if no extra has it."""
+    extra = EXTRAS.get((error.name or "").partition(".")[0])
+    if extra is None:
+        return error
+    return SettingsError(f"islands {command} needs the {extra} packages: pip install 'islands[{extra}]'")
 
 
 app = typer.Typer(

@@ -32,7 +32,7 @@ from islands_api.cli import options
 from islands_api.cli.console import Display, compile_kernels, errors, output, print_message, progress
 from islands_api.cli.output_folder import show_result
 from islands_api.cli.search_progress import search_progress
-from islands_service.engines import ENGINES
+from islands_service.engines import ENGINES, SERIAL_NOTICE, default_engine, has_ray
 
 #: File of the search state.
 CHECKPOINT = "checkpoint.json"
@@ -57,7 +57,7 @@ class RunOptions:
     Attributes
     ----------
     engine : str, optional
-        Name of an engine; by default Ray for several islands or with an address, else serial.
+        Name of an engine; by default that of `default_engine`.
     address : str, optional
         Address of a Ray cluster.
     wall_time : float, optional
@@ -72,8 +72,8 @@ class RunOptions:
     verbose: bool
 
     def engine_for(self, islands: int) -> str:
-        """Return the name of the engine. Ray starts in three seconds, and one island does not need it."""
-        return self.engine or ("ray" if islands > 1 or self.address else "serial")
+        """Return the name of the engine."""
+        return self.engine or default_engine(islands, self.address)
 
 
 def run(
@@ -99,6 +99,8 @@ def run(
     folder.mkdir(parents=True, exist_ok=True)
     compile_kernels()
     start_engine = ENGINES[run_options.engine_for(settings.islands)]
+    if run_options.engine is None and settings.islands > 1 and not has_ray():
+        print_message(SERIAL_NOTICE)
     with (
         progress("identify") as show,
         # Ray installs a handler for SIGTERM when it starts, so it starts before our handlers are installed.

@@ -19,7 +19,7 @@ from islands.validation.metrics import Metrics, metrics
 from islands_api.cli.console import compile_kernels, output, print_message, progress
 from islands_api.cli.output_folder import check_folder, show_result
 from islands_api.cli.search_progress import search_progress
-from islands_service.engines import ENGINES
+from islands_service.engines import ENGINES, SERIAL_NOTICE, default_engine, has_ray
 
 #: Number of islands: one for each core of the smallest supported machine.
 ISLANDS = 2
@@ -48,9 +48,11 @@ def demo(
     for part in SELECTING:
         write_record(records[part], out / f"{part}.csv")
     compile_kernels()
+    if not has_ray():
+        print_message(SERIAL_NOTICE)
     with (
         progress("demo") as show,
-        ENGINES["ray"](None, print_message) as engine,
+        ENGINES[default_engine(ISLANDS)](None, print_message) as engine,
     ):
         by_preset = {}
         for preset in PRESETS:

@@ -45,7 +45,9 @@ def identify(
     search: SearchOptions = DEFAULTS,
     engine: Annotated[
         str | None,
-        typer.Option("--engine", help=f"{' or '.join(ENGINES)}; by default ray for several islands."),
+        typer.Option(
+            "--engine", help=f"{' or '.join(ENGINES)}; by default ray for several islands, if installed."
+        ),
     ] = None,
     ray_address: Annotated[
         str | None, typer.Option("--ray-address", help="HOST:PORT of a cluster; this machine by default.")

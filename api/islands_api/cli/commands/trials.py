@@ -25,7 +25,6 @@ from islands.performance.trials.scoring import (
 )
 from islands.performance.trials.trial import Trial, TrialOutcome, run_trial
 from islands_api.cli.console import compile_kernels, output, progress
-from islands_service.runtime.parallel_map import ray_pool
 
 #: Bands of the misfit of an effect, in standard deviations of the noise; used in turn.
 BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
@@ -104,6 +103,9 @@ def trials(
             ]
     compile_kernels()
     found = []
+    # Imported here: the help of the command must not need Ray.
+    from islands_service.runtime.parallel_map import ray_pool  # noqa: PLC0415
+
     with progress("trials") as show, ray_pool(workers, address) as parallel_map:
         for outcome in parallel_map(run_trial, planned):
             found.append(outcome)
