@@ -61,7 +61,7 @@ def draw_static_characteristic(
     """
     figure = blank(3.4) if ax is None else cast("Figure", ax.get_figure(root=True))
     axes = figure.subplots() if ax is None else ax
-    axes.plot(inputs, outputs, color=SIMULATED, lw=1.4)
+    axes.plot(inputs, outputs, color=SIMULATED, lw=1.4, label="model")
     (name,) = model.column_names
     axes.set_xlabel(f"constant {label(name, parse_unit(name))}")
     axes.set_ylabel(f"{label(model.output_name, parse_unit(model.output_name))} at rest")

@@ -4,8 +4,11 @@ Equal content gives equal bytes: the matplotlibrc of the user is ignored, and fi
 identifiers.
 """
 
+from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager
+from html import escape
+from io import BytesIO
 from pathlib import Path
 from textwrap import fill
 from typing import IO, Any
@@ -46,6 +49,9 @@ REMARK = 7.5
 
 #: Tick steps of low panels, times powers of ten.
 STEPS = (1, 2, 2.5, 5, 10)
+
+#: Style of an image in HTML: a figure is drawn on white, also in a dark notebook.
+_IMAGE = "max-width: 100%; background: white"
 
 #: Characters per line of a title.
 _TITLE_CHARACTERS = 80
@@ -89,9 +95,27 @@ def house_style() -> Iterator[None]:
         yield
 
 
+class ShownFigure(Figure):
+    """Figure that a notebook shows, also if nothing has imported pyplot."""
+
+    def _repr_html_(self) -> str:
+        return image_html(self, "figure")
+
+
+def image_html(figure: Figure, alternative: str) -> str:
+    """Return a figure as an image in HTML, with an alternative text.
+
+    An image keeps the identifiers of the figure's shapes apart from those of other figures in the notebook.
+    """
+    stream = BytesIO()
+    save(figure, stream)
+    image = b64encode(stream.getvalue()).decode("ascii")
+    return f'<img src="data:image/svg+xml;base64,{image}" alt="{escape(alternative)}" style="{_IMAGE}">'
+
+
 def blank(height: float, title: str = "") -> Figure:
     """Return an empty figure of width `WIDTH` and a height in inches, with a left-aligned title."""
-    figure = Figure(figsize=(WIDTH, height))
+    figure = ShownFigure(figsize=(WIDTH, height))
     if title:
         lines = (fill(line, _TITLE_CHARACTERS) for line in title.splitlines())
         figure.suptitle("\n".join(lines), x=0.01, ha="left")

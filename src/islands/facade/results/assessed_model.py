@@ -95,6 +95,9 @@ class AssessedModel(AnalysedModel, ABC):
     ) -> NDArray[np.float64]:
         """Return the free run of the model, one value for every row of the data.
 
+        It starts from the first samples of the output, as many as the largest lag of the model. `simulate`
+        starts later, after the warm-up of `metrics`.
+
         Parameters
         ----------
         record : Dataset, data frame or array
@@ -115,7 +118,7 @@ class AssessedModel(AnalysedModel, ABC):
             missing in the warm-up.
         """
         data = record_of_model(self.model, record, y, dt, inputs, output)
-        return predict(self.model, data, self.warm_up)
+        return predict(self.model, data)
 
     def simulate(self, record: Dataset, mode: str = "free-run", warm_up: int | None = None) -> Simulation:
         """Simulate the model on a record.

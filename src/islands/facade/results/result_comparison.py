@@ -10,7 +10,6 @@ from islands.data.compatibility import match_rate
 from islands.errors import SettingsError
 from islands.facade.results.assessed_model import AssessedModel
 from islands.facade.results.model_simulation import record_of_model
-from islands.facade.results.notebook_html import image_html
 from islands.validation.metrics import Metrics, metrics
 
 if TYPE_CHECKING:
@@ -88,6 +87,8 @@ class ResultComparison:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
+        from islands.figures.style import image_html  # noqa: PLC0415
+
         head, *rows = (
             "".join(f'<t{kind} style="text-align: left">{escape(cell)}</t{kind}>' for cell in line)
             for kind, line in zip("h" + "d" * len(self.recommended), self._cells(), strict=True)

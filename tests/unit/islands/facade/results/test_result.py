@@ -54,9 +54,10 @@ def test_predictions_of_a_frame_have_one_value_per_row(result):
     frame = pd.DataFrame({"u": data.u[:, 0], "y": data.y})
     predicted = result.predict(frame)
     assert predicted.shape == (400,)
-    assert np.array_equal(predicted, result.best.simulate(data).y, equal_nan=True)
+    lag = result.best.model.maximum_lag
+    assert np.array_equal(predicted, result.best.simulate(data, warm_up=lag).y, equal_nan=True)
     # The free run reads only the first samples of the output.
-    frame.loc[result.best.warm_up :, "y"] = np.nan
+    frame.loc[lag:, "y"] = np.nan
     assert np.array_equal(result.predict(frame), predicted, equal_nan=True)
     assert np.array_equal(result.predict(data.u, data.y, data.dt), predicted, equal_nan=True)
     with pytest.raises(islands.RecordError, match="no column u; it has v, y"):
@@ -66,7 +67,8 @@ def test_predictions_of_a_frame_have_one_value_per_row(result):
 def test_rows_of_a_model_of_means_have_the_prediction_of_their_mean():
     data = islands.join((record(400), record(205, seed=3)))
     result = islands.fit(data, library="polynomial", degree=1, max_terms=2, average=4)
-    predicted, means = result.predict(data), result.best.simulate(data).y
+    predicted = result.predict(data)
+    means = result.best.simulate(data, warm_up=result.best.model.maximum_lag).y
     assert predicted.shape == (605,)
     assert np.array_equal(predicted[:400:4], means[:100], equal_nan=True)
     assert np.array_equal(
@@ -90,6 +92,10 @@ def test_a_figure_of_another_record_is_that_of_its_simulation(result):
     assert np.array_equal(drawn, result.best.simulate(other).y, equal_nan=True)
     for kind in ("loop", "hold", "residuals"):
         assert result.best.plot(kind, record=other).axes
+
+
+def test_a_notebook_shows_a_figure_without_pyplot(result):
+    assert "data:image/svg+xml" in result.best.plot()._repr_html_()
 
 
 @pytest.mark.parametrize("kind", ["free-run", "loop"])
