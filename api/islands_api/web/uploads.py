@@ -13,6 +13,9 @@ from islands_api.web.problems import PayloadTooLargeError
 #: Number of bytes that are copied at once.
 CHUNK_BYTES = 1 << 20
 
+#: Suffixes of uploads. The reader of MDF writes temporary files, which the inspection forbids.
+SUFFIXES = tuple(suffix for suffix in READERS if suffix not in {".mf4", ".mdf"})
+
 #: Maximum length in bytes of a file name.
 MAX_NAME_BYTES = 200
 
@@ -33,8 +36,8 @@ def parse_file_name(given: str | None) -> tuple[str, bool]:
     compressed = name.lower().endswith(GZIP_SUFFIX)
     name = name[: -len(GZIP_SUFFIX)] if compressed else name
     suffix = PurePosixPath(name).suffix.lower()
-    if suffix not in READERS:
-        known = ", ".join(READERS)
+    if suffix not in SUFFIXES:
+        known = ", ".join(SUFFIXES)
         raise RecordError(
             f"{name or 'the file'}: its name must end in one of {known}, optionally followed by "
             f"{GZIP_SUFFIX}: export the record to one of these formats"

@@ -14,11 +14,17 @@ _BRACKETED = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]")
 #: Exponents of ten of the SI prefixes.
 _PREFIXES = {"": 0, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "k": 3, "M": 6, "G": 9, "T": 12}
 
-#: Units: those without a prefix, or a prefix and a symbol.
-_UNIT = re.compile(
-    r"(?:%|min|h|d|deg|°|°C|degC|°F|degF|rpm|psi|dB)"
-    r"|([pnumcdkMGT]?)(m|g|s|A|K|mol|cd|Hz|N|Pa|J|W|C|V|F|ohm|S|Wb|T|H|L|l|bar|eV|rad)"
-)
+#: Units without a prefix, and symbols that may have one of `_PREFIXES`.
+PLAIN_UNITS = tuple("% min h d deg ° °C degC °F degF rpm psi dB".split())  # noqa: SIM905
+SYMBOLS = tuple("m g s A K mol cd Hz N Pa J W C V F ohm S Wb T H L l bar eV rad".split())  # noqa: SIM905
+
+_UNIT = re.compile(f"(?:{'|'.join(PLAIN_UNITS)})|([{''.join(_PREFIXES)}]?)({'|'.join(SYMBOLS)})")
+
+#: Units of long times, which are also words behind other names: ``y_min`` is the least y.
+_LONG_TIMES = ("min", "h", "d")
+
+#: Names of times.
+_TIME_STEM = re.compile(r"(?:t|(?i:.*(?:time|zeit|duration|dauer|delay|period|age)))(?:_.*)?")
 
 #: Units of time that divide the unit before them.
 _DIVISORS = frozenset({"s", "s2", "min", "h"})
@@ -73,7 +79,7 @@ def parse_unit(name: str) -> str:
 
     The unit is the text in brackets, behind a slash, or after the last underscore. A time after another unit
     divides it: ``omega_rad_s`` is in ``rad/s``. Text that is not a unit is a part of the name:
-    ``oven_temperature``, ``speed (measured)``.
+    ``oven_temperature``, ``speed (measured)``, ``level_min``.
     """
     return _split_unit(name)[1]
 
@@ -88,7 +94,9 @@ def _split_unit(name: str) -> tuple[str, str]:
     if not (stem and is_unit(last)):
         return name, ""
     above, _, unit = stem.rpartition("_")
-    return (above, f"{unit}/{last}") if last in _DIVISORS and above and is_unit(unit) else (stem, last)
+    if last in _DIVISORS and above and is_unit(unit):
+        return above, f"{unit}/{last}"
+    return (name, "") if last in _LONG_TIMES and not _TIME_STEM.fullmatch(stem) else (stem, last)
 
 
 def _match_quotient(name: str) -> re.Match[str] | None:
@@ -114,6 +122,16 @@ def normalise_unit(text: str) -> str:
 def spell_unit(text: str) -> str:
     """Return the symbol of a unit that is written as a word (``Volt``), else the text itself."""
     return _WORDS.get(text.lower(), text)
+
+
+def simplify_unit(text: str) -> str:
+    """Return a quotient of units without the factor 1: ``V`` for ``V/1^3``, empty for ``1/1``."""
+    numerator, *denominators = (
+        " ".join(factor for factor in part.split(" ") if not re.fullmatch(r"1(\^\d+)?", factor))
+        for part in text.split("/")
+    )
+    kept = [part for part in denominators if part]
+    return "/".join([numerator or ("1" if kept else ""), *kept])
 
 
 def conversion_factor(unit: str, other: str) -> float | None:

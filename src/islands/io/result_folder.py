@@ -83,6 +83,7 @@ def record_document(record: Dataset) -> dict[str, Any]:
         "units": {"inputs": list(record.input_units), "output": record.output_unit},
         "segments": list(record.segments),
         "recordings": list(record.recordings),
+        "reading": list(record.reading),
     }
 
 

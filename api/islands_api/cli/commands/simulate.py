@@ -90,6 +90,8 @@ def simulate(
         missing_output=True,
         options=reading,
     )
+    for step in recorded.reading:
+        output.print(step, markup=False)
     data = match_rate(chosen, recorded)
     if data is not recorded:
         output.print(f"averaged {chosen.average} samples of {recorded.dt:g} s each: dt {data.dt:g} s")

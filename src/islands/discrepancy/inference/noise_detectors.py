@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from islands.data.channel_names import simplify_unit
 from islands.discrepancy.calibration.noise_model import fit_ar_noise
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 
@@ -184,7 +185,7 @@ def _detect_heteroscedastic_noise(
     if score_gain <= 0.0:
         return None
     strength = float(_HETEROSCEDASTIC_STRENGTHS[best]) / float(np.max(np.abs(y)))
-    return NoiseFinding({"k": (strength, f"1/{context.output_unit}")}, score_gain)
+    return NoiseFinding({"k": (strength, simplify_unit(f"1/{context.output_unit}"))}, score_gain)
 
 
 HETEROSCEDASTIC_NOISE = NoiseDetector(

@@ -7,6 +7,8 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.channel_names import simplify_unit
+
 Signal = NDArray[np.float64]
 
 
@@ -143,3 +145,6 @@ class Parameter:
     lower: float = -inf
     upper: float = inf
     initial: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", simplify_unit(self.unit))

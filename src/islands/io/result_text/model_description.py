@@ -68,7 +68,8 @@ def describe_units(found: SearchResult) -> str:
         signal_names(found.recommended.model), (record.output_unit, *record.input_units), strict=True
     )
     units = ", ".join(f"{name} in {unit}" for name, unit in columns if unit)
-    return f"{f'{units}; ' if units else ''}{_describe_rate(found)}.{_describe_feedthrough(found)}"
+    reading = "".join(f" Reading: {step}." for step in record.reading)
+    return f"{f'{units}; ' if units else ''}{_describe_rate(found)}.{_describe_feedthrough(found)}{reading}"
 
 
 def describe_findings(found: SearchResult) -> list[str]:

@@ -2,7 +2,15 @@
 
 import pytest
 
-from islands.data.channel_names import conversion_factor, is_unit, parse_channel_name, parse_unit
+from islands.data.channel_names import (
+    PLAIN_UNITS,
+    SYMBOLS,
+    conversion_factor,
+    is_unit,
+    parse_channel_name,
+    parse_unit,
+    simplify_unit,
+)
 
 
 @pytest.mark.parametrize(
@@ -45,3 +53,53 @@ def test_units_with_prefixes_convert_by_powers_of_ten():
     assert [text for text in ("V", "N.m", "m/s2", "degC", "est", "", "B", "set") if is_unit(text)] == [
         *("V", "N.m", "m/s2", "degC")
     ]
+
+
+ORDINARY_NAMES = (
+    *("oven_temperature", "fan_speed", "pos_ref", "y_meas", "heater_power", "valve_opening", "tank_level_1"),
+    *("level_min", "level_max", "T_min", "u_d", "y_hat", "u_in", "y_out", "motor_on", "run_no", "flow_set"),
+    *("omega", "torque (measured)", "signal [raw]", "u", "in/out", "x_axis", "ch_2", "sensor_a", "e_sum"),
+)
+
+
+@pytest.mark.parametrize("name", ORDINARY_NAMES)
+def test_an_ordinary_name_has_no_unit(name):
+    assert parse_unit(name) == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("t_min", "min"), ("dead_time_h", "h"), ("flow_l_min", "l/min"), ("v_km_h", "km/h")]
+)
+def test_long_times_are_units_of_times_and_of_rates(name, unit):
+    assert parse_unit(name) == unit
+
+
+@pytest.mark.ci
+def test_every_unit_is_one_of_pint():
+    import pint
+
+    registry = pint.UnitRegistry()
+    prefixes = "pnumcdkMGT"
+    units = [*PLAIN_UNITS, *SYMBOLS, *(prefix + symbol for prefix in prefixes for symbol in SYMBOLS)]
+    unknown = []
+    for unit in units:
+        try:
+            registry.parse_units(unit)
+        except pint.UndefinedUnitError:
+            unknown.append(unit)
+    assert unknown == []
+
+
+@pytest.mark.parametrize(
+    ("unit", "simple"),
+    [
+        ("1/1^3", ""),
+        ("1/1", ""),
+        ("V/1^2", "V"),
+        ("1 s^2/1^2", "s^2"),
+        ("1/V^3", "1/V^3"),
+        ("N s/m", "N s/m"),
+    ],
+)
+def test_the_unit_of_a_parameter_has_no_factor_one(unit, simple):
+    assert simplify_unit(unit) == simple

@@ -60,7 +60,7 @@ def test_a_result_has_every_field_of_the_contract(findings):
     ]
     assert result["schema"] == "islands.result/1"
     assert list(result["record"]) == [
-        *("sha256", "samples", "dt", "start", "names", "units", "segments", "recordings")
+        *("sha256", "samples", "dt", "start", "names", "units", "segments", "recordings", "reading")
     ]
     contract = ["evaluations", "evaluations_per_second", "wall_s", "outcomes", "full_set"]
     assert list(result["search"])[:5] == contract
