@@ -24,13 +24,12 @@ from islands.io.checkpoints import (
     write_checkpoint,
     write_hall,
 )
-from islands.io.records import fingerprint, read_dataset
+from islands.io.records import fingerprint
 from islands.io.records.reading_options import ReadingOptions
-from islands.io.records.row_range import parse_rows
 from islands.validation.metrics import metrics
-from islands_api.cli import options
 from islands_api.cli.console import Display, compile_kernels, errors, output, print_message, progress
 from islands_api.cli.output_folder import show_result
+from islands_api.cli.recordings import Recordings
 from islands_api.cli.search_progress import search_progress
 from islands_service.engines import ENGINES, SERIAL_NOTICE, default_engine, has_ray
 
@@ -88,7 +87,7 @@ def run(
     Parameters
     ----------
     job : dict
-        Record, columns, preset, seed and changed settings.
+        Recordings, columns, preset, seed and changed settings.
     state : SearchState, optional
         State from which the search is resumed.
     spent : float
@@ -167,14 +166,15 @@ def _read_data(
     for name, known in job["sha256"].items():
         if fingerprint(name) != known:
             raise RecordError(f"{name} has changed since the run began: restore the file, or start a new run")
-    path = Path(job["record"])
-    columns = (job["inputs"], job["output"], job["dt"])
+    # Checkpoints of versions with one recording have its path under another name.
+    paths = [Path(name) for name in job.get("records") or [job["record"]]]
     reading = ReadingOptions(**job.get("reading", {}))
-    data = read_dataset(path, *columns, parse_rows(job["rows"]), options=reading)
-    held_out = options.validation(job["validation"], path, *columns, job["rows"], reading=reading)
+    recordings = Recordings(paths, job["inputs"], job["output"], job["dt"], reading)
+    data = recordings.read(job["rows"])
+    held_out = recordings.read_held_out(job["validation"], job["rows"])
     test_data: islands.Dataset | None = None
     if job["test"] is not None:
-        given = options.validation(job["test"], path, *columns, job["rows"], "--test", reading)
+        given = recordings.read_held_out(job["test"], job["rows"], "--test")
         if isinstance(given, float):
             parts = islands.split(data, given)
             data, test_data = parts.estimation, parts.validation

@@ -5,12 +5,8 @@ from typing import Annotated
 
 import typer
 
-from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.io.models import read_model
-from islands.io.records import read_dataset
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.row_range import overlap, parse_rows
 from islands.io.result_models import find_model_file
 from islands.io.simulator_spec.specification import SIMULATORS, LocalExtendedSpec, is_extended, parse_spec
 from islands.model.model import Model
@@ -22,8 +18,13 @@ Record = Annotated[
 Records = Annotated[
     list[Path],
     typer.Argument(
-        metavar="RECORD...", help="One or several recordings of a system: CSV, NPZ, MAT or Parquet."
+        metavar="RECORD...",
+        help="Recordings of one system: text, XLSX, NPZ, MAT, HDF5, Parquet, MDF or TDMS; also .gz, .zip.",
     ),
+]
+RecordsOrNone = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="RECORD...", help="Recordings of one system, as for fit; not with --resume."),
 ]
 Inputs = Annotated[
     list[str], typer.Option("--input", help="Input column; repeat it, or separate by commas, for several.")
@@ -93,48 +94,6 @@ def tolerances(texts: list[str]) -> dict[str, float]:
         except ValueError:
             raise SettingsError(f"--tolerance {text}: write PARAM=REL, for example dp=0.01") from None
     return found
-
-
-def validation(
-    text: str | None,
-    record: Path,
-    inputs: list[str],
-    output: str,
-    dt: float | None,
-    used: str | None = None,
-    option: str = "--validation",
-    reading: ReadingOptions = DEFAULT_READING,
-) -> Dataset | float:
-    """Read ``--validation``: a fraction of the record's end, rows of the record's file, or another file.
-
-    Parameters
-    ----------
-    used : str, optional
-        The ``--rows`` used for estimation. Validation rows must not overlap them.
-    option : str
-        Name of the option in messages; ``--test`` is read in the same way.
-    reading : ReadingOptions
-        Options of reading, for all files.
-
-    Raises
-    ------
-    SettingsError
-        The text is none of the three, or the rows overlap those used for estimation.
-    """
-    if text is None:
-        return 0.25
-    if Path(text).exists():
-        return read_dataset(text, inputs, output, dt, options=reading)
-    if ":" in text:
-        if used is None or overlap(parse_rows(used), parse_rows(text)):
-            raise SettingsError(f"{option} {text}: give --rows START:STOP, other samples for estimation")
-        return read_dataset(record, inputs, output, dt, parse_rows(text), options=reading)
-    try:
-        return float(text)
-    except ValueError:
-        raise SettingsError(
-            f"{option} {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
-        ) from None
 
 
 def extended(text: str) -> LocalExtendedSpec | None:

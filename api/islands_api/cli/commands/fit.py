@@ -11,19 +11,18 @@ from islands.data.averaging import AUTO
 from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.io.records import read_dataset
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.row_range import parse_rows
 from islands.model.candidate_library import LIBRARIES
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, progress
 from islands_api.cli.output_folder import check_folder, show_result
 from islands_api.cli.record_options import with_reading_options
+from islands_api.cli.recordings import Recordings
 
 
 @with_reading_options
 def fit(
-    record: options.Record,
+    records: options.Records,
     inputs: options.Inputs,
     output_column: options.Output,
     out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
@@ -70,14 +69,14 @@ def fit(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
 ) -> None:
-    """Fit small models to a record by subset selection and least squares, and assess them."""
+    """Fit small models to recordings of a system by subset selection and least squares, and assess them."""
     check_folder(out, force)
-    names = options.columns(inputs)
+    recordings = Recordings(records, options.columns(inputs), output_column, dt, reading)
     compile_kernels()
     with progress("fit") as show:
         show("reading", 0.0)
-        data = read_dataset(record, names, output_column, dt, parse_rows(rows), options=reading)
-        held_out = options.validation(validation, record, names, output_column, dt, rows, reading=reading)
+        data = recordings.read(rows)
+        held_out = recordings.read_held_out(validation, rows)
         began = perf_counter()
         result = islands.fit(
             data,

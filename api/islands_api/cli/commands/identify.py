@@ -23,9 +23,7 @@ RUN_OPTIONS = ("resume", "engine", "ray_address", "wall_time", "verbose")
 @with_search_options
 def identify(
     context: typer.Context,
-    record: Annotated[
-        Path | None, typer.Argument(help="The record: text, XLSX, NPZ, MAT, HDF5, ...; not with --resume.")
-    ] = None,
+    records: options.RecordsOrNone = None,
     inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column; repeatable.")] = None,
     output_column: Annotated[str | None, typer.Option("--output", help="Output column.")] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
@@ -64,7 +62,7 @@ def identify(
         bool, typer.Option("--verbose", help="Also print the memory used by the caches.")
     ] = False,
 ) -> None:
-    """Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR continues."""
+    """Identify recordings of a system by evolution. Ctrl-C keeps the best so far; --resume DIR continues."""
     if engine is not None:
         lookup(ENGINES, engine, "engine")
     if wall_time is not None and not wall_time > 0.0:
@@ -76,19 +74,21 @@ def identify(
         _check_resume(context)
         run(run_options, resume, *load_run(resume))
     else:
-        if record is None or not inputs or output_column is None or out is None:
+        if not records or not inputs or output_column is None or out is None:
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
         check_folder(out, force)
-        sources = {"record": str(record), "validation": validation, "test": test}
+        paths = [str(path.resolve()) for path in records]
+        held_out = {"validation": validation, "test": test}
         files = {
             kind: str(Path(name).resolve())
-            for kind, name in sources.items()
-            if name and (kind == "record" or Path(name).is_file())
+            for kind, name in held_out.items()
+            if name and Path(name).is_file()
         }
         job = {
-            **sources,
+            "records": paths,
+            **held_out,
             **files,
-            "sha256": {path: fingerprint(path) for path in files.values()},
+            "sha256": {path: fingerprint(path) for path in (*paths, *files.values())},
             "inputs": options.columns(inputs),
             "output": output_column,
             "dt": dt,

@@ -88,8 +88,9 @@ def read_record(
     rows : slice, optional
         Samples to read, counted from 0 without the header. Samples outside are not checked.
     missing_output : bool
-        Accept an output with missing values, which a free run needs in its warm-up only, and constant
-        channels: a constant input can be simulated, although nothing can be estimated from it.
+        Accept an output without any value, which a free run needs in its warm-up only, and constant channels:
+        a constant input can be simulated, although nothing can be estimated from it. Single missing outputs
+        are always accepted: estimation and validation skip them.
     names : sequence of str, optional
         Names of the columns of a table without a header, or in place of its header.
     header : bool

@@ -61,7 +61,7 @@ def read_table(
     required = [name for name in columns.numbers if not (missing_output and name == output)]
     if options.gaps is None:
         for name in columns.numbers:
-            check_values(columns, name, missing=name not in required)
+            check_values(columns, name, missing=name == output)
     values = np.column_stack([columns.numbers[name] for name in (*sources, output)])
     if options.gaps is None and options.resample is None:
         step, start = find_sampling(table, columns, clock, dt, structure, options.time is not None)

@@ -162,16 +162,21 @@ def check_repaired(values: NDArray[np.float64], name: str, file: str, missing: b
 
 
 def check_varies(columns: Columns, name: str) -> None:
-    """Refuse a constant column: it contains no information for identification.
+    """Refuse a constant or empty column: it contains no information for identification.
 
     Raises
     ------
     RecordError
-        All values are equal.
+        All values are equal, or missing.
     """
     rows, values = columns.rows, columns.numbers[name]
     values = values[~np.isnan(values)]
-    if values.size and values.min() == values.max():
+    if not values.size:
+        raise RecordError(
+            f"{rows.file}: column {name} has no value from {rows.row(0)} to {rows.row(-1)}: choose another "
+            "column or other rows"
+        )
+    if values.min() == values.max():
         raise RecordError(
             f"{rows.file}: column {name} is constant, {values[0]:.6g} from {rows.row(0)} to {rows.row(-1)}: "
             "choose a column, or rows, that vary"

@@ -12,7 +12,7 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
-from islands.errors import IslandsError, RecordError, SettingsError
+from islands.errors import IslandsError, SettingsError
 from islands.io.models import read_model, write_model
 from islands.io.records import write_record
 from islands.io.records.row_range import parse_rows
@@ -100,36 +100,6 @@ def test_malformed_rows_are_rejected(text):
     with pytest.raises(SettingsError) as caught:
         parse_rows(text)
     assert str(caught.value) == f"cannot read the rows {text!r}: write START:STOP, for example 0:5000"
-
-
-def test_validation_is_a_file_a_fraction_or_rows(tmp_path):
-    here, there = tmp_path / "r.csv", tmp_path / "other.csv"
-    write_record(record(), here)
-    write_record(record(60, 1), there)
-
-    def read(text, used="0:80"):
-        return options.validation(text, here, ["u_V"], "y_um", None, used)
-
-    assert read(None) == 0.25
-    assert read("0.4") == 0.4
-    assert np.array_equal(read(str(there)).y, record(60, 1).y)
-    assert np.array_equal(read("80:").y, record().y[80:])
-    with pytest.raises(SettingsError) as caught:
-        read("nowhere.csv")
-    assert str(caught.value) == (
-        "--validation nowhere.csv: give a file that exists, a fraction such as 0.25, or rows START:STOP"
-    )
-    with pytest.raises(RecordError, match="is a folder: give the path of the file in it"):
-        read(str(tmp_path))
-
-
-@pytest.mark.parametrize(
-    ("text", "used"), [("80:", None), ("80:", "0:81"), ("0:90", "80:"), ("50:60", "0:100"), (":", "0:10")]
-)
-def test_validation_rows_must_not_overlap_estimation_rows(tmp_path, text, used):
-    write_record(record(), tmp_path / "r.csv")
-    with pytest.raises(SettingsError, match="give --rows START:STOP, other samples for estimation"):
-        options.validation(text, tmp_path / "r.csv", ["u_V"], "y_um", None, used)
 
 
 def test_model_is_a_file_or_a_published_model(tmp_path):

@@ -17,12 +17,23 @@ def test_the_valid_record_of_these_tests_is_read(tmp_path):
 
 
 @pytest.mark.parametrize("cell", ["nan", "NaN", "", "  ", "NA"])
-@pytest.mark.parametrize(("column", "name"), [(0, "t_s"), (1, "u_V"), (2, "y_um")])
-def test_a_missing_value_is_refused(tmp_path, cell, column, name):
+@pytest.mark.parametrize(("column", "name"), [(0, "t_s"), (1, "u_V")])
+def test_a_missing_time_or_input_is_refused(tmp_path, cell, column, name):
     message = refusal(tmp_path, changed(14, column, cell))
     assert message.startswith(f"bad.csv, line 14, column {name} is empty or NaN")
     assert "--gaps interpolate" in message
     assert "--gaps split" in message
+
+
+@pytest.mark.parametrize("cell", ["nan", "NaN", "", "  ", "NA"])
+def test_a_missing_output_is_read(tmp_path, cell):
+    (tmp_path / "good.csv").write_text("\n".join(changed(14, 2, cell)))
+    assert np.flatnonzero(np.isnan(read_record(tmp_path / "good.csv", ["u_V"], "y_um").y)).tolist() == [12]
+
+
+def test_an_output_without_any_value_is_refused(tmp_path):
+    rows = [line if place == 0 else line.rsplit(",", 1)[0] + "," for place, line in enumerate(lines())]
+    assert "column y_um has no value from line 2 to line 61: choose another column" in refusal(tmp_path, rows)
 
 
 @pytest.mark.parametrize("cell", ["inf", "-Infinity", "1e999"])
@@ -106,15 +117,14 @@ def test_a_decimal_comma_between_commas_is_recognised(tmp_path):
     assert "if it is a decimal comma, save with ';' between the columns" in message
 
 
-@pytest.mark.parametrize(("column", "name"), [(1, "u_V"), (2, "y_um")])
-def test_a_channel_that_ends_early_is_refused_as_of_unequal_length(tmp_path, column, name):
+def test_an_input_that_ends_early_is_refused_as_of_unequal_length(tmp_path):
     rows = lines()
     for line in range(41, len(rows)):
         cells = rows[line].split(",")
-        cells[column] = ""
+        cells[1] = ""
         rows[line] = ",".join(cells)
     message = refusal(tmp_path, rows)
-    assert f"line 42, column {name} and all below, to line 61, are empty" in message
+    assert "line 42, column u_V and all below, to line 61, are empty" in message
     assert "unequal lengths" in message
     assert "select the rows that are complete" in message
 

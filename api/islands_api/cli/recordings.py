@@ -1,0 +1,79 @@
+"""Recordings of one system that a command reads."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from islands.data.dataset import Dataset, join
+from islands.errors import SettingsError
+from islands.io.records import read_dataset
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.row_range import overlap, parse_rows
+
+#: Fraction of every recording that is used for validation.
+FRACTION = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Recordings:
+    """Files with recordings of one system, their columns, and how they are read.
+
+    Attributes
+    ----------
+    paths : sequence of Path
+        Files, one for each recording.
+    inputs : sequence of str
+        Input columns.
+    output : str
+        Output column.
+    dt : float, optional
+        Sampling time in seconds, for files that do not contain it.
+    reading : ReadingOptions
+    """
+
+    paths: Sequence[Path]
+    inputs: Sequence[str]
+    output: str
+    dt: float | None = None
+    reading: ReadingOptions = DEFAULT_READING
+
+    def read(self, rows: str | None = None) -> Dataset:
+        """Read ``START:STOP`` of every recording, or all of it, and join the recordings."""
+        return join(tuple(self._read_file(path, rows) for path in self.paths))
+
+    def read_held_out(
+        self, text: str | None, used: str | None = None, option: str = "--validation"
+    ) -> Dataset | float:
+        """Read ``--validation``: a fraction of each recording's end, other rows of each, or another file.
+
+        Parameters
+        ----------
+        text : str or None
+            Value of the option. None is the default fraction.
+        used : str, optional
+            The ``--rows`` used for estimation. Validation rows must not overlap them.
+        option : str
+            Name of the option in messages; ``--test`` is read in the same way.
+
+        Raises
+        ------
+        SettingsError
+            The text is none of the three, or the rows overlap those used for estimation.
+        """
+        if text is None:
+            return FRACTION
+        if Path(text).exists():
+            return self._read_file(Path(text))
+        if ":" in text:
+            if used is None or overlap(parse_rows(used), parse_rows(text)):
+                raise SettingsError(f"{option} {text}: give --rows START:STOP, other samples for estimation")
+            return self.read(text)
+        try:
+            return float(text)
+        except ValueError:
+            raise SettingsError(
+                f"{option} {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
+            ) from None
+
+    def _read_file(self, path: Path, rows: str | None = None) -> Dataset:
+        return read_dataset(path, self.inputs, self.output, self.dt, parse_rows(rows), options=self.reading)
