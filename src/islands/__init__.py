@@ -32,6 +32,7 @@ _PUBLIC = {
     "facade.engine_choice": ("Ray",),
     "facade.explain_residual": ("explain_residual",),
     "facade.fit": ("fit",),
+    "facade.inspect_record": ("inspect_record",),
     "facade.identify": ("identify",),
     "facade.results.fitted_model": ("FittedModel",),
     "facade.results.model_analysis": ("linear_system",),

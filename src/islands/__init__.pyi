@@ -27,6 +27,7 @@ from islands.facade.engine_choice import Ray as Ray
 from islands.facade.explain_residual import explain_residual as explain_residual
 from islands.facade.fit import fit as fit
 from islands.facade.identify import identify as identify
+from islands.facade.inspect_record import inspect_record as inspect_record
 from islands.facade.results.fitted_model import FittedModel as FittedModel
 from islands.facade.results.model_analysis import linear_system as linear_system
 from islands.facade.results.model_simulation import simulate as simulate

@@ -22,6 +22,8 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB
 #: command's name. The help shows these descriptions, so that it does not import the commands.
 COMMANDS: Mapping[str, str] = MappingProxyType(
     {
+        "inspect": "Describe a record: columns, sampling, dead time, noise, excitation, and the next "
+        "command.",
         "identify": "Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR continues.",
         "fit": "Fit small models to a record by subset selection and least squares, and assess them.",
         "diagnose": "Find the errors of a simulation on a record, name their causes, and measure the gain of "

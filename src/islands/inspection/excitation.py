@@ -105,5 +105,6 @@ def _find_order(channel: Channel, record: Dataset) -> Fact:
             break
         order = size
     more = " or more" if order == most else ""
-    text = f"{channel.name} excites {order}{more} linear parameters (order of persistent excitation)."
+    parameters = "parameter" if order == 1 else "parameters"
+    text = f"{channel.name} excites {order}{more} linear {parameters} (order of persistent excitation)."
     return Fact("excitation-order", channel.name, float(order), "", None, None, text)

@@ -24,6 +24,9 @@ _ORDERS, _AGREEMENT = (4, 6, 8), 1.2
 #: Level, relative to the standard deviation, from which on a signal without noise looks like noise.
 _ROUGH = 0.1
 
+#: Level, relative to the range, that is no more than rounding.
+_INVISIBLE = 1e-7
+
 #: Median of the absolute value of a normal variable, in standard deviations.
 _MEDIAN = 0.6745
 
@@ -55,7 +58,9 @@ def measure_noise(channel: Channel, record: Dataset, quantisation: Fact) -> Fact
         text = f"The noise of {name} is below its quantisation step of {describe_amount(step, unit)}."
         return Fact("noise", name, None, unit, None, None, text)
     extent = float(np.ptp(channel.known))
-    part = f"{100 * min(levels) / extent:.2g} % of its range" if extent > 0.0 else "it is constant"
+    if min(levels) <= _INVISIBLE * extent:
+        return Fact("noise", name, None, unit, None, None, f"{name} has no visible noise.")
+    part = f"{100 * min(levels) / extent:.2g} % of its range"
     if max(levels) > _AGREEMENT * min(levels) or _may_be_signal(channel, record, min(levels)):
         text = f"The noise of {name} is at most {describe_amount(min(levels), unit)} ({part})."
         return Fact("noise", name, None, unit, None, None, text)

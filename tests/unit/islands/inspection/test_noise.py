@@ -54,3 +54,8 @@ def test_interval_contains_the_level_of_most_records():
         fact = measure_output_noise(measure(u, u, 0.05, seed))
         hits += fact.interval[0] <= 0.05 * u.std() <= fact.interval[1]
     assert hits >= 16
+
+
+def test_rounding_is_not_noise():
+    u = np.sin(0.02 * np.arange(3000))
+    assert "no visible noise" in measure_output_noise(Dataset(u, 5.0 + u, 1.0)).sentence

@@ -1,0 +1,283 @@
+"""`inspect_record`: columns, sampling and facts of a file or of a record, before a model is sought."""
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.channel_names import parse_unit
+from islands.data.dataset import Dataset
+from islands.errors import RecordError
+from islands.inspection.channel import channels
+from islands.inspection.columns.column_roles import ColumnChoice, choose_columns
+from islands.inspection.columns.record_inspection import (
+    MOST_ROWS,
+    InspectedColumn,
+    InspectedSampling,
+    RecordInspection,
+)
+from islands.inspection.columns.stamp_regularity import TimeStamps, describe_stamps
+from islands.inspection.record_facts import RecordFacts, measure_facts
+from islands.io.records.column_names import find_column, split_structures
+from islands.io.records.preview import ColumnPreview, Preview, preview
+from islands.io.records.reader import open_record
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.sampling.sampling_time import time_scale
+from islands.io.records.table import Columns, Table
+from islands.io.records.table_reading import read_table
+from islands.io.records.validation import MIN_SAMPLES, check_choice
+
+#: Remark on a file without a sampling time.
+_NO_SAMPLING_TIME = "The sampling time is unknown: the facts count a sample as one second."
+
+#: Samples of a part without gaps that facts are measured on, at least.
+_LEAST_PART = 20
+
+
+def inspect_record(
+    record: Dataset | str | Path,
+    inputs: Sequence[str] = (),
+    output: str | None = None,
+    dt: float | None = None,
+    rows: slice | None = None,
+    reading: ReadingOptions = DEFAULT_READING,
+) -> RecordInspection:
+    """Describe a record before a model is sought.
+
+    Parameters
+    ----------
+    record : Dataset, str or Path
+        A record, or a file as for `read_record`. Gaps, repeated time stamps and missing values of a file are
+        reported; the facts are then those of the parts between them.
+    inputs, output : sequence of str, str or None
+        Columns of the file. Without them, they are chosen by the names of the columns and by which column
+        predicts which; ``choice`` states how sure that is.
+    dt : float, optional
+        Sampling time in seconds, for files without a time column.
+    rows : slice, optional
+        Samples to inspect.
+    reading : ReadingOptions
+        Options of reading the file. With ``gaps`` or ``resample``, the facts are those of the repaired
+        record.
+
+    Returns
+    -------
+    RecordInspection
+        ``facts`` holds the facts; ``find("dead-time")`` returns one of them.
+
+    Raises
+    ------
+    RecordError
+        The file cannot be read, or a column does not exist. The messages are those of `read_record`.
+    """
+    if isinstance(record, Dataset):
+        return _inspect_dataset(record if rows is None else record[rows])
+    inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
+    found = preview(record, reading)
+    table, file = open_record(record, reading), Path(record).name
+    if inputs and output is not None:
+        sources = [find_column(name, table.names) for name in inputs]
+        check_choice(table.names, sources, find_column(output, table.names), file, reading.time, table.others)
+    return _FileInspection(Path(record), table, found, dt, rows, reading).inspect(inputs, output)
+
+
+def _inspect_dataset(record: Dataset) -> RecordInspection:
+    columns = tuple(
+        _describe_values(
+            channel.name, channel.unit, "output" if channel.is_output else "input", channel.values
+        )
+        for channel in channels(record)
+    )
+    sampling = InspectedSampling(None, record.samples, record.dt, None, (), (), (), _count(None), "")
+    choice = ColumnChoice(record.input_names, record.output_name, None, "Inputs and output are as given.")
+    return RecordInspection("", columns, sampling, choice, measure_facts(record), (), "", record)
+
+
+def _describe_values(
+    name: str, unit: str, role: str, values: NDArray[np.float64], problem: str = ""
+) -> InspectedColumn:
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (None, None)
+    return InspectedColumn(name, unit, role, low, high, int(values.size - known.size), problem)
+
+
+@dataclass(frozen=True, slots=True)
+class _FileInspection:
+    path: Path
+    table: Table
+    found: Preview
+    dt: float | None
+    rows: slice | None
+    reading: ReadingOptions
+
+    def inspect(self, inputs: tuple[str, ...], output: str | None) -> RecordInspection:
+        read = self._read()
+        values = {name: columns.numbers[name] for name, columns in read.items()}
+        size = len(values[output]) if output in values else self._most_common_length(values)
+        usable = {
+            name: column
+            for name, column in values.items()
+            if len(column) == size and name != self.found.time and np.isfinite(column).any()
+        }
+        given = tuple(find_column(name, self.table.names) for name in inputs)
+        choice = choose_columns(usable, given, output)
+        if inputs and choice.inputs:
+            choice = replace(choice, inputs=inputs)
+        stamps, sampling = self._describe_sampling(read, size)
+        warnings = [warning for warning in self.found.warnings if warning != sampling.problem]
+        record, facts = None, RecordFacts(())
+        if choice.output:
+            repaired, problem = self._read_repaired(choice)
+            is_repaired = self.reading.gaps is not None or self.reading.resample is not None
+            record = repaired if is_repaired else self._cut(values, choice, sampling.dt or 1.0, stamps)
+            facts = measure_facts(record) if record is not None else facts
+            warnings.append(problem)
+        if sampling.dt is None and facts.facts:
+            warnings.append(_NO_SAMPLING_TIME)
+        return RecordInspection(
+            str(self.path),
+            tuple(self._describe_column(column, values, choice) for column in self.found.columns),
+            sampling,
+            choice,
+            facts,
+            tuple(dict.fromkeys(filter(None, [sampling.problem, *warnings]))),
+            self._make_command(choice, stamps),
+            record,
+        )
+
+    def _read(self) -> Mapping[str, Columns]:
+        """Return every column that has numbers, over the chosen rows."""
+        read = {}
+        for column in self.found.columns:
+            if column.samples:
+                read[column.name] = self.table.read((column.name,), self.rows)
+        return read
+
+    @staticmethod
+    def _most_common_length(values: Mapping[str, NDArray[np.float64]]) -> int:
+        lengths = [len(column) for column in values.values()]
+        return max(set(lengths), key=lambda length: (lengths.count(length) > 1, length), default=0)
+
+    def _describe_sampling(
+        self, read: Mapping[str, Columns], size: int
+    ) -> tuple[TimeStamps | None, InspectedSampling]:
+        time, stamps = self.found.time, None
+        dt = self.found.dt if self.dt is None else self.dt
+        problem = _find_sampling_problem(self.found, dt)
+        if time is not None and time in read and len(read[time].rows) == size:
+            seconds = read[time].numbers[time] * self._scale(read[time], time)
+            stamps = describe_stamps(seconds) if np.isfinite(seconds).all() else None
+        if stamps is None:
+            return None, InspectedSampling(time, size, dt, None, (), (), (), _count(None), problem)
+        rows = read[str(time)].rows
+        gaps, repeated, backward = (
+            tuple(rows.row(sample) for sample in samples[:MOST_ROWS])
+            for samples in (stamps.gaps, stamps.repeated, stamps.backward)
+        )
+        dt = stamps.dt if dt is None else dt
+        return stamps, InspectedSampling(
+            time, size, dt, stamps.jitter, gaps, repeated, backward, _count(stamps), problem
+        )
+
+    def _scale(self, columns: Columns, time: str) -> float:
+        structure = split_structures(self.table.names)[time]
+        return time_scale(self.table, columns, time, structure, self.reading.time is not None)
+
+    def _field(self, name: str) -> str:
+        return name.removeprefix(split_structures(self.table.names)[name])
+
+    def _cut(
+        self,
+        values: Mapping[str, NDArray[np.float64]],
+        choice: ColumnChoice,
+        dt: float,
+        stamps: TimeStamps | None,
+    ) -> Dataset | None:
+        """Return the record with segments between gaps and missing inputs; None if no part is long enough."""
+        names = [find_column(name, self.table.names) for name in choice.inputs]
+        u = np.column_stack([values[name] for name in names])
+        y = np.where(np.isinf(values[choice.output]), np.nan, values[choice.output])
+        whole = np.asarray(np.isfinite(u).all(axis=1))
+        starts = np.zeros(len(y), dtype=bool)
+        starts[list(stamps.breaks) if stamps is not None else []] = True
+        starts[np.flatnonzero(np.diff(whole)) + 1] = True
+        part = np.cumsum(starts)
+        lengths = np.bincount(part)
+        kept = whole & (lengths[part] >= _LEAST_PART)
+        if np.count_nonzero(kept & np.isfinite(y)) < MIN_SAMPLES:
+            return None
+        return Dataset(
+            u[kept],
+            y[kept],
+            dt,
+            tuple(names),
+            choice.output,
+            tuple(parse_unit(self._field(name)) for name in names),
+            parse_unit(self._field(choice.output)),
+            segments=tuple(int(length) for length in np.unique(part[kept], return_counts=True)[1]),
+        )
+
+    def _read_repaired(self, choice: ColumnChoice) -> tuple[Dataset | None, str]:
+        """Return the record as it is read for a search, or the message with which it is refused."""
+        file = self.path.name
+        try:
+            record = read_table(
+                *(self.table, file, choice.inputs, choice.output, self.dt, self.rows), options=self.reading
+            )
+        except RecordError as error:
+            return None, str(error)
+        return record, ""
+
+    def _describe_column(
+        self, column: ColumnPreview, values: Mapping[str, NDArray[np.float64]], choice: ColumnChoice
+    ) -> InspectedColumn:
+        inputs = {find_column(name, self.table.names) for name in choice.inputs}
+        role = "time" if column.name == self.found.time else ""
+        role = "input" if column.name in inputs else "output" if column.name == choice.output else role
+        if column.name not in values:
+            return InspectedColumn(column.name, column.unit, role, None, None, 0, column.problem)
+        return _describe_values(column.name, column.unit, role, values[column.name], column.problem)
+
+    def _make_command(self, choice: ColumnChoice, stamps: TimeStamps | None) -> str:
+        if not choice.output:
+            return ""
+        words = ["islands", "identify", str(self.path)]
+        for name in choice.inputs:
+            words += ["--input", name]
+        words += ["--output", choice.output]
+        if self.found.dt is None and self.found.time is None:
+            words += ["--dt", "SECONDS" if self.dt is None else f"{self.dt:g}"]
+        if self.rows is not None:
+            bounds = ("" if bound is None else str(bound) for bound in (self.rows.start, self.rows.stop))
+            words += ["--rows", ":".join(bounds)]
+        if stamps is not None and stamps.breaks and not self.reading.gaps and self.reading.resample is None:
+            words += ["--gaps", "split"]
+        for name, value in self.reading.changes().items():
+            words += ["--no-header"] if name == "header" else [f"--{name}", _format_option(value)]
+        return shlex.join([*words, "--out", "result"])
+
+
+def _format_option(value: object) -> str:
+    return ",".join(value) if isinstance(value, list) else str(value)
+
+
+def _find_sampling_problem(found: Preview, dt: float | None) -> str:
+    """Return the warning of a preview about its sampling."""
+    if found.dt is not None or (dt is not None and found.time is None):
+        return ""
+    words = ("time", "--dt", "grid", "gap")
+    return next((text for text in found.warnings if any(word in text for word in words)), "")
+
+
+def _count(stamps: TimeStamps | None) -> dict[str, int]:
+    if stamps is None:
+        return {"gaps": 0, "missing": 0, "repeated": 0, "backward": 0}
+    return {
+        "gaps": len(stamps.gaps),
+        "missing": stamps.missing,
+        "repeated": len(stamps.repeated),
+        "backward": len(stamps.backward),
+    }

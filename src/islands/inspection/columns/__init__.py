@@ -1,0 +1,1 @@
+"""Columns of a file: time stamps, and which columns are inputs and output."""

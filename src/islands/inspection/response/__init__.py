@@ -1,0 +1,1 @@
+"""Response of the output to an input: its first lag and its impulse response."""

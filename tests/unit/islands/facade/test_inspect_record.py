@@ -1,0 +1,110 @@
+import json
+
+import numpy as np
+import pytest
+
+import islands
+from islands.errors import RecordError
+from islands.inspection.columns.record_inspection import SCHEMA
+from islands.io.inspection_text import WIDTH, format_inspection
+from islands.io.records.reading_options import ReadingOptions
+from support.known_records import delay, lag, measure, steps
+
+
+def write(path, time=None, drop=(), blank=(), header="t_s,u_V,y_um"):
+    """Write a record with a dead time of 4 samples of 0.1 s; leave out rows, or cells of the input."""
+    u = steps(1500, 0, 10)
+    record = measure(u, delay(lag(u, 5.0), 3), 0.02)
+    stamps = 0.1 * np.arange(1500) if time is None else time
+    cells = [f"{stamps[k]:.3f},{'' if k in blank else record.u[k, 0]},{record.y[k]}" for k in range(1500)]
+    rows = [row for k, row in enumerate(cells) if k not in drop]
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+def test_a_file_is_described_without_a_choice_of_columns(tmp_path):
+    found = islands.inspect_record(write(tmp_path / "r.csv"))
+    assert [column.role for column in found.columns] == ["time", "input", "output"]
+    assert found.sampling.dt == pytest.approx(0.1)
+    assert found.find("dead-time").value == 4
+    assert found.warnings == ()
+    assert "--input u_V --output y_um" in found.command
+    assert found.choice.confidence > 0.9
+
+
+def test_gaps_are_reported_with_rows_and_no_fact_reads_across_them(tmp_path):
+    found = islands.inspect_record(write(tmp_path / "r.csv", drop=range(400, 420)))
+    assert found.sampling.gaps == ("line 402",)
+    assert found.sampling.counts["missing"] == 20
+    assert found.record.segments == (400, 1080)
+    assert "line 402" in found.warnings[0]
+    assert "--gaps split" in found.command
+    assert found.find("dead-time").value == 4
+
+
+def test_gaps_are_repaired_as_for_identify(tmp_path):
+    file = write(tmp_path / "r.csv", drop=range(400, 420))
+    found = islands.inspect_record(file, reading=ReadingOptions(gaps="interpolate"))
+    assert found.record.segments == (1500,)
+    assert "--gaps interpolate" in found.command
+
+
+def test_missing_inputs_cut_the_record(tmp_path):
+    found = islands.inspect_record(write(tmp_path / "r.csv", blank=range(700, 705)))
+    assert found.columns[1].missing == 5
+    assert found.record.segments == (700, 795)
+    assert any("line 702" in warning for warning in found.warnings)
+
+
+def test_repeated_time_stamps_are_reported(tmp_path):
+    stamps = 0.1 * np.arange(1500)
+    stamps[200] = stamps[199]
+    found = islands.inspect_record(write(tmp_path / "r.csv", stamps))
+    assert found.sampling.repeated == ("line 202",)
+
+
+def test_unknown_sampling_time_counts_samples(tmp_path):
+    file = write(tmp_path / "r.csv", header="k,u_V,y_um")
+    found = islands.inspect_record(file)
+    assert found.sampling.dt is None
+    assert found.find("dead-time").value == 4
+    assert "--dt SECONDS" in found.command
+    assert islands.inspect_record(file, dt=0.1).sampling.dt == 0.1
+
+
+def test_rows_select_samples(tmp_path):
+    found = islands.inspect_record(write(tmp_path / "r.csv"), rows=slice(100, 900))
+    assert found.record.samples == 800
+    assert "--rows 100:900" in found.command
+
+
+def test_errors_are_those_of_reading(tmp_path):
+    file = write(tmp_path / "r.csv")
+    for path, choice in ((tmp_path / "none.csv", {}), (file, {"inputs": ["v"], "output": "y_um"})):
+        with pytest.raises(RecordError) as inspected:
+            islands.inspect_record(path, **choice)
+        with pytest.raises(RecordError) as read:
+            islands.read_record(path, **({"inputs": ["u_V"], "output": "y_um"} | choice))
+        assert str(inspected.value) == str(read.value)
+
+
+def test_a_record_in_memory_has_the_same_facts(tmp_path):
+    file = write(tmp_path / "r.csv")
+    record = islands.read_record(file, ["u_V"], "y_um")
+    assert islands.inspect_record(record).facts == islands.inspect_record(file).facts
+
+
+def test_the_document_is_json(tmp_path):
+    found = islands.inspect_record(write(tmp_path / "r.csv", drop=[50]))
+    document = json.loads(json.dumps(found.as_document(), allow_nan=False))
+    assert document["schema"] == SCHEMA
+    assert {fact["name"] for fact in document["facts"]} >= {"dead-time", "rest", "noise"}
+
+
+def test_text_has_80_columns(tmp_path):
+    long = "t_s,u_" + "very_long_name_" * 5 + "V,y_um"
+    for options in ({}, {"header": long}, {"drop": range(100, 900, 50)}):
+        text = format_inspection(islands.inspect_record(write(tmp_path / "r.csv", **options)))
+        lines = [line for line in text.splitlines() if "very_long" not in line and str(tmp_path) not in line]
+        assert max(map(len, lines)) <= WIDTH
+        assert "Next:" in text
