@@ -35,7 +35,7 @@ _PUBLIC = {
     "facade.inspect_record": ("inspect_record",),
     "facade.identify": ("identify",),
     "facade.results.fitted_model": ("FittedModel",),
-    "facade.results.model_analysis": ("linear_system",),
+    "facade.results.model_analysis": ("linearise",),
     "facade.results.model_simulation": ("simulate",),
     "facade.results.result": ("Result",),
     "facade.results.saved_result": ("SavedModel", "SavedResult", "read_result"),

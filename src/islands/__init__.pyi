@@ -29,7 +29,7 @@ from islands.facade.fit import fit as fit
 from islands.facade.identify import identify as identify
 from islands.facade.inspect_record import inspect_record as inspect_record
 from islands.facade.results.fitted_model import FittedModel as FittedModel
-from islands.facade.results.model_analysis import linear_system as linear_system
+from islands.facade.results.model_analysis import linearise as linearise
 from islands.facade.results.model_simulation import simulate as simulate
 from islands.facade.results.result import Result as Result
 from islands.facade.results.saved_result import SavedModel as SavedModel

@@ -9,7 +9,7 @@ from islands.model.expression import Expression
 from islands.model.regressor import Regressor, regressor
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Model:
     """Regressors and, after estimation, their parameters.
 
@@ -61,6 +61,9 @@ class Model:
             raise ModelError(
                 f"the model reads input {deepest} and has {len(self.input_names)}: {self.input_names}"
             )
+
+    def __repr__(self) -> str:
+        return f"<Model of {', '.join(item.text for item in self.regressors)}>"
 
     @property
     def size(self) -> int:

@@ -68,8 +68,8 @@ class Linearisation:
         return bool((np.abs(self.poles) < 1.0).all())
 
 
-def linearise(model: Model, u: ArrayLike, y: float | None = None) -> Linearisation:
-    """Linearise a model about an operating point.
+def differentiate_model(model: Model, u: ArrayLike, y: float | None = None) -> Linearisation:
+    """Return the coefficients of the linear model about an operating point.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def static_characteristic(model: Model, inputs: ArrayLike) -> NDArray[np.float64
     ModelError
         A point has no stable equilibrium, several of them, or a continuum.
     """
-    points = np.asarray(inputs, dtype=np.float64)
+    points = np.atleast_1d(np.asarray(inputs, dtype=np.float64))
     rows = points[:, None] if points.ndim == 1 else points
     return np.array([find_equilibrium(model, _read_levels(model, row)) for row in rows])
 

@@ -21,7 +21,7 @@ _FEWEST, _MOST = 64, 65_536
 _SETTLED = 0.01
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class StepResponse:
     """Response of a model to a step of one input.
 
@@ -41,6 +41,9 @@ class StepResponse:
     y: NDArray[np.float64]
     input_name: str
     output_name: str
+
+    def __repr__(self) -> str:
+        return f"<StepResponse of {len(self.time)} samples: {self.input_name} to {self.output_name}>"
 
 
 def step_response(

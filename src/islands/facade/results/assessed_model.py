@@ -120,14 +120,16 @@ class AssessedModel(AnalysedModel, ABC):
         data = record_of_model(self.model, record, y, dt, inputs, output)
         return predict(self.model, data)
 
-    def simulate(self, record: Dataset, mode: str = "free-run", warm_up: int | None = None) -> Simulation:
+    def simulate(
+        self, record: "RecordLike", mode: str = "free-run", warm_up: int | None = None
+    ) -> Simulation:
         """Simulate the model on a record.
 
         On the validation data, the errors of the simulation are those in `metrics`.
 
         Parameters
         ----------
-        record : Dataset
+        record : Dataset or data frame
             Its samples are averaged as in the search if it has the sampling time of the search's record.
         mode : str
             ``one-step``, ``shooting`` or ``free-run``.
@@ -137,12 +139,12 @@ class AssessedModel(AnalysedModel, ABC):
         warm_up = self.warm_up if warm_up is None else warm_up
         return simulate(self.model, record, mode, self.shooting_interval, warm_up=warm_up)
 
-    def bands(self, record: Dataset, level: float = LEVEL, warm_up: int | None = None) -> PredictionBand:
+    def bands(self, record: "RecordLike", level: float = LEVEL, warm_up: int | None = None) -> PredictionBand:
         """Simulate the model on a record, with a band that contains a measured sample with a probability.
 
         Parameters
         ----------
-        record : Dataset
+        record : Dataset or data frame
             Inputs, and the output of the warm-up; averaged as in `simulate`.
         level : float
             Probability, between 0.5 and 0.99.
@@ -161,7 +163,8 @@ class AssessedModel(AnalysedModel, ABC):
                 f"model {self.rank} has no prediction bands: its free run diverged, take another"
             )
         warm_up = self.warm_up if warm_up is None else warm_up
-        return self.prediction_bands.predict(self.model, match_rate(self.model, record), level, warm_up)
+        data = match_rate(self.model, record_of_model(self.model, record))
+        return self.prediction_bands.predict(self.model, data, level, warm_up)
 
     def plot(
         self, kind: str = "free-run", record: "RecordLike | None" = None, *, ax: "Axes | None" = None

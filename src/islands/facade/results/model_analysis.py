@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from islands.errors import ModelError
 from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
-from islands.model.operating_point import linearise, static_characteristic
+from islands.model.operating_point import differentiate_model, static_characteristic
 from islands.model.sympy_expression import to_sympy
 from islands.simulation.step_response import StepResponse, step_response
 
@@ -51,8 +51,8 @@ class AnalysedModel:
         return to_sympy(self.model)
 
     def linearise(self, operating_point: ArrayLike, y: float | None = None) -> "control.StateSpace":
-        """Linearise the model; see `linear_system` (extra ``control``)."""
-        return linear_system(self.model, operating_point, y)
+        """Linearise the model; see `islands.linearise` (extra ``control``)."""
+        return linearise(self.model, operating_point, y)
 
     def static_characteristic(self, inputs: ArrayLike) -> NDArray[np.float64]:
         """Return the output at rest for constant inputs; see `static_characteristic`."""
@@ -109,7 +109,7 @@ class AnalysedModel:
         return draw_step_response(self.step_response(start, end, y, samples), ax)
 
 
-def linear_system(model: Model, operating_point: ArrayLike, y: float | None = None) -> "control.StateSpace":
+def linearise(model: Model, operating_point: ArrayLike, y: float | None = None) -> "control.StateSpace":
     """Linearise a model about an operating point, as a system of the library python-control.
 
     Parameters
@@ -138,7 +138,7 @@ def linear_system(model: Model, operating_point: ArrayLike, y: float | None = No
         import control as library  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise ModelError("install islands[control] to get a linear system") from error
-    found = linearise(model, operating_point, y)
+    found = differentiate_model(model, operating_point, y)
     order = len(found.outputs)
     direct, past = found.inputs[:, 0], found.inputs[:, 1:].T
     matrix = np.eye(order, k=1)

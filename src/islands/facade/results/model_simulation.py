@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from islands.data.compatibility import match_rate
-from islands.data.dataset import Dataset
-from islands.errors import SettingsError, lookup
-from islands.io.data_frames import as_record, states_time
+from islands.data.dataset import Dataset, join
+from islands.errors import RecordError, SettingsError, lookup
+from islands.io.data_frames import as_record, column_names, states_time
+from islands.io.records.column_names import find_column
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, free_run, multiple_shooting
@@ -26,7 +27,7 @@ SIMULATION_MODES = ("one-step", "shooting", "free-run")
 
 def simulate(
     model: "Model | str | Mapping[str, object] | SimulationSpec | LocalSpec",
-    record: Dataset,
+    record: "RecordLike",
     mode: str = "free-run",
     shooting: int = 500,
     columns: Mapping[str, NDArray[np.float64]] | None = None,
@@ -39,7 +40,7 @@ def simulate(
     model : Model, str, mapping or spec
         A model; or a simulator, as its name on the command line (``second-order``), its specification, or
         the document of an extended simulation.
-    record : Dataset
+    record : Dataset or data frame
         Inputs, and the output from which initial states are taken. Its samples are averaged if the model
         describes means of samples and the record has the sampling time before averaging (see `match_rate`).
     mode : str
@@ -62,12 +63,14 @@ def simulate(
     intervals = dict(zip(SIMULATION_MODES, (1, shooting, None), strict=True))
     interval = lookup(intervals, mode, "mode")
     if isinstance(model, Model):
+        record = record_of_model(model, record)
         return multiple_shooting(model, match_rate(model, record), interval, warm_up)
     if interval is not None:
         raise SettingsError(f"a simulator has no mode {mode!r}: take free-run")
     # Import the simulators of the discrepancy analysis only if they are used.
     from islands.io.simulator_spec.factory import simulate_spec  # noqa: PLC0415
 
+    record = as_record(record)
     y = simulate_spec(model, record, columns)
     return Simulation(y, float(np.mean((record.y - y) ** 2)), EvaluationOutcome())
 
@@ -92,8 +95,16 @@ def record_of_model(
     """
     if isinstance(data, Dataset):
         return as_record(data, y, dt, inputs=inputs, output=output)
+    if isinstance(data, list | tuple) and y is None:
+        return join(tuple(record_of_model(model, each, None, dt, inputs, output) for each in data))
     if y is None:
         inputs, output = inputs or model.column_names, output or model.output_name
+    known = column_names(data)
+    if y is None and output and known and find_column(output, known) not in known:
+        raise RecordError(
+            f"the record has no column {output}; it has {', '.join(known)}. A simulation starts from the "
+            "first values of the output: add its column, in which the other values may be missing"
+        )
     if dt is None and model.dt is not None and not states_time(data, (*inputs, output or "")):
         dt = model.dt / model.average
     return as_record(data, y, dt, inputs=inputs, output=output, missing_output=True)

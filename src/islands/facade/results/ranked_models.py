@@ -15,6 +15,8 @@ from islands.validation.recommendation import Recommendation
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from narwhals.typing import IntoSeries
 
     from islands.io.data_frames import RecordLike
@@ -70,6 +72,12 @@ class RankedModels(ABC, Generic[M]):
     ) -> NDArray[np.float64]:
         """Return the free run of the recommended model; see `AssessedModel.predict`."""
         return self.best.predict(record, y, dt, inputs=inputs, output=output)
+
+    def plot(
+        self, kind: str = "free-run", record: "RecordLike | None" = None, *, ax: "Axes | None" = None
+    ) -> "Figure":
+        """Draw a figure of the recommended model; see `AssessedModel.plot`."""
+        return self.best.plot(kind, record, ax=ax)
 
     def compare(
         self,

@@ -57,7 +57,8 @@ def read_table(
     structure = structures[output]
     clock = options.time or time_column(table.names, file, (*sources, output), structure, table.clocks)
     columns = table.read(tuple(dict.fromkeys((*sources, output, *([clock] if clock else [])))), rows)
-    check_length(columns)
+    # A simulation needs no more samples than the lags of its model, which it checks.
+    check_length(columns, *([2] if missing_output else []))
     required = [name for name in columns.numbers if not (missing_output and name == output)]
     if options.gaps is None:
         for name in columns.numbers:

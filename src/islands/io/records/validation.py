@@ -85,21 +85,21 @@ def check_equal_length(lengths: Mapping[str, int], file: str) -> None:
             )
 
 
-def check_length(columns: Columns) -> None:
-    """Refuse a record that is too short for identification.
+def check_length(columns: Columns, least: int = MIN_SAMPLES) -> None:
+    """Refuse a record that is too short, by default for identification.
 
     Raises
     ------
     RecordError
-        There are fewer than `MIN_SAMPLES` samples.
+        There are fewer than ``least`` samples.
     """
     rows = columns.rows
     if not len(rows):
         raise RecordError(f"{rows.file} has no samples: use another record")
-    if len(rows) < MIN_SAMPLES:
+    if len(rows) < least:
         raise RecordError(
             f"{rows.file}: {len(rows)} samples, from {rows.row(0)} to {rows.row(-1)}, are too few: at least "
-            f"{MIN_SAMPLES} are needed; use a longer record or more of its rows"
+            f"{least} are needed; use a longer record or more of its rows"
         )
 
 

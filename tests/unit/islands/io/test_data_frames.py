@@ -86,6 +86,12 @@ def test_units_of_an_xarray_data_set_are_those_of_the_record():
     assert (made.input_units, made.output_unit) == (("V",), "um")
 
 
+def test_a_list_of_frames_is_a_record_of_recordings():
+    made = islands.as_record([FRAME[:150], FRAME[150:]], dt=0.04, **CHOICE)
+    assert made.segments == (150, 250)
+    assert np.array_equal(made.y, RECORD.y)
+
+
 def test_an_input_of_a_frame_may_act_at_once():
     made = islands.as_record(FRAME, dt=0.04, inputs="u_V+1", output="y")
     assert made.input_names == ("u_V+1",)
@@ -118,6 +124,8 @@ UNUSABLE = [
     (RECORD, {"dt": 0.04}, "give nothing else"),
     (RECORD, {"y": RECORD}, "validation="),
     (FRAME, {**CHOICE, "y": 0.25}, "validation="),
+    (FRAME, {"y": "u_V"}, "inputs=..., output=..."),
+    ("piezo.csv", CHOICE, r"islands.read_record\('piezo.csv'"),
 ]
 
 

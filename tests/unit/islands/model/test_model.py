@@ -115,3 +115,8 @@ def test_make_model_of_the_terms_of_a_model_returns_an_equal_model(model):
     )
     assert again == model
     assert hash(again) == hash(model)
+
+
+def test_a_model_is_represented_by_its_regressors():
+    model = make_model([(parse("y(k-1)"), 0.5), (parse("u(k-1)^2"), 1.0)])
+    assert repr(model) == "<Model of y(k-1), u1(k-1)^2>"

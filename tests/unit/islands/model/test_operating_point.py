@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.model.operating_point import find_equilibrium, linearise, static_characteristic
+from islands.model.operating_point import differentiate_model, find_equilibrium, static_characteristic
 from islands.simulation.predictors import free_run
 
 
@@ -55,7 +55,7 @@ def test_models_without_a_unique_equilibrium_are_named(system, message):
 @pytest.mark.parametrize("system", [TANK, OUTFLOW, SATURATION])
 def test_the_error_of_the_linearisation_is_of_second_order(system):
     level = 0.7
-    linear = linearise(system, level)
+    linear = differentiate_model(system, level)
     rng = np.random.default_rng(0)
     wave, lags = rng.normal(size=200), len(linear.outputs)
 
@@ -74,16 +74,18 @@ def test_the_error_of_the_linearisation_is_of_second_order(system):
 
 def test_an_input_that_acts_at_once_has_a_direct_coefficient():
     system = islands.make_model([(islands.parse("y(k-1)"), 0.5), (islands.parse("u(k-1)"), 2.0)], ("u_V+1",))
-    assert linearise(system, 1.0).inputs.tolist() == [[2.0, 0.0]]
+    assert differentiate_model(system, 1.0).inputs.tolist() == [[2.0, 0.0]]
 
 
 def test_a_kink_has_no_linearisation():
     with pytest.raises(islands.ModelError, match=r"the term y\(k-1\)\*sign\(.* has a kink"):
-        linearise(HYSTERESIS, 0.4, y=1.0)
+        differentiate_model(HYSTERESIS, 0.4, y=1.0)
     with pytest.raises(islands.ModelError, match=r"the model has 1 inputs \(u\), got"):
-        linearise(TANK, [0.4, 0.5])
+        differentiate_model(TANK, [0.4, 0.5])
 
 
 def test_stability_follows_from_the_poles():
-    assert linearise(TANK, 0.5).is_stable
-    assert linearise(model(**{"y(k-1)": 1.5, "u(k-1)": 1.0}), 0.0, y=0.0).poles == pytest.approx([1.5])
+    assert differentiate_model(TANK, 0.5).is_stable
+    assert differentiate_model(model(**{"y(k-1)": 1.5, "u(k-1)": 1.0}), 0.0, y=0.0).poles == pytest.approx(
+        [1.5]
+    )

@@ -23,6 +23,7 @@ def test_a_first_order_response_is_exponential():
     assert found.u[after][0] == 2.0
     # The response is simulated until it has settled.
     assert abs(found.y[-1] - 4.0) < 0.02
+    assert repr(found) == f"<StepResponse of {len(found.time)} samples: u to y>"
 
 
 def test_an_input_that_acts_at_once_steps_the_output_at_time_zero():

@@ -22,7 +22,7 @@ TWO = islands.make_model(
 def test_the_system_of_control_simulates_as_the_linear_model():
     import control
 
-    system = islands.linear_system(TWO, [0.0, 1.0])
+    system = islands.linearise(TWO, [0.0, 1.0])
     assert (system.dt, system.input_labels, system.output_labels) == (0.1, ["u_V", "v"], ["y_um"])
     rng = np.random.default_rng(0)
     u = 1e-4 * rng.normal(size=(2, 200))

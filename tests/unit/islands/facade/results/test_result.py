@@ -60,8 +60,28 @@ def test_predictions_of_a_frame_have_one_value_per_row(result):
     frame.loc[lag:, "y"] = np.nan
     assert np.array_equal(result.predict(frame), predicted, equal_nan=True)
     assert np.array_equal(result.predict(data.u, data.y, data.dt), predicted, equal_nan=True)
+    with pytest.raises(islands.RecordError, match="no column y; it has u"):
+        result.predict(frame[["u"]])
     with pytest.raises(islands.RecordError, match="no column u; it has v, y"):
         result.predict(frame.rename(columns={"u": "v"}))
+
+
+def test_predictions_need_only_the_lags_of_the_model(result):
+    data = record(400)
+    few = pd.DataFrame({"u": data.u[:6, 0], "y": data.y[:6]})
+    assert np.array_equal(result.predict(few), result.predict(data[:6]), equal_nan=True)
+    lag = result.best.model.maximum_lag
+    assert np.isfinite(result.predict(few)[lag:]).all()
+
+
+def test_recordings_of_a_list_are_predicted_one_after_the_other(result):
+    parts = [record(60, seed=seed) for seed in (1, 2)]
+    frames = [pd.DataFrame({"u": part.u[:, 0], "y": part.y}) for part in parts]
+    expected = np.concatenate([result.predict(part) for part in parts])
+    assert np.array_equal(result.predict(frames), expected, equal_nan=True)
+    assert np.array_equal(
+        result.best.simulate(frames).y, result.best.simulate(islands.join(tuple(parts))).y, equal_nan=True
+    )
 
 
 def test_rows_of_a_model_of_means_have_the_prediction_of_their_mean():
@@ -92,6 +112,10 @@ def test_a_figure_of_another_record_is_that_of_its_simulation(result):
     assert np.array_equal(drawn, result.best.simulate(other).y, equal_nan=True)
     for kind in ("loop", "hold", "residuals"):
         assert result.best.plot(kind, record=other).axes
+
+
+def test_a_result_draws_its_recommended_model(result):
+    assert result.plot()._repr_html_() == result.best.plot()._repr_html_()
 
 
 def test_a_notebook_shows_a_figure_without_pyplot(result):
