@@ -73,7 +73,8 @@ def _type(option: Any) -> str:
 
 def _meaning(option: Any) -> str:
     """Return the help of an option, or the description of the setting of a search that it has the name of."""
-    return option.help or attributes(Settings).get(option.name, "")
+    # The command line escapes brackets, which are markup there.
+    return option.help.replace("\\[", "[") or attributes(Settings).get(option.name, "")
 
 
 def _default(option: Any) -> str:

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import version
+from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
@@ -14,6 +15,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from islands.errors import IslandsError, SettingsError
 from islands_api.cli.console import errors
+from islands_api.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
 
 #: Environment variables that set the number of threads of linear algebra libraries.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -94,10 +96,14 @@ class Commands(TyperGroup):
             raise explain_missing_package(error, cmd_name) from error
         group = getattr(module, cmd_name)
         if not isinstance(group, typer.Typer):
-            function, group = group, typer.Typer(pretty_exceptions_enable=False)
+            function, group = group, typer.Typer(pretty_exceptions_enable=False, add_completion=False)
             group.command(name=cmd_name)(function)
         command = typer.main.get_command(group)
         command.name = cmd_name
+        for each in getattr(command, "commands", {cmd_name: command}).values():
+            for parameter in each.params:
+                # Statements such as [u(k-1)] >= 0 are not markup.
+                parameter.help = escape(parameter.help or "")
         return command
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -133,12 +139,27 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def _islands(
+    context: typer.Context,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            "--config", help=f"TOML file with options, a table for each command; by default {DEFAULT_FILE}."
+        ),
+    ] = None,
     _: Annotated[
         bool,
         typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
     ] = False,
 ) -> None:
-    pass
+    name = context.invoked_subcommand
+    path = config or DEFAULT_FILE
+    if name is None or (config is None and not path.is_file()):
+        return
+    table = read_option_tables(path).get(name, {})
+    if table:
+        command = context.command.get_command(context, name)  # type: ignore[attr-defined]
+        context.default_map = {name: match_options(command, table, path, name)}
+        errors.print(f"options of {path}: {', '.join(table)}", markup=False)
 
 
 def main() -> None:

@@ -62,7 +62,11 @@ def _setting_parameter(setting: Field[Any]) -> Parameter:
     members = get_args(kind)
     if members:
         kind = list[members[0]] if Ellipsis in members else str  # type: ignore[valid-type]
-    option = typer.Option(declared["option"] or f"--{setting.name.replace('_', '-')}", help=declared["help"])
+    option = typer.Option(
+        declared["option"] or f"--{setting.name.replace('_', '-')}",
+        help=declared["help"],
+        show_default="that of the preset",
+    )
     return _parameter(setting.name, Annotated[kind | None, option], None)
 
 

@@ -147,16 +147,16 @@ class Settings:
         output; 0 for no target.
     """
 
-    population: int = _option(500)
-    generations: int = _option(500)
+    population: int = _option(500, "Individuals of an island.")
+    generations: int = _option(500, "Generations of a search, at most.")
     elite: float = 0.1
     crossover: float = 0.8
     mutation: float = 0.2
     prune: float = 0.5
     tolerance: float = 1e-5
     err_target: str = "output"
-    max_terms: int = _option(10)
-    max_height: int = _option(5)
+    max_terms: int = _option(10, "Terms of the largest model.")
+    max_height: int = _option(5, "Height of an expression tree, at most.")
     shifts: tuple[int, ...] = (1, 2, 3, 4, 5)
     primitives: tuple[str | Primitive, ...] = _option(
         ("mul", "phi1", "phi2"),
@@ -196,8 +196,8 @@ class Settings:
     characters: tuple[str, ...] = _option(
         (), f"Repeat it, islands take turns: {', '.join(ISLAND_PROFILES)}.", "--character"
     )
-    max_evaluations: int = _option(0, "Stop after the epoch that reaches this number.")
-    target_error: float = _option(0.0, "Stop after the epoch that reaches this RMSE.")
+    max_evaluations: int = _option(0, "Stop after the epoch that reaches this number of individuals.")
+    target_error: float = _option(0.0, "Stop after the epoch that reaches this RMSE, in the output's unit.")
 
     def __post_init__(self) -> None:
         _at_least(1, population=self.population, max_terms=self.max_terms, shooting=self.shooting)
