@@ -1,11 +1,14 @@
-"""Models, records and start values for exports as blocks of simulators."""
+"""Models of one and of several outputs, and the signals of their blocks."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.io.export.sampled_state import make_sampled_state
+from islands.io.export.sampled_block import SampledBlock, make_block
+from islands.model.model import Model
+from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.predictors import free_run
+from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.programs import CASES, model, record, record_of
 
 #: Chosen for their states: past inputs and outputs, several inputs, no past, an input that acts at once.
@@ -24,18 +27,44 @@ OF_STATES = {
     "at once": replace(model({"y(k-1)": 0.5, "u1(k-1)*u2(k-2)": 0.25}, ("a_V+1", "b_A")), dt=0.1),
 }
 
+#: Models of several outputs as well.
+OF_BLOCKS = {**OF_STATES, "two masses": TWO_MASSES, "prey": PREY}
 
-def start_values(exported, data):
-    """Return the past samples of a block, in the order of its state, and the number of its first sample."""
-    first, signals = max(exported.maximum_lag, 1), [data.y, *data.u.T]
-    return [signals[channel][first - lag] for channel, lag in make_sampled_state(exported).samples], first
+
+@dataclass(frozen=True)
+class BlockCase:
+    """A model and the signals of its block.
+
+    Attributes
+    ----------
+    exported : Model or CoupledModel
+    block : SampledBlock
+    past : list of float
+        Samples before the first one, in the order of the state.
+    inputs : ndarray, shape (samples, inputs)
+    outputs : ndarray, shape (samples, outputs)
+    """
+
+    exported: Model | CoupledModel
+    block: SampledBlock
+    past: list[float]
+    inputs: np.ndarray
+    outputs: np.ndarray
 
 
 def block_case(name):
-    """Return a model, its record, and start values, inputs and outputs of its block from the first sample."""
-    exported = OF_STATES[name]
-    data = record(exported.inputs, dt=0.1) if name == "at once" else record_of(name)
-    past, first = start_values(exported, data)
-    run = free_run(exported, data)
-    assert run.outcome
-    return exported, data, past, np.ascontiguousarray(data.u[first:]), run.y[first:]
+    """Return a case of ``OF_BLOCKS``."""
+    exported = OF_BLOCKS[name]
+    if isinstance(exported, CoupledModel):
+        records = make_coupled_record(exported, samples=60).records
+        u, y = records[0].u, np.column_stack([each.y for each in records])
+        run = y
+    else:
+        data = record(exported.inputs, dt=0.1) if name == "at once" else record_of(name)
+        simulated = free_run(exported, data)
+        assert simulated.outcome
+        u, y, run = data.u, data.y[:, None], simulated.y[:, None]
+    block, first = make_block(exported), max(exported.maximum_lag, 1)
+    signals = [*y.T, *u.T]
+    past = [float(signals[channel][first - lag]) for channel, lag in block.samples]
+    return BlockCase(exported, block, past, np.ascontiguousarray(u[first:]), run[first:])

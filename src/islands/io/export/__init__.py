@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 from islands.errors import SettingsError, lookup
 from islands.io.export.c import c_source
+from islands.io.export.coupled import export_coupled
 from islands.io.export.fmu.archive import fmu2, fmu3
 from islands.io.export.matlab import matlab_source
 from islands.io.export.matlab_system import matlab_system_source
@@ -19,6 +20,7 @@ from islands.io.export.s_function import s_function_source
 from islands.io.models import model_json
 from islands.model.equations import equation, latex_equation, mathml_equation
 from islands.model.model import Model
+from islands.simulation.coupled_model import CoupledModel
 
 EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(
     {
@@ -37,7 +39,9 @@ EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(
 
 
 #: Formats that are not text.
-FILE_EXPORTS: Mapping[str, Callable[[Model], bytes]] = MappingProxyType({"fmu": fmu3, "fmu2": fmu2})
+FILE_EXPORTS: Mapping[str, Callable[[Model | CoupledModel], bytes]] = MappingProxyType(
+    {"fmu": fmu3, "fmu2": fmu2}
+)
 
 
 def export(model: Model, kind: str) -> str:
@@ -54,8 +58,8 @@ def export(model: Model, kind: str) -> str:
     return EXPORTS[kind](model)
 
 
-def write_export(model: Model, kind: str, path: str | Path) -> None:
-    """Write a model to a file in one of the formats of ``EXPORTS`` or ``FILE_EXPORTS``.
+def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> None:
+    """Write a model to a file in one of its text formats or a format of ``FILE_EXPORTS``.
 
     Raises
     ------
@@ -65,4 +69,5 @@ def write_export(model: Model, kind: str, path: str | Path) -> None:
     if kind in FILE_EXPORTS:
         Path(path).write_bytes(FILE_EXPORTS[kind](model))
         return
-    Path(path).write_text(f"{export(model, kind).rstrip()}\n", encoding="utf-8")
+    text = export_coupled(model, kind) if isinstance(model, CoupledModel) else export(model, kind)
+    Path(path).write_text(f"{text.rstrip()}\n", encoding="utf-8")

@@ -3,9 +3,9 @@
 import textwrap
 
 from islands.io.export.matlab import matlab_definition
-from islands.io.export.parts import functions, heading, terms
-from islands.io.export.sampled_state import SampledState, make_sampled_state
+from islands.io.export.sampled_block import SampledBlock, make_block
 from islands.model.model import Model
+from islands.simulation.coupled_model import CoupledModel
 
 _FILE = """\
 classdef narx_system < matlab.System
@@ -14,7 +14,7 @@ classdef narx_system < matlab.System
 {heading}
 %
 % Save this file as narx_system.m; select narx_system in a block MATLAB System, or call a System object with
-% the inputs of each sample: model = narx_system; y = model({inputs}).
+% the inputs of each sample: model = narx_system; {results} = model({inputs}).
 
   properties (Nontunable)
     % Start  Samples before the first one, newest first:
@@ -31,21 +31,22 @@ classdef narx_system < matlab.System
       obj.Past = reshape(double(obj.Start), 1, {states});
     end
 
-    function y = outputImpl(obj, {inputs})
-      y = predict(obj, {inputs});
+    function {results} = outputImpl(obj, {inputs})
+      result = predict(obj, {inputs});
+      {assignments}
     end
 
     function updateImpl(obj, {inputs})
+      result = predict(obj, {inputs});
       x = obj.Past;
       obj.Past = [{update}];
     end
 
-    function y = predict(obj, {inputs})
+    function result = predict(obj, {inputs})
       x = obj.Past;
       {conversions}
-      total = 0;
-      {terms}
-      y = total;
+      result = zeros(1, {outputs});
+      {equations}
     end
 
     function varargout = isInputDirectFeedthroughImpl(~, {ignored})
@@ -62,20 +63,20 @@ classdef narx_system < matlab.System
       complex = false;
     end
 
-    function size = getOutputSizeImpl(~)
-      size = [1 1];
+    function varargout = getOutputSizeImpl(~)
+      varargout = repmat({{[1 1]}}, 1, {outputs});
     end
 
-    function class = getOutputDataTypeImpl(~)
-      class = 'double';
+    function varargout = getOutputDataTypeImpl(~)
+      varargout = repmat({{'double'}}, 1, {outputs});
     end
 
-    function complex = isOutputComplexImpl(~)
-      complex = false;
+    function varargout = isOutputComplexImpl(~)
+      varargout = repmat({{false}}, 1, {outputs});
     end
 
-    function fixed = isOutputFixedSizeImpl(~)
-      fixed = true;
+    function varargout = isOutputFixedSizeImpl(~)
+      varargout = repmat({{true}}, 1, {outputs});
     end
   end
 {functions}end
@@ -87,8 +88,8 @@ _FUNCTIONS = """
 """
 
 
-def matlab_system_source(model: Model) -> str:
-    """Return a model as the source of a MATLAB System object, in ASCII.
+def matlab_system_source(model: Model | CoupledModel) -> str:
+    """Return a model of one or several outputs as the source of a MATLAB System object, in ASCII.
 
     The first sample of the object is the one after the past samples in its property ``Start``. An input that
     acts at once has direct feedthrough.
@@ -99,38 +100,46 @@ def matlab_system_source(model: Model) -> str:
         The model has no finite parameters or no sampling time, or a user-defined primitive has no MATLAB
         body.
     """
-    state = make_sampled_state(model)
-    inputs = state.signals[1:]
-    used = [textwrap.indent(matlab_definition(each), "    ") for each in functions(model)]
-    lines = terms(
-        model,
-        lambda signal, lag: f"x({state.position(signal, lag) + 1})" if lag else signal,
-        lambda primitive: f"narx_system.f_{primitive.name}",
-    )
-    read = [signal for signal, direct in zip(state.signals, state.feedthrough, strict=True) if direct]
+    block = make_block(model)
+    outputs, inputs = block.signals[: block.outputs], block.signals[block.outputs :]
+    used = [textwrap.indent(matlab_definition(each), "    ") for each in block.primitives]
+    equations = []
+    for place, write in enumerate(block.terms, start=1):
+        equations += [
+            f"result({place}) = result({place}) + {term};"
+            for term in write(
+                lambda signal, lag: f"x({block.position(signal, lag) + 1})" if lag else signal,
+                lambda primitive: f"narx_system.f_{primitive.name}",
+            )
+        ]
+    read = [signal for signal, direct in zip(block.signals, block.feedthrough, strict=True) if direct]
     return _FILE.format(
-        heading=heading(model, "%"),
+        heading=block.heading("%"),
         inputs=", ".join(inputs),
-        past=state.describe("    %   "),
-        states=state.size,
-        update=_update(state),
+        results=outputs[0] if len(outputs) == 1 else f"[{', '.join(outputs)}]",
+        assignments="\n      ".join(
+            f"{name} = result({place});" for place, name in enumerate(outputs, start=1)
+        ),
+        past=block.describe("    %   "),
+        outputs=block.outputs,
+        states=block.size,
+        update=_update(block),
         # With integer inputs MATLAB would round every product.
         conversions="\n      ".join(f"{name} = double({name});" for name in read) or "% no present input",
-        terms="\n      ".join(f"total = total + {term};" for term in lines),
+        equations="\n      ".join(equations),
         ignored=", ".join("~" for _ in inputs),
-        direct=", ".join(str(each).lower() for each in state.feedthrough[1:]),
-        dt=state.dt,
+        direct=", ".join(str(each).lower() for each in block.feedthrough[block.outputs :]),
+        dt=block.dt,
         functions=_FUNCTIONS.format(definitions="\n".join(used)) if used else "",
     )
 
 
-def _update(state: SampledState) -> str:
+def _update(block: SampledBlock) -> str:
     """Return the elements of the next state: each signal begins with its present sample."""
-    predicted = f"predict(obj, {', '.join(state.signals[1:])})"
     parts, place = [], 1
-    for channel, (signal, depth) in enumerate(zip(state.signals, state.depths, strict=True)):
+    for channel, (signal, depth) in enumerate(zip(block.signals, block.depths, strict=True)):
         if depth:
-            parts.append(f"double({signal})" if channel else predicted)
+            parts.append(f"double({signal})" if channel >= block.outputs else f"result({channel + 1})")
         if depth > 1:
             parts.append(f"x({place}:{place + depth - 2})")
         place += depth

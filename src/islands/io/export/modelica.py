@@ -5,11 +5,11 @@ from types import MappingProxyType
 
 from islands.data.channel_names import parse_unit
 from islands.errors import ModelError
-from islands.io.export.parts import functions, heading, terms
-from islands.io.export.sampled_state import SampledState, make_sampled_state
+from islands.io.export.sampled_block import SampledBlock, make_block
 from islands.model.expression import Primitive
 from islands.model.model import Model
 from islands.model.primitives import LARGEST_EXPONENT
+from islands.simulation.coupled_model import CoupledModel
 
 _FILE = """\
 block NarxModel "NARX model of {title}"
@@ -20,7 +20,7 @@ block NarxModel "NARX model of {title}"
 protected
 {states}{functions}equation
   when sample(0, {dt!r}) then
-    y = {terms};
+    {equations}
     {shifts}
   end when;
 end NarxModel;
@@ -44,37 +44,35 @@ _BODIES: Mapping[str, str] = MappingProxyType(
 )
 
 
-def modelica_source(model: Model) -> str:
-    """Return a model as a Modelica block with connectors of the Modelica Standard Library.
+def modelica_source(model: Model | CoupledModel) -> str:
+    """Return a model of one or several outputs as a Modelica block.
 
-    The block samples its inputs with the sampling time of the model. Sums and products are evaluated in the
-    same order as in this package's kernels.
+    It has connectors of the Modelica Standard Library and samples its inputs with the sampling time of the
+    model. Sums and products are evaluated in the same order as in this package's kernels.
 
     Raises
     ------
     ModelError
         The model has no finite parameters or no sampling time, or it has a user-defined primitive.
     """
-    state = make_sampled_state(model)
-    stored = [(name, depth) for name, depth in zip(state.signals, state.depths, strict=True) if depth]
-    lines = terms(
-        model,
-        lambda signal, lag: f"pre(past_{signal}[{lag}])" if lag else signal,
-        lambda primitive: f"f_{primitive.name}",
-    )
+    block = make_block(model)
+    stored = [(name, depth) for name, depth in zip(block.signals, block.depths, strict=True) if depth]
+    outputs = zip(block.signals, block.terms, strict=False)
     return _FILE.format(
-        title=_escape(model.output_name),
-        heading=heading(model, "  //"),
+        title=_escape(block.title),
+        heading=block.heading("  //"),
         parameters="\n".join(_parameter(name, depth) for name, depth in stored),
-        connectors="\n".join(_connector(state, channel) for channel in range(len(state.signals))),
+        connectors="\n".join(_connector(block, channel) for channel in range(len(block.signals))),
         states="".join(
             f"  discrete Real past_{name}[{depth}](start = start_{name}, each fixed = true);\n"
             for name, depth in stored
         ),
-        functions="".join(_function(each) for each in functions(model)),
-        dt=state.dt,
-        # Modelica has no sign after an operator.
-        terms="\n      + ".join(lines).replace("+ -", "- "),
+        functions="".join(_function(each) for each in block.primitives),
+        dt=block.dt,
+        equations="\n    ".join(
+            f"{name} = {_join_terms(write(_sample, lambda primitive: f'f_{primitive.name}'))};"
+            for name, write in outputs
+        ),
         shifts="\n    ".join(
             f"past_{name}[{lag}] = {f'pre(past_{name}[{lag - 1}])' if lag > 1 else name};"
             for name, depth in stored
@@ -83,16 +81,25 @@ def modelica_source(model: Model) -> str:
     )
 
 
+def _sample(signal: str, lag: int) -> str:
+    return f"pre(past_{signal}[{lag}])" if lag else signal
+
+
+def _join_terms(terms: list[str]) -> str:
+    # Modelica has no sign after an operator.
+    return "\n      + ".join(terms).replace("+ -", "- ")
+
+
 def _parameter(name: str, depth: int) -> str:
     lags = ", ".join(f"{name}(k-{lag})" for lag in range(1, depth + 1))
     return f'  parameter Real start_{name}[{depth}] = fill(0.0, {depth}) "{lags}";'
 
 
-def _connector(state: SampledState, channel: int) -> str:
-    column, kind = state.columns[channel], "RealInput" if channel else "RealOutput"
+def _connector(block: SampledBlock, channel: int) -> str:
+    column, kind = block.columns[channel], "RealOutput" if channel < block.outputs else "RealInput"
     unit = parse_unit(column)
     declared = f'(unit = "{_escape(unit)}")' if unit else ""
-    return f'  Modelica.Blocks.Interfaces.{kind} {state.signals[channel]}{declared} "{_escape(column)}";'
+    return f'  Modelica.Blocks.Interfaces.{kind} {block.signals[channel]}{declared} "{_escape(column)}";'
 
 
 def _function(primitive: Primitive) -> str:

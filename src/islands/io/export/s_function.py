@@ -1,16 +1,16 @@
 """Export of a model as a Simulink block: a C MEX S-function in one file."""
 
-from islands.io.export.parts import heading
-from islands.io.export.sampled_state import c_block, make_sampled_state
+from islands.io.export.sampled_block import c_block, make_block
 from islands.model.model import Model
+from islands.simulation.coupled_model import CoupledModel
 
 _FILE = """\
 /*
 {heading}
  *
  * Level-2 S-function for Simulink. Save this file as narx_model.c, run "mex narx_model.c" in MATLAB, and
- * enter narx_model in a block S-Function. Input ports: {ports}. Its parameter is the vector of the samples
- * before the first one, newest first, or [] for zeros:
+ * enter narx_model in a block S-Function. Input ports: {ports}. Output ports: {results}. Its parameter is the
+ * vector of the samples before the first one, newest first, or [] for zeros:
 {past}
  */
 
@@ -49,7 +49,7 @@ static void mdlInitializeSizes(SimStruct *S)
     ssSetSFcnParamTunable(S, 0, 0);
     ssSetNumContStates(S, 0);
     ssSetNumDiscStates(S, STATES);
-    if (!ssSetNumInputPorts(S, INPUTS) || !ssSetNumOutputPorts(S, 1)) {{
+    if (!ssSetNumInputPorts(S, INPUTS) || !ssSetNumOutputPorts(S, OUTPUTS)) {{
         return;
     }}
     for (int port = 0; port < INPUTS; ++port) {{
@@ -57,7 +57,9 @@ static void mdlInitializeSizes(SimStruct *S)
         ssSetInputPortRequiredContiguous(S, port, 1);
         ssSetInputPortDirectFeedThrough(S, port, DIRECT[port]);
     }}
-    ssSetOutputPortWidth(S, 0, 1);
+    for (int port = 0; port < OUTPUTS; ++port) {{
+        ssSetOutputPortWidth(S, port, 1);
+    }}
     ssSetNumSampleTimes(S, 1);
     ssSetOptions(S, SS_OPTION_EXCEPTION_FREE_CODE);
 }}
@@ -79,24 +81,30 @@ static void mdlInitializeConditions(SimStruct *S)
 
 static void mdlOutputs(SimStruct *S, int_T tid)
 {{
-    double input[INPUTS];
+    double input[INPUTS], result[OUTPUTS];
     (void)tid;
     /* Simulink provides the other inputs only afterwards, to mdlUpdate. */
     for (int port = 0; port < INPUTS; ++port) {{
         input[port] = DIRECT[port] ? ssGetInputPortRealSignal(S, port)[0] : 0.0;
     }}
-    ssGetOutputPortRealSignal(S, 0)[0] = output(ssGetRealDiscStates(S), input);
+    compute(ssGetRealDiscStates(S), input, result);
+    for (int port = 0; port < OUTPUTS; ++port) {{
+        ssGetOutputPortRealSignal(S, port)[0] = result[port];
+    }}
 }}
 
 #define MDL_UPDATE
 static void mdlUpdate(SimStruct *S, int_T tid)
 {{
-    double input[INPUTS];
+    double input[INPUTS], result[OUTPUTS];
     (void)tid;
+    for (int port = 0; port < OUTPUTS; ++port) {{
+        result[port] = ssGetOutputPortRealSignal(S, port)[0];
+    }}
     for (int port = 0; port < INPUTS; ++port) {{
         input[port] = ssGetInputPortRealSignal(S, port)[0];
     }}
-    advance(ssGetRealDiscStates(S), ssGetOutputPortRealSignal(S, 0)[0], input);
+    advance(ssGetRealDiscStates(S), result, input);
 }}
 
 static void mdlTerminate(SimStruct *S) {{ (void)S; }}
@@ -109,8 +117,8 @@ static void mdlTerminate(SimStruct *S) {{ (void)S; }}
 """
 
 
-def s_function_source(model: Model) -> str:
-    """Return a model as the C source of a level-2 S-function, in ASCII.
+def s_function_source(model: Model | CoupledModel) -> str:
+    """Return a model of one or several outputs as the C source of a level-2 S-function, in ASCII.
 
     The first sample of the block is the one after the past samples in its parameter. An input that acts at
     once has direct feedthrough.
@@ -120,12 +128,13 @@ def s_function_source(model: Model) -> str:
     ModelError
         The model has no finite parameters or no sampling time, or a user-defined primitive has no C body.
     """
-    state = make_sampled_state(model)
+    block = make_block(model)
     return _FILE.format(
-        heading=heading(model, " *"),
-        ports=", ".join(state.signals[1:]),
-        past=state.describe(" *  "),
-        block=c_block(model, state),
-        direct=", ".join(str(int(each)) for each in state.feedthrough[1:]),
-        states=state.size,
+        heading=block.heading(" *"),
+        ports=", ".join(block.signals[block.outputs :]),
+        results=", ".join(block.signals[: block.outputs]),
+        past=block.describe(" *  "),
+        block=c_block(block),
+        direct=", ".join(str(int(each)) for each in block.feedthrough[block.outputs :]),
+        states=block.size,
     )

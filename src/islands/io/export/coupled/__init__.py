@@ -7,6 +7,9 @@ from islands.errors import SettingsError
 from islands.io.export.coupled.coupled_document import coupled_json
 from islands.io.export.coupled.coupled_equations import coupled_equation, coupled_latex, coupled_mathml
 from islands.io.export.coupled.coupled_programs import coupled_c, coupled_matlab, coupled_python
+from islands.io.export.matlab_system import matlab_system_source
+from islands.io.export.modelica import modelica_source
+from islands.io.export.s_function import s_function_source
 from islands.simulation.coupled_model import CoupledModel
 
 #: Export formats of a coupled model by name.
@@ -18,6 +21,9 @@ COUPLED_EXPORTS: Mapping[str, Callable[[CoupledModel], str]] = MappingProxyType(
         "python": coupled_python,
         "c": coupled_c,
         "matlab": coupled_matlab,
+        "matlab-system": matlab_system_source,
+        "s-function": s_function_source,
+        "modelica": modelica_source,
         "json": coupled_json,
     }
 )

@@ -19,9 +19,9 @@ from islands.io.export.fmu.description import (
     describe_fmi3,
     model_identifier,
 )
-from islands.io.export.parts import heading
-from islands.io.export.sampled_state import SampledState, c_block, make_sampled_state
+from islands.io.export.sampled_block import SampledBlock, c_block, make_block
 from islands.model.model import Model
+from islands.simulation.coupled_model import CoupledModel
 
 #: The first flag makes results equal those of the search bit for bit.
 _FLAGS = ("-ffp-contract=off", "-O2", "-std=c99", "-fvisibility=hidden")
@@ -49,13 +49,13 @@ class FmiVersion:
     source : str
         File of the interface.
     describe : callable
-        Returns the model description of a model, its state and its token.
+        Returns the model description of a block with a token.
     platforms : mapping
         Folder of the libraries of a system, by (system, processor).
     """
 
     source: str
-    describe: Callable[[Model, SampledState, str], str]
+    describe: Callable[[SampledBlock, str], str]
     platforms: Mapping[tuple[str, str], str]
 
 
@@ -85,18 +85,18 @@ FMI_VERSIONS: Mapping[str, FmiVersion] = MappingProxyType(
 )
 
 
-def fmu3(model: Model) -> bytes:
+def fmu3(model: Model | CoupledModel) -> bytes:
     """Return a model as an FMU of FMI 3.0; see `make_fmu`."""
     return make_fmu(model, FMI_VERSIONS["fmu"])
 
 
-def fmu2(model: Model) -> bytes:
+def fmu2(model: Model | CoupledModel) -> bytes:
     """Return a model as an FMU of FMI 2.0; see `make_fmu`."""
     return make_fmu(model, FMI_VERSIONS["fmu2"])
 
 
-def make_fmu(model: Model, version: FmiVersion) -> bytes:
-    """Return a model as an FMU for co-simulation, with its sources.
+def make_fmu(model: Model | CoupledModel, version: FmiVersion) -> bytes:
+    """Return a model of one or several outputs as an FMU for co-simulation, with its sources.
 
     A library for this machine is included if there is a C compiler. The communication step is a multiple of
     the sampling time of the model. Start values are the samples before the first one.
@@ -107,19 +107,19 @@ def make_fmu(model: Model, version: FmiVersion) -> bytes:
         The model has no finite parameters or no sampling time, a user-defined primitive has no C body, a
         column cannot name a variable, or the compiler fails.
     """
-    state = make_sampled_state(model)
-    block = c_block(model, state)
-    token = hashlib.sha256(f"{version.source}{state.columns}{block}".encode()).hexdigest()
+    block = make_block(model)
+    program = c_block(block)
+    token = hashlib.sha256(f"{version.source}{block.columns}{program}".encode()).hexdigest()
     sources = {name: _read(name) for name in ("instance.h", version.source)}
-    sources["model.h"] = _MODEL.format(heading=heading(model, " *"), block=block, token=token)
-    files = {"modelDescription.xml": version.describe(model, state, token).encode()}
+    sources["model.h"] = _MODEL.format(heading=block.heading(" *"), block=program, token=token)
+    files = {"modelDescription.xml": version.describe(block, token).encode()}
     files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if version.source == "fmi3.c":
-        files["sources/buildDescription.xml"] = describe_build(model).encode()
+        files["sources/buildDescription.xml"] = describe_build(block).encode()
     folder = version.platforms.get((sys.platform, platform.machine()))
     if folder and find_compiler():
         suffix = "dylib" if sys.platform == "darwin" else "so"
-        files[f"binaries/{folder}/{model_identifier(model)}.{suffix}"] = _compile(sources, version.source)
+        files[f"binaries/{folder}/{model_identifier(block)}.{suffix}"] = _compile(sources, version.source)
     return _pack(files)
 
 

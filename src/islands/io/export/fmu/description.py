@@ -6,9 +6,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from islands.data.channel_names import parse_unit
-from islands.io.export.sampled_state import SampledState
-from islands.model.equations import equation
-from islands.model.model import Model
+from islands.io.export.sampled_block import SampledBlock
 
 #: Attributes of an FMU of either version.
 _CAPABILITIES = {
@@ -39,26 +37,27 @@ class FmuVariable:
     start: bool = False
 
 
-def fmu_variables(state: SampledState) -> tuple[FmuVariable, ...]:
-    """Return the variables: time, output, inputs, and one start value for each past sample of the state."""
+def fmu_variables(block: SampledBlock) -> tuple[FmuVariable, ...]:
+    """Return the variables: time, outputs, inputs, and one start value for each past sample of the state."""
     found = [FmuVariable("time", "independent", "continuous", "Time in seconds", "s")]
-    late = ", one sampling time late" if any(state.feedthrough) else ""
-    for channel, (column, signal) in enumerate(zip(state.columns, state.signals, strict=True)):
-        causality, variability = ("input", "continuous") if channel else ("output", "discrete")
+    late = ", one sampling time late" if any(block.feedthrough) else ""
+    for channel, (column, signal) in enumerate(zip(block.columns, block.signals, strict=True)):
+        is_input = channel >= block.outputs
+        causality, variability = ("input", "continuous") if is_input else ("output", "discrete")
         found.append(
             FmuVariable(
                 column,
                 causality,
                 variability,
-                f"{signal}(k)" if channel else f"y(k){late}",
+                f"{signal}(k)" if is_input else f"{signal}(k){late}",
                 parse_unit(column),
-                "" if channel else "calculated",
-                bool(channel),
+                "" if is_input else "calculated",
+                is_input,
             )
         )
-    for channel, lag in state.samples:
-        column = state.columns[channel]
-        text = f"{state.signals[channel]}(k-{lag}) at the first sample"
+    for channel, lag in block.samples:
+        column = block.columns[channel]
+        text = f"{block.signals[channel]}(k-{lag}) at the first sample"
         found.append(
             FmuVariable(
                 f"start.{column}[{lag}]", "parameter", "fixed", text, parse_unit(column), "exact", True
@@ -67,29 +66,29 @@ def fmu_variables(state: SampledState) -> tuple[FmuVariable, ...]:
     return tuple(found)
 
 
-def model_identifier(model: Model) -> str:
+def model_identifier(block: SampledBlock) -> str:
     """Return the name of the library of an FMU, a C identifier: ``narx_y_um``."""
-    return f"narx_{re.sub('[^A-Za-z0-9]+', '_', model.output_name).strip('_')}"[:60].rstrip("_")
+    return f"narx_{re.sub('[^A-Za-z0-9]+', '_', block.title).strip('_')}"[:60].rstrip("_")
 
 
-def describe_fmi3(model: Model, state: SampledState, token: str) -> str:
+def describe_fmi3(block: SampledBlock, token: str) -> str:
     """Return ``modelDescription.xml`` of FMI 3.0."""
-    root = _make_root(model, "3.0", {"instantiationToken": token})
+    root = _make_root(block, "3.0", {"instantiationToken": token})
     SubElement(
         root,
         "CoSimulation",
         {
-            "modelIdentifier": model_identifier(model),
+            "modelIdentifier": model_identifier(block),
             "canGetAndSetFMUState": "true",
             "canSerializeFMUState": "true",
-            "fixedInternalStepSize": repr(state.dt),
+            "fixedInternalStepSize": repr(block.dt),
             **_CAPABILITIES,
         },
     )
-    _add_units(root, state)
-    SubElement(root, "DefaultExperiment", startTime="0.0", stepSize=repr(state.dt))
+    _add_units(root, block)
+    SubElement(root, "DefaultExperiment", startTime="0.0", stepSize=repr(block.dt))
     listed = SubElement(root, "ModelVariables")
-    for reference, each in enumerate(fmu_variables(state)):
+    for reference, each in enumerate(fmu_variables(block)):
         SubElement(
             listed,
             "Float64",
@@ -103,29 +102,33 @@ def describe_fmi3(model: Model, state: SampledState, token: str) -> str:
             },
         )
     structure = SubElement(root, "ModelStructure")
-    SubElement(structure, "Output", valueReference="1", dependencies="")
-    SubElement(structure, "InitialUnknown", valueReference="1")
+    # Value references of the outputs: those behind the time. No output depends on present inputs.
+    references = [str(place) for place in range(1, 1 + block.outputs)]
+    for output in references:
+        SubElement(structure, "Output", valueReference=output, dependencies="")
+    for output in references:
+        SubElement(structure, "InitialUnknown", valueReference=output)
     return _to_text(root)
 
 
-def describe_fmi2(model: Model, state: SampledState, token: str) -> str:
+def describe_fmi2(block: SampledBlock, token: str) -> str:
     """Return ``modelDescription.xml`` of FMI 2.0."""
-    root = _make_root(model, "2.0", {"guid": token})
+    root = _make_root(block, "2.0", {"guid": token})
     simulation = SubElement(
         root,
         "CoSimulation",
         {
-            "modelIdentifier": model_identifier(model),
+            "modelIdentifier": model_identifier(block),
             "canGetAndSetFMUstate": "true",
             "canSerializeFMUstate": "true",
             **_CAPABILITIES,
         },
     )
     SubElement(SubElement(simulation, "SourceFiles"), "File", name="fmi2.c")
-    _add_units(root, state)
-    SubElement(root, "DefaultExperiment", startTime="0.0", stepSize=repr(state.dt))
+    _add_units(root, block)
+    SubElement(root, "DefaultExperiment", startTime="0.0", stepSize=repr(block.dt))
     listed = SubElement(root, "ModelVariables")
-    for reference, each in enumerate(fmu_variables(state)):
+    for reference, each in enumerate(fmu_variables(block)):
         variable = SubElement(
             listed,
             "ScalarVariable",
@@ -140,38 +143,40 @@ def describe_fmi2(model: Model, state: SampledState, token: str) -> str:
         )
         SubElement(variable, "Real", _optional(unit=each.unit, start="0.0" if each.start else ""))
     structure = SubElement(root, "ModelStructure")
-    # FMI 2.0 counts variables from 1: the output is the second one.
-    SubElement(SubElement(structure, "Outputs"), "Unknown", index="2", dependencies="")
-    SubElement(SubElement(structure, "InitialUnknowns"), "Unknown", index="2")
+    outputs, unknowns = SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")
+    # FMI 2.0 counts variables from 1: the time is the first one.
+    for index in range(2, 2 + block.outputs):
+        SubElement(outputs, "Unknown", index=str(index), dependencies="")
+        SubElement(unknowns, "Unknown", index=str(index))
     return _to_text(root)
 
 
-def describe_build(model: Model) -> str:
+def describe_build(block: SampledBlock) -> str:
     """Return ``sources/buildDescription.xml`` of FMI 3.0."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
-    build = SubElement(root, "BuildConfiguration", modelIdentifier=model_identifier(model))
+    build = SubElement(root, "BuildConfiguration", modelIdentifier=model_identifier(block))
     files = SubElement(build, "SourceFileSet", language="C99")
     SubElement(files, "SourceFile", name="fmi3.c")
     return _to_text(root)
 
 
-def _make_root(model: Model, version: str, identity: dict[str, str]) -> Element:
-    means = f"; a sample is the mean of {model.average} samples of the recording" if model.average > 1 else ""
+def _make_root(block: SampledBlock, version: str, identity: dict[str, str]) -> Element:
+    means = f"; a sample is the mean of {block.average} samples of the recording" if block.average > 1 else ""
     return Element(
         "fmiModelDescription",
         {
             "fmiVersion": version,
-            "modelName": f"NARX model of {model.output_name}",
+            "modelName": f"NARX model of {block.title}",
             **identity,
-            "description": f"{equation(model)}{means}",
+            "description": f"{'; '.join(block.equations)}{means}",
             "generationTool": "islands",
             "variableNamingConvention": "flat",
         },
     )
 
 
-def _add_units(root: Element, state: SampledState) -> None:
-    names = {each.unit for each in fmu_variables(state)} - {""}
+def _add_units(root: Element, block: SampledBlock) -> None:
+    names = {each.unit for each in fmu_variables(block)} - {""}
     listed = SubElement(root, "UnitDefinitions")
     for name in sorted(names):
         SubElement(listed, "Unit", name=name)

@@ -6,8 +6,8 @@
 
 #include "model.h"
 
-/* Value references: time, output, inputs, start values of the state. */
-enum { TIME = 0, OUTPUT = 1, INPUT = 2, START = 2 + INPUTS, VARIABLES = 2 + INPUTS + STATES };
+/* Value references: time, outputs, inputs, start values of the state. */
+enum { TIME = 0, OUTPUT = 1, INPUT = OUTPUT + OUTPUTS, START = INPUT + INPUTS, VARIABLES = START + STATES };
 
 /* Phases of an instance. Start values can be set until the simulation runs. */
 typedef enum { PREPARING, INITIALISING, RUNNING, TERMINATED, FAILED } Phase;
@@ -26,27 +26,35 @@ static void reset(Model *model)
     model->phase = PREPARING;
 }
 
-/* Compute the output before the first step from the start values. */
+/* Compute the outputs before the first step from the start values. */
 static void initialise(Model *model)
 {
     memcpy(model->state, model->values + START, sizeof model->state);
-    model->values[OUTPUT] = FEEDTHROUGH ? model->state[0] : output(model->state, model->values + INPUT);
+    if (FEEDTHROUGH) {
+        const double *state = model->state;
+        for (int place = 0; place < OUTPUTS; ++place) {
+            model->values[OUTPUT + place] = state[0];
+            state += DEPTHS[place];
+        }
+    } else {
+        compute(model->state, model->values + INPUT, model->values + OUTPUT);
+    }
 }
 
 /*
- * Take one step with constant inputs. Without direct feedthrough the output is that of the new sample.
- * With it, the output of the new sample would need inputs that are not yet known, and is that of the
- * previous one.
+ * Take one step with constant inputs. Without direct feedthrough the outputs are those of the new sample.
+ * With it, those of the new sample would need inputs that are not yet known, and they are those of the previous
+ * one.
  */
 static void take_step(Model *model)
 {
-    double *inputs = model->values + INPUT, *y = model->values + OUTPUT;
+    double *inputs = model->values + INPUT, *outputs = model->values + OUTPUT;
     if (FEEDTHROUGH) {
-        *y = output(model->state, inputs);
-        advance(model->state, *y, inputs);
+        compute(model->state, inputs, outputs);
+        advance(model->state, outputs, inputs);
     } else {
-        advance(model->state, *y, inputs);
-        *y = output(model->state, inputs);
+        advance(model->state, outputs, inputs);
+        compute(model->state, inputs, outputs);
     }
 }
 
@@ -71,9 +79,11 @@ static const char *simulate(Model *model, double time, double duration)
         take_step(model);
     }
     model->values[TIME] = time + duration;
-    if (!isfinite(model->values[OUTPUT])) {
-        model->phase = FAILED;
-        return "the output is not finite: the model has diverged, or an input is not finite";
+    for (int place = 0; place < OUTPUTS; ++place) {
+        if (!isfinite(model->values[OUTPUT + place])) {
+            model->phase = FAILED;
+            return "an output is not finite: the model has diverged, or an input is not finite";
+        }
     }
     return NULL;
 }

@@ -9,10 +9,12 @@ import pytest
 import islands
 from islands.errors import ModelError
 from islands.io.export import export
+from islands.io.export.coupled import export_coupled
 from islands.model.expression import value
 from islands.model.primitives import PRIMITIVES
 from islands.model.user_primitive import primitive
 from support.block_cases import OF_STATES
+from support.coupled_systems import PREY, TWO_MASSES
 from support.programs import CASES, model
 
 SAMPLED = {name: replace(each, dt=each.dt or 0.1) for name, each in CASES.items()} | OF_STATES
@@ -77,6 +79,23 @@ def test_the_block_has_the_units_and_the_columns():
     assert r'RealInput u(unit = "V") "u \"1\" \\ [V]";' in text
     assert 'RealOutput y(unit = "um") "y_um";' in text
     assert "when sample(0, 0.001) then" in text
+
+
+@pytest.mark.parametrize("exported", [PREY, TWO_MASSES], ids=["prey", "two masses"])
+def test_a_block_of_two_outputs_has_an_equation_for_each(exported):
+    text = export_coupled(exported, "modelica")
+    samples = np.random.default_rng(0).normal(size=(3, 5))
+    for place, written in enumerate(body(text)[:2]):
+        left, _, right = " ".join(written.split()).partition(" = ")
+        assert left == f"y{place + 1}"
+        # The parser knows one output: all signals are read as inputs 1, 2 and 3.
+        outputs_read = re.sub(r"pre\(past_y(\d)\[(\d+)\]\)", r"u\1(k-\2)", right)
+        all_read = re.sub(r"pre\(past_u\[(\d+)\]\)", r"u3(k-\1)", outputs_read)
+        found = value(islands.parse(all_read), lambda channel, lag: samples[channel - 1][lag])
+        terms = zip(exported.models[place].parameters, exported.expressions(place), strict=True)
+        assert found == pytest.approx(
+            sum(theta * value(each, lambda channel, lag: samples[channel][lag]) for theta, each in terms)
+        )
 
 
 def test_a_user_defined_primitive_is_refused():

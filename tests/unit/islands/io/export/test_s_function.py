@@ -5,10 +5,10 @@ import ctypes
 import numpy as np
 import pytest
 
-from islands.io.export import export
+from islands.io.export import export, write_export
 from islands.io.export.fmu.compiler import find_compiler
 from islands.performance.benchmark.compiled_c import compile_model
-from support.block_cases import OF_STATES, block_case
+from support.block_cases import OF_BLOCKS, OF_STATES, block_case
 from support.programs import bits
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
@@ -22,7 +22,7 @@ typedef struct { double *values; size_t count; int is_double; } mxArray;
 typedef struct {
     mxArray parameter;
     int parameters, states, inputs, outputs, direct[8];
-    double state[64], input[8], output[1], period;
+    double state[64], input[8], output[8], period;
     const char *error;
 } SimStruct;
 #define SS_OPTION_EXCEPTION_FREE_CODE 1
@@ -67,7 +67,7 @@ const char *run(double *past, size_t count, int is_double, const double *u, size
         const double *present = u + k * S->inputs;
         for (int i = 0; i < S->inputs; ++i) S->input[i] = S->direct[i] ? present[i] : 0.0 / 0.0;
         mdlOutputs(S, 0);
-        y[k] = S->output[0];
+        for (int i = 0; i < S->outputs; ++i) y[k * S->outputs + i] = S->output[i];
         for (int i = 0; i < S->inputs; ++i) S->input[i] = present[i];
         mdlUpdate(S, 0);
     }
@@ -77,15 +77,18 @@ const char *run(double *past, size_t count, int is_double, const double *u, size
 """
 
 
-def run(exported, past, inputs, folder, is_double=True):
+def run(case, past, folder, is_double=True):
     """Run the compiled S-function; return its error and its output."""
     (folder / "simstruc.h").write_text(HEADER)
     (folder / "simulink.c").write_text(LOOP)
     strict = ("-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror")
     flags = (*strict, "-DMATLAB_MEX_FILE", f"-I{folder}")
-    library = compile_model(export(exported, "s-function"), flags, folder)
+    write_export(case.exported, "s-function", folder / "model.c")
+    library = compile_model((folder / "model.c").read_text(), flags, folder)
     library.run.restype = ctypes.c_char_p
-    arrays = [np.ascontiguousarray(values, dtype=float) for values in (past, inputs, np.empty(len(inputs)))]
+    given = (past, case.inputs, np.empty(case.outputs.shape))
+    arrays = [np.ascontiguousarray(values, dtype=float) for values in given]
+
     pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in arrays]
     sizes = [ctypes.c_size_t(len(each)) for each in arrays]
     error = library.run(pointers[0], sizes[0], is_double, pointers[1], sizes[1], pointers[2])
@@ -94,26 +97,25 @@ def run(exported, past, inputs, folder, is_double=True):
 
 @pytest.mark.ci
 @needs_compiler
-@pytest.mark.parametrize("name", OF_STATES)
+@pytest.mark.parametrize("name", OF_BLOCKS)
 def test_the_block_simulates_like_the_free_run(name, tmp_path):
-    exported, _, past, inputs, outputs = block_case(name)
-    error, found = run(exported, past, inputs, tmp_path)
+    case = block_case(name)
+    error, found = run(case, case.past, tmp_path)
     assert error is None
-    np.testing.assert_allclose(found, outputs, rtol=1e-13, atol=0)
+    np.testing.assert_allclose(found, case.outputs, rtol=1e-12, atol=0)
 
 
 @needs_compiler
 def test_an_empty_parameter_is_a_past_of_zeros(tmp_path):
-    exported, _, past, inputs, _ = block_case("published 12")
-    empty, zeros = (run(exported, each, inputs, tmp_path)[1] for each in ([], np.zeros(len(past))))
+    case = block_case("published 12")
+    empty, zeros = (run(case, each, tmp_path)[1] for each in ([], np.zeros(len(case.past))))
     assert bits(empty) == bits(zeros)
 
 
 @needs_compiler
 @pytest.mark.parametrize(("count", "is_double"), [(3, True), (5, True), (4, False)])
 def test_a_parameter_of_another_size_or_class_is_refused(count, is_double, tmp_path):
-    exported, _, _, inputs, _ = block_case("published 12")
-    error, _ = run(exported, np.zeros(count), inputs, tmp_path, is_double)
+    error, _ = run(block_case("published 12"), np.zeros(count), tmp_path, is_double)
     assert error == b"the parameter has to be [] or a vector of 4 samples of class double"
 
 

@@ -115,7 +115,7 @@ def test_latex_and_mathml_number_the_outputs() -> None:
 
 
 def test_a_format_without_several_outputs_names_the_others() -> None:
-    with pytest.raises(SettingsError, match="several outputs has no format 'fmu': take plain, latex"):
-        export_coupled(PREY, "fmu")
+    with pytest.raises(SettingsError, match="several outputs has no format 'fortran': take plain, latex"):
+        export_coupled(PREY, "fortran")
     renamed = CoupledModel(tuple(replace(each) for each in PREY.models))
     assert all(export_coupled(renamed, kind) for kind in COUPLED_EXPORTS)

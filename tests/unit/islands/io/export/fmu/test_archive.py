@@ -13,9 +13,8 @@ from fmpy.validation import validate_fmu
 from islands.errors import ModelError
 from islands.io.export import write_export
 from islands.io.export.fmu.compiler import compile_library, find_compiler
-from islands.io.export.sampled_state import make_sampled_state
 from islands.systems.published_models import PUBLISHED
-from support.block_cases import OF_STATES, block_case
+from support.block_cases import OF_BLOCKS, OF_STATES, block_case
 from support.programs import HOSTILE_NAMES, model
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
@@ -26,29 +25,32 @@ FORMATS = ("fmu", "fmu2")
 @pytest.mark.ci
 @needs_compiler
 @pytest.mark.parametrize("kind", FORMATS)
-@pytest.mark.parametrize("name", OF_STATES)
+@pytest.mark.parametrize("name", OF_BLOCKS)
 def test_fmpy_simulates_like_the_free_run(name, kind, tmp_path):
-    exported, data, past, inputs, outputs = block_case(name)
-    path, state = tmp_path / "model.fmu", make_sampled_state(exported)
-    write_export(exported, kind, path)
+    case, path = block_case(name), tmp_path / "model.fmu"
+    write_export(case.exported, kind, path)
     assert validate_fmu(str(path)) == []
-    signals = np.empty(len(outputs), [(column, float) for column in ("time", *exported.column_names)])
-    signals["time"] = np.arange(len(outputs)) * data.dt
-    for column, values in zip(exported.column_names, inputs.T, strict=True):
+    columns, count = case.block.columns, case.block.outputs
+    signals = np.empty(len(case.inputs), [(column, float) for column in ("time", *columns[count:])])
+    signals["time"] = np.arange(len(case.inputs)) * case.block.dt
+    for column, values in zip(columns[count:], case.inputs.T, strict=True):
         signals[column] = values
-    names = [f"start.{state.columns[channel]}[{lag}]" for channel, lag in state.samples]
+    names = [f"start.{columns[channel]}[{lag}]" for channel, lag in case.block.samples]
     found = fmpy.simulate_fmu(
         str(path),
         stop_time=signals["time"][-1],
-        step_size=data.dt,
-        output_interval=data.dt,
-        start_values=dict(zip(names, past, strict=True)),
+        step_size=case.block.dt,
+        output_interval=case.block.dt,
+        start_values=dict(zip(names, case.past, strict=True)),
         input=signals,
-        output=[exported.output_name],
+        output=columns[:count],
     )
-    # With an input that acts at once, the output is late by one sampling time.
-    expected = [past[0], *outputs[:-1]] if any(exported.leads) else outputs
-    np.testing.assert_allclose(found[exported.output_name], expected, rtol=1e-12, atol=0)
+    expected = case.outputs
+    if any(case.block.feedthrough):
+        # An input that acts at once delays the output by one sampling time.
+        expected = np.vstack([case.past[:1], expected[:-1]])
+    for column, values in zip(columns[:count], expected.T, strict=True):
+        np.testing.assert_allclose(found[column], values, rtol=1e-12, atol=0)
 
 
 class Session:
