@@ -50,6 +50,39 @@ class Column(ResponseModel):
     )
 
 
+class RecordFact(ResponseModel):
+    """Measured property of a record."""
+
+    name: str = Field(description="Property, for example `dead-time`.", examples=["dead-time"])
+    signal: str = Field(description="Column that it describes. Empty for the whole record.")
+    value: bool | float | None = Field(description="None if the record does not determine it.")
+    unit: str
+    interval: tuple[float, float] | None = Field(default=None, description="95 % interval of the value.")
+    confidence: float | None = Field(default=None, description="Probability that the value is right.")
+    sentence: str = Field(description="The fact in one sentence.")
+
+
+class ChosenColumns(ResponseModel):
+    """Inputs and output that the facts describe."""
+
+    inputs: tuple[str, ...]
+    output: str
+    confidence: float | None = Field(
+        default=None, description="Probability that the choice is right. None if it was given."
+    )
+    reason: str
+
+
+class Inspection(ResponseModel):
+    """Facts about the record in a file."""
+
+    rows: str | None = Field(
+        default=None, description="`START:STOP`, the samples that were measured. None if all were."
+    )
+    choice: ChosenColumns
+    facts: tuple[RecordFact, ...]
+
+
 class Preview(ResponseModel):
     """Content of a file."""
 
@@ -60,6 +93,9 @@ class Preview(ResponseModel):
         default=None, description="Sampling time in seconds. None if the file does not give it."
     )
     warnings: tuple[str, ...] = ()
+    inspection: Inspection | None = Field(
+        default=None, description="Facts about the record. None if no two columns form one."
+    )
 
 
 class DatasetView(ResponseModel):

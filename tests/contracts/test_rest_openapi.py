@@ -278,4 +278,9 @@ def test_the_preview_of_a_data_set_describes_its_columns(service):
             ("deviation", values.std()),
         ):
             assert column[field] == pytest.approx(expected, abs=1e-6)
+    inspection = preview["inspection"]
+    assert inspection["choice"]["inputs"] == ["u_V"]
+    facts = {(fact["name"], fact["signal"]): fact["value"] for fact in inspection["facts"]}
+    assert facts["samples", ""] == 123
+    assert ("dead-time", "u_V") in facts
     assert kept(service.store) != kept(service.store, content=b"other")

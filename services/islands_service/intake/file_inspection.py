@@ -68,7 +68,7 @@ async def inspect_file(
     Returns
     -------
     mapping
-        An `islands.io.records.preview.Preview` as a document.
+        An `islands.io.records.preview.Preview` as a document, with the key ``inspection``.
 
     Raises
     ------
@@ -129,7 +129,28 @@ def main() -> None:
     except RecordError as error:
         json.dump({"error": str(error)}, sys.stdout)
         sys.exit(_REFUSED)
-    json.dump(asdict(found), sys.stdout)
+    json.dump(asdict(found) | {"inspection": _measure(found, message["path"], request)}, sys.stdout)
+
+
+def _measure(found: "Preview", path: str, request: InspectionRequest) -> dict[str, Any] | None:
+    """Return the choice of columns and the facts about the record; None if there is no record."""
+    from islands.facade.inspect_record import inspect_file  # noqa: PLC0415
+    from islands.inspection.record_facts import MOST_SAMPLES  # noqa: PLC0415
+    from islands.io.records.row_range import parse_rows  # noqa: PLC0415
+
+    rows = request.rows
+    if rows is None and found.samples > MOST_SAMPLES:
+        first = (found.samples - MOST_SAMPLES) // 2
+        rows = f"{first}:{first + MOST_SAMPLES}"
+    try:
+        inspected = inspect_file(path, found, request.inputs, request.output, request.dt, parse_rows(rows))
+    except RecordError:
+        # The preview states the problems of the file.
+        return None
+    if not inspected.facts.facts:
+        return None
+    document = inspected.as_document()
+    return {"rows": rows, "choice": document["choice"], "facts": document["facts"]}
 
 
 def _check_readable(found: "Preview", path: str) -> None:

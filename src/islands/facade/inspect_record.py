@@ -30,6 +30,9 @@ from islands.io.records.table import Columns, Table
 from islands.io.records.table_reading import read_table
 from islands.io.records.validation import MIN_SAMPLES, check_choice
 
+#: Columns that are read to choose inputs and output, at most.
+_MOST_COLUMNS = 32
+
 #: Remark on a file without a sampling time.
 _NO_SAMPLING_TIME = "The sampling time is unknown: the facts count a sample as one second."
 
@@ -75,8 +78,26 @@ def inspect_record(
     """
     if isinstance(record, Dataset):
         return _inspect_dataset(record if rows is None else record[rows])
+    return inspect_file(record, preview(record, reading), inputs, output, dt, rows, reading)
+
+
+def inspect_file(
+    record: str | Path,
+    found: Preview,
+    inputs: Sequence[str] = (),
+    output: str | None = None,
+    dt: float | None = None,
+    rows: slice | None = None,
+    reading: ReadingOptions = DEFAULT_READING,
+) -> RecordInspection:
+    """Describe a file as `inspect_record` does, with its preview.
+
+    Raises
+    ------
+    RecordError
+        As in `inspect_record`.
+    """
     inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
-    found = preview(record, reading)
     table, file = open_record(record, reading), Path(record).name
     if inputs and output is not None:
         sources = [find_column(name, table.names) for name in inputs]
@@ -114,7 +135,8 @@ class _FileInspection:
     reading: ReadingOptions
 
     def inspect(self, inputs: tuple[str, ...], output: str | None) -> RecordInspection:
-        read = self._read()
+        output = output if output is None else find_column(output, self.table.names)
+        read = self._read(inputs, output)
         values = {name: columns.numbers[name] for name, columns in read.items()}
         size = len(values[output]) if output in values else self._most_common_length(values)
         usable = {
@@ -148,12 +170,15 @@ class _FileInspection:
             record,
         )
 
-    def _read(self) -> Mapping[str, Columns]:
-        """Return every column that has numbers, over the chosen rows."""
+    def _read(self, inputs: tuple[str, ...], output: str | None) -> Mapping[str, Columns]:
+        """Return the columns that are chosen, or may be, over the chosen rows."""
+        names = [column.name for column in self.found.columns if column.samples]
+        chosen = {self.found.time, output, *(find_column(name, self.table.names) for name in inputs)}
+        first = names[:_MOST_COLUMNS]
         read = {}
-        for column in self.found.columns:
-            if column.samples:
-                read[column.name] = self.table.read((column.name,), self.rows)
+        for name in names:
+            if name in chosen or (name in first and (output is None or not inputs)):
+                read[name] = self.table.read((name,), self.rows)
         return read
 
     @staticmethod

@@ -20,7 +20,6 @@ from islands.data.dataset import Dataset
 from islands.data.loops import has_loops, loop_starts, measure_area
 from islands.inspection.blocks import assign_blocks, resample, sum_blocks
 from islands.inspection.fact import Fact
-from islands.systems.hysteresis_operators import play
 
 #: Samples of a loop and of a record that are compared, about.
 _LOOP_SAMPLES, _SAMPLES = 100, 6000
@@ -169,17 +168,22 @@ def _predict(record: Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     filtered = [u, *(_filter(u, constant) for constant in _TIME_CONSTANTS)]
     lagged = [np.concatenate([np.full(lag, u[0]), u[:-lag]]) for lag in (1, 2, 4, 8)]
     smooth = [signal**power for signal in filtered + lagged for power in range(1, 1 + _POWERS)]
-    plays = []
-    for width in _WIDTHS:
-        output = np.empty_like(u)
-        play(u, width, output)
-        plays += [output]
+    plays = [_apply_play(u, width) for width in _WIDTHS]
     trend = np.linspace(-1.0, 1.0, u.size)
     columns = np.array([np.ones(u.size), trend, *smooth, *plays])
     scale = np.sqrt(np.mean(columns**2, axis=1))
     columns /= np.where(scale > 0.0, scale, 1.0)[:, None]
     y = (record.y - record.y.mean()) / record.y.std()
     return _measure_errors(columns[: -len(plays)], y), _measure_errors(columns, y)
+
+
+def _apply_play(u: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+    """Apply a play operator. For some thousand samples, loading the compiled kernel would take longer."""
+    output, at = [], float(u[0])
+    for value in u.tolist():
+        at = max(min(at, value + width), value - width)
+        output.append(at)
+    return np.array(output)
 
 
 def _filter(u: NDArray[np.float64], constant: float) -> NDArray[np.float64]:

@@ -39,6 +39,24 @@ function makeColumnTable({ preview }, spec) {
   );
 }
 
+/** Facts that are shown only if they state a problem. */
+const ONLY_PROBLEMS = ["quantisation", "saturation", "levels"];
+
+/** List the facts about the record; data sets of earlier versions have none. */
+function describeInspection(inspection) {
+  if (!inspection) return [];
+  const shown = inspection.facts.filter(({ name, value }) => value || !ONLY_PROBLEMS.includes(name));
+  const title = `Facts about ${inspection.choice.inputs.join(", ")} and ${inspection.choice.output}`;
+  return [
+    el(
+      "details",
+      {},
+      el("summary", {}, inspection.rows ? `${title}, samples ${inspection.rows}` : title),
+      el("ul", {}, ...shown.map(({ sentence }) => el("li", {}, sentence))),
+    ),
+  ];
+}
+
 function describeDataset(dataset, spec) {
   const { preview } = dataset;
   return [
@@ -50,6 +68,7 @@ function describeDataset(dataset, spec) {
     ]),
     ...preview.warnings.map((warning) => el("p", { class: "complaint" }, warning)),
     makeScrollable("Columns of the data set", makeColumnTable(dataset, spec)),
+    ...describeInspection(preview.inspection),
   ];
 }
 

@@ -10,6 +10,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from islands.errors import RecordError
@@ -208,3 +209,18 @@ def test_service_answers_while_two_files_at_a_time_are_inspected(serve):
         for upload in uploads:
             upload.join()
         assert len(service.client.get("/v1/datasets").json()["items"]) == 4
+
+
+@pytest.mark.ci
+def test_the_facts_of_a_long_record_are_those_of_its_middle(tmp_path):
+    rng = np.random.default_rng(0)
+    np.savez(tmp_path / "long.npz", u=rng.random(120_000), y=rng.random(120_000), dt=0.01)
+    found = inspect(tmp_path / "long.npz")["inspection"]
+    assert found["rows"] == "10000:110000"
+    assert found["facts"][0]["value"] == 100_000
+
+
+@pytest.mark.ci
+def test_a_file_without_a_record_has_no_facts(tmp_path):
+    np.savez(tmp_path / "one.npz", y=np.random.default_rng(0).random(100), dt=0.01)
+    assert inspect(tmp_path / "one.npz")["inspection"] is None
