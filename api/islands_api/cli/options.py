@@ -30,6 +30,10 @@ Inputs = Annotated[
     list[str], typer.Option("--input", help="Input column; repeat it, or separate by commas, for several.")
 ]
 Output = Annotated[str, typer.Option("--output", help="Output column.")]
+Outputs = Annotated[
+    list[str],
+    typer.Option("--output", help="Output column; several, as inputs, for a model that couples them."),
+]
 SamplingTime = Annotated[
     float | None, typer.Option("--dt", help="Sampling time in seconds, if the record has no time column.")
 ]

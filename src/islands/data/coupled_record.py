@@ -1,6 +1,6 @@
 """Record of several outputs of one system, which share the inputs and the time grid."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,25 +34,17 @@ class CoupledRecord:
     records: tuple[Dataset, ...]
 
     def __post_init__(self) -> None:
-        names = self.output_names
-        if len(names) < 2:
-            raise RecordError(f"a coupled record has at least two outputs, got {', '.join(names) or 'none'}")
+        check_outputs(self.records[0].input_names if self.records else (), self.output_names)
         first = self.records[0]
-        inputs = {parse_channel_name(name).base for name in first.input_names}
         for record in self.records:
-            name = record.output_name
-            if names.count(name) > 1:
-                raise RecordError(f"the output {name} is given twice: name each output once")
-            if name in inputs:
-                raise RecordError(f"{name} is an input and an output: remove one of them")
             if (record.input_names, record.dt, record.segments) != (
                 first.input_names,
                 first.dt,
                 first.segments,
             ) or not np.array_equal(record.u, first.u):
                 raise RecordError(
-                    f"the records of {first.output_name} and {name} differ in their inputs, segments or "
-                    "sampling time: read all outputs with the same options"
+                    f"the records of {first.output_name} and {record.output_name} differ in their inputs, "
+                    "segments or sampling time: read all outputs with the same options"
                 )
 
     @property
@@ -126,6 +118,46 @@ class CoupledRecord:
         return self.map(
             lambda record: skip_missing_outputs(replace(record, y=np.where(missing, np.nan, record.y)))
         )
+
+
+def check_outputs(inputs: Sequence[str], outputs: Sequence[str]) -> None:
+    """Check that there are several outputs, each named once, and none of them is an input.
+
+    Raises
+    ------
+    RecordError
+        The message names the column.
+    """
+    if len(outputs) < 2:
+        raise RecordError(f"a coupled record has at least two outputs, got {', '.join(outputs) or 'none'}")
+    bases = {parse_channel_name(name).base for name in inputs}
+    for name in outputs:
+        if outputs.count(name) > 1:
+            raise RecordError(f"the output {name} is given twice: name each output once")
+        if name in bases:
+            raise RecordError(f"{name} is an input and an output: remove one of them")
+
+
+def couple(record: Dataset, outputs: int) -> CoupledRecord:
+    """Return the coupled record of a record whose last inputs are the outputs after the first.
+
+    Reading all outputs at once cuts the record at the gaps of every one.
+
+    Parameters
+    ----------
+    record : Dataset
+    outputs : int
+        Number of outputs, at least two.
+    """
+    first = record.inputs - outputs + 1
+    single = record.first_inputs(first)
+    others = [
+        replace(single, y=column, output_name=name, output_unit=unit)
+        for column, name, unit in zip(
+            record.u.T[first:], record.input_names[first:], record.input_units[first:], strict=True
+        )
+    ]
+    return CoupledRecord((single, *others))
 
 
 def split_coupled(

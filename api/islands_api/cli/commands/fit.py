@@ -2,7 +2,7 @@
 
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,16 +15,20 @@ from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.model.candidate_library import LIBRARIES
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, progress
+from islands_api.cli.coupled_run import couple_data, coupled_options, join_columns, show_coupled
 from islands_api.cli.output_folder import check_folder, show_result
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
+
+#: Default libraries.
+ONE_OUTPUT, SEVERAL_OUTPUTS = "phi-polynomial", "polynomial"
 
 
 @with_reading_options
 def fit(
     records: options.Records,
     inputs: options.Inputs,
-    output_column: options.Output,
+    output_columns: options.Outputs,
     out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
@@ -35,7 +39,14 @@ def fit(
             "--validation", help="FILE, FRACTION of the record's end (default 0.25), or START:STOP."
         ),
     ] = None,
-    library: Annotated[str, typer.Option("--library", help=" or ".join(LIBRARIES))] = "phi-polynomial",
+    library: Annotated[
+        str | None,
+        typer.Option(
+            "--library",
+            help=f"{' or '.join(LIBRARIES)}. "
+            f"By default {ONE_OUTPUT}, and {SEVERAL_OUTPUTS} for several outputs.",
+        ),
+    ] = None,
     degree: Annotated[
         int | None, typer.Option("--degree", help="By default the value of the library.")
     ] = None,
@@ -71,29 +82,41 @@ def fit(
 ) -> None:
     """Fit small models to recordings of a system by subset selection and least squares, and assess them."""
     check_folder(out, force)
-    recordings = Recordings(records, options.columns(inputs), output_column, dt, reading)
+    outputs = options.columns(output_columns)
+    names, output_column = join_columns(options.columns(inputs), outputs)
+    recordings = Recordings(records, names, output_column, dt, reading)
     compile_kernels()
     with progress("fit") as show:
         show("reading", 0.0)
         data = recordings.read(rows)
         held_out = recordings.read_held_out(validation, rows)
         began = perf_counter()
-        result = islands.fit(
-            data,
-            validation=held_out,
-            library=library,
-            degree=degree,
-            lags=lags,
-            max_terms=max_terms,
-            constraints=constraints,
-            estimator=estimator,
-            average=average,
-            feedthrough=feedthrough,
-            shooting=shooting,
-            certificate=certificate,
-            seed=seed,
-            progress=show,
-        ).with_wall_time(perf_counter() - began)
-        show("figures", 1.0)
-        result.save(out)
-    show_result(result, out)
+        given: dict[str, Any] = {
+            "library": library,
+            "degree": degree,
+            "lags": lags,
+            "max_terms": max_terms,
+            "constraints": constraints,
+            "estimator": estimator,
+            "average": average,
+            "feedthrough": feedthrough,
+            "shooting": shooting,
+            "certificate": certificate,
+            "seed": seed,
+            "progress": show,
+        }
+        if len(outputs) > 1:
+            pair = couple_data(data, held_out, len(outputs))
+            coupled = islands.fit_coupled(pair[0], validation=pair[1], **coupled_options(given))
+            show("figures", 1.0)
+            coupled.save(out)
+        else:
+            given["library"] = library or ONE_OUTPUT
+            result = islands.fit(data, validation=held_out, **given)
+            result = result.with_wall_time(perf_counter() - began)
+            show("figures", 1.0)
+            result.save(out)
+    if len(outputs) > 1:
+        show_coupled(coupled, out)
+    else:
+        show_result(result, out)

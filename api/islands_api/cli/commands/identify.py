@@ -9,14 +9,19 @@ from islands.errors import SettingsError, lookup
 from islands.io.records import fingerprint
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands_api.cli import options
+from islands_api.cli.coupled_run import couple_data, identify_several, join_columns
 from islands_api.cli.identify_run import RunOptions, load_run, run
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.record_options import with_reading_options
+from islands_api.cli.recordings import Recordings
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, with_search_options
 from islands_service.engines import ENGINES
 
 #: Options of the run rather than of the search: allowed with ``--resume``.
 RUN_OPTIONS = ("resume", "engine", "ray_address", "wall_time", "verbose")
+
+#: Preset for several outputs, if none is given.
+COUPLED_PRESET = "narx"
 
 
 @with_reading_options
@@ -25,7 +30,10 @@ def identify(
     context: typer.Context,
     records: options.RecordsOrNone = None,
     inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column; repeatable.")] = None,
-    output_column: Annotated[str | None, typer.Option("--output", help="Output column.")] = None,
+    output_columns: Annotated[
+        list[str] | None,
+        typer.Option("--output", help="Output column; several, as inputs, for a model that couples them."),
+    ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
@@ -74,9 +82,22 @@ def identify(
         _check_resume(context)
         run(run_options, resume, *load_run(resume))
     else:
-        if not records or not inputs or output_column is None or out is None:
+        outputs = options.columns(output_columns or [])
+        if not records or not inputs or not outputs or out is None:
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
         check_folder(out, force)
+        names, output_column = join_columns(options.columns(inputs), outputs)
+        if len(outputs) > 1:
+            if test is not None or wall_time is not None:
+                raise SettingsError("--test and --wall-time are for one output: leave them out")
+            recordings = Recordings(records, names, output_column, dt, reading)
+            data = couple_data(
+                recordings.read(rows), recordings.read_held_out(validation, rows), len(outputs)
+            )
+            source = context.get_parameter_source("preset")
+            preset = search.preset if source is not None and source.name == "COMMANDLINE" else COUPLED_PRESET
+            identify_several(run_options, out, data, preset, search.seed, search.changes)
+            return
         paths = [str(path.resolve()) for path in records]
         held_out = {"validation": validation, "test": test}
         files = {
@@ -89,7 +110,7 @@ def identify(
             **held_out,
             **files,
             "sha256": {path: fingerprint(path) for path in (*paths, *files.values())},
-            "inputs": options.columns(inputs),
+            "inputs": names,
             "output": output_column,
             "dt": dt,
             "rows": rows,

@@ -7,8 +7,10 @@ import typer
 
 from islands.io.export import EXPORTS, FILE_EXPORTS, export, write_export
 from islands.io.export.closed_form import closed_form
+from islands.io.export.coupled import export_coupled
 from islands.io.export.extension import EXTENDED_EXPORTS
 from islands_api.cli import options
+from islands_api.cli.coupled_run import read_coupled
 
 
 def show(
@@ -23,10 +25,13 @@ def show(
 
     Equations: plain text, LaTeX, MathML. Programs: Python, C, MATLAB. Blocks: FMU of
     FMI 3.0 and 2.0, Simulink S-function, MATLAB System, Modelica. An extended
-    simulation with a closed form is exported like a model.
+    simulation with a closed form is exported like a model. A model of several outputs
+    has the formats plain, latex, mathml, python, c, matlab and json.
     """
-    extended = options.extended(model)
-    if extended is not None and kind in EXTENDED_EXPORTS:
+    coupled, extended = read_coupled(model), options.extended(model)
+    if coupled is not None:
+        text = export_coupled(coupled, kind)
+    elif extended is not None and kind in EXTENDED_EXPORTS:
         text = EXTENDED_EXPORTS[kind](extended)
     else:
         chosen = options.model(model) if extended is None else closed_form(extended)

@@ -24,6 +24,7 @@ from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output
+from islands_api.cli.coupled_run import read_coupled, read_warm_up, simulate_coupled
 from islands_api.cli.record_options import with_reading_options
 
 
@@ -40,8 +41,8 @@ def simulate(
         list[str] | None,
         typer.Option("--input", help="Input column; by default that of the model."),
     ] = None,
-    output_column: Annotated[
-        str | None, typer.Option("--output", help="Output column; by default that of the model.")
+    output_columns: Annotated[
+        list[str] | None, typer.Option("--output", help="Output column; by default that of the model.")
     ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
@@ -72,6 +73,18 @@ def simulate(
 
     For a model of a result folder, the errors on the validation data are those of the result.
     """
+    outputs = options.columns(output_columns or [])
+    coupled = read_coupled(model)
+    if coupled is not None:
+        if mode != "free-run" or bands is not None:
+            raise SettingsError("a model of several outputs has free runs only: leave out --mode and --bands")
+        first = read_warm_up(model) if warm_up is None else warm_up
+        columns = (options.columns(inputs or []), outputs)
+        simulate_coupled(coupled, record, *columns, dt, parse_rows(rows), reading, first, out)
+        return
+    if len(outputs) > 1:
+        raise SettingsError(f"the model has one output, got {', '.join(outputs)}: give one --output")
+    output_column = outputs[0] if outputs else None
     extended = options.extended(model)
     if bands is not None and (mode != "free-run" or extended is not None):
         raise SettingsError("--bands are for free runs of models of a result folder")

@@ -6,7 +6,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from islands.data.averaging import AUTO, average_samples
-from islands.data.coupled_record import CoupledRecord, split_coupled
+from islands.data.coupled_record import CoupledRecord, check_outputs, couple, split_coupled
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError
@@ -19,7 +19,7 @@ from islands.facade.coupled.coupled_result import CoupledResult
 from islands.facade.coupled.coupled_selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
 from islands.facade.fit import fit
-from islands.facade.identify import identify, make_trial_library
+from islands.facade.identify import SearchCallback, identify, make_trial_library
 from islands.facade.rate_selection import TrialLibrary, select_rate
 from islands.facade.results.result import Result
 from islands.facade.setting_changes import SettingChanges
@@ -122,6 +122,7 @@ def identify_coupled(
     refine_together: bool = True,
     preset: str = "narx",
     seed: int = 0,
+    progress: SearchCallback | None = None,
     stage: ProgressCallback = ignore_progress,
     engine: Engine | Ray | str | None = None,
     **changes: Unpack[SettingChanges],
@@ -138,6 +139,8 @@ def identify_coupled(
         An entry of ``PRESETS``.
     seed : int
         Seed of the random generator; the same seed gives the same result, bit for bit.
+    progress : callable, optional
+        Called with the `SearchState` and the `Settings` after every epoch of the search of each output.
     stage : callable, optional
         Called with a message and the completed fraction of each stage.
     engine : str, Ray or Engine, optional
@@ -161,7 +164,7 @@ def identify_coupled(
     )
     _check_constraints(settings.constraints, chosen)
     chosen.setdefault("average", settings.average)
-    find = partial(identify, preset=preset, seed=seed, engine=engine)
+    find = partial(identify, preset=preset, seed=seed, progress=progress, engine=engine)
     trial = make_trial_library(settings)
     data = _read_data(record, inputs, outputs, dt, validation)
     return _couple(data, chosen, trial, settings.maximum_lag + 3, refine_together, stage, "stage", find)
@@ -189,15 +192,18 @@ def _read_data(
 ) -> tuple[CoupledRecord, CoupledRecord]:
     """Return estimation data and validation data, at the sampling time of the record."""
 
-    def read(data: Any) -> CoupledRecord:
+    def as_coupled(data: Any) -> CoupledRecord:
         if isinstance(data, CoupledRecord):
             return data
         if isinstance(data, Dataset):
             raise SettingsError("a Dataset has one output: give a CoupledRecord, one Dataset per output")
-        return CoupledRecord(tuple(as_record(data, None, dt, inputs=inputs, output=name) for name in outputs))
+        columns = [inputs] if isinstance(inputs, str) else list(inputs)
+        check_outputs(columns, outputs)
+        read = as_record(data, None, dt, inputs=[*columns, *outputs[1:]], output=outputs[0])
+        return couple(read, len(outputs))
 
-    held_out = validation if isinstance(validation, int | float) else read(validation)
-    return split_coupled(read(record), held_out)
+    held_out = validation if isinstance(validation, int | float) else as_coupled(validation)
+    return split_coupled(as_coupled(record), held_out)
 
 
 def _couple(

@@ -14,6 +14,7 @@ from islands.io.export.coupled import export_coupled
 from islands.io.export.coupled.coupled_document import coupled_json
 from islands.io.export.coupled.coupled_equations import coupled_equation
 from islands.io.result_folder import record_document
+from islands.io.result_text.text_layout import term_table
 from islands.simulation.coupled_free_run import CoupledSimulation, coupled_free_run
 from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.predictors import one_step_ahead
@@ -156,8 +157,9 @@ class CoupledResult:
         refined = "refined together on the free run" if self.refined else "those of the separate equations"
         lines = [
             f"{len(self.model.models)} outputs, {self.model.size} terms, parameters {refined}:",
-            *(f"    {line}" for line in self.equation.splitlines()),
-            f"    k counts samples of {self.validation.dt:g} s"
+            "",
+            *(line for single in self.model.models for line in [*term_table(single), ""]),
+            f"k counts samples of {self.validation.dt:g} s"
             + (f", means of {self.model.average} samples of the record." * (self.model.average > 1) or "."),
             "",
             "Validation data; all outputs are simulated together, from the inputs alone:",

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 
@@ -46,6 +47,18 @@ def write_simulation(
     columns = [simulated, *(band or ())]
     names = ("time", "y_sim", "y_low", "y_high")[: 1 + len(columns)]
     rows = zip(_round_times(record), *(column.tolist() for column in columns), strict=True)
+    _write(path, names, rows)
+
+
+def write_coupled_simulation(record: CoupledRecord, simulated: NDArray[np.float64], path: str | Path) -> None:
+    """Write the column ``time`` (s) and one column per output, such as ``level_cm_sim``.
+
+    Parameters
+    ----------
+    simulated : ndarray, shape (samples, outputs)
+    """
+    names = ("time", *(f"{name}_sim" for name in record.output_names))
+    rows = zip(_round_times(record.records[0]), *simulated.T.tolist(), strict=True)
     _write(path, names, rows)
 
 

@@ -1,0 +1,148 @@
+"""Several outputs on the command line: a coupled model is identified, fitted and simulated."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import islands
+from islands.data.averaging import AUTO
+from islands.data.channel_names import parse_channel_name
+from islands.data.compatibility import match_rate
+from islands.data.coupled_record import CoupledRecord, check_outputs, couple
+from islands.data.dataset import Dataset
+from islands.errors import SettingsError
+from islands.evolution.presets import resolve_settings
+from islands.io.export.coupled.coupled_document import is_coupled
+from islands.io.records import read_dataset
+from islands.io.records.reading_options import ReadingOptions
+from islands.io.records.writer import write_coupled_simulation
+from islands.simulation.coupled_free_run import coupled_free_run, match_coupled
+from islands.validation.metrics import metrics
+from islands_api.cli import options
+from islands_api.cli.console import compile_kernels, output, print_message, progress
+from islands_api.cli.identify_run import RunOptions
+from islands_api.cli.search_progress import search_progress
+from islands_service.engines import ENGINES
+
+
+def join_columns(inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[str], str]:
+    """Return the inputs and the output of one record with all columns, for `couple_data`.
+
+    Raises
+    ------
+    RecordError
+        With several outputs, one is given twice or is also an input.
+    """
+    if len(outputs) > 1:
+        check_outputs(inputs, outputs)
+    return [*inputs, *outputs[1:]], outputs[0]
+
+
+def couple_data(
+    data: Dataset, held_out: Dataset | float, outputs: int
+) -> tuple[CoupledRecord, CoupledRecord | float]:
+    """Return the coupled records of data that were read with `join_columns`."""
+    return couple(data, outputs), held_out if isinstance(held_out, float) else couple(held_out, outputs)
+
+
+def coupled_options(given: dict[str, Any]) -> dict[str, Any]:
+    """Return options of a single output as those of several: by default, other settings hold for these."""
+    return {
+        name: value
+        for name, value in given.items()
+        if value is not None and (name, value) != ("feedthrough", AUTO)
+    }
+
+
+def identify_several(
+    run_options: RunOptions,
+    folder: Path,
+    data: tuple[CoupledRecord, CoupledRecord | float],
+    preset: str,
+    seed: int,
+    changes: Mapping[str, Any],
+) -> None:
+    """Identify several outputs by evolution, write the result and print it."""
+    settings = resolve_settings(preset, changes)
+    compile_kernels()
+    with (
+        progress("identify") as show,
+        ENGINES[run_options.engine_for(settings.islands)](run_options.address, print_message) as engine,
+    ):
+        result = islands.identify_coupled(
+            data[0],
+            validation=data[1],
+            preset=preset,
+            seed=seed,
+            progress=search_progress(show),
+            stage=show,
+            engine=engine,
+            **coupled_options(dict(changes)),
+        )
+        show("figures", 1.0)
+        result.save(folder)
+    show_coupled(result, folder)
+
+
+def show_coupled(result: "islands.CoupledResult", folder: Path) -> None:
+    """Print the summary and the files of a result."""
+    output.print(str(result), markup=False)
+    files = "result.json, model.json, summary.txt, figures/, outputs/ (the result of each output)"
+    output.print(f"{folder}/: {files}", markup=False)
+
+
+def read_coupled(text: str) -> "islands.CoupledModel | None":
+    """Read the coupled model of a file or a result folder; return None if it is not one."""
+    if text.startswith(options.PUBLISHED) or not is_coupled(text):
+        return None
+    return islands.read_coupled_model(text)
+
+
+def read_warm_up(text: str) -> int | None:
+    """Return the warm-up of the errors of a result folder; None for a file."""
+    result = Path(text) / "result.json"
+    return int(json.loads(result.read_text(encoding="utf-8"))["warm_up"]) if result.is_file() else None
+
+
+def simulate_coupled(
+    model: "islands.CoupledModel",
+    record: Path,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    dt: float | None,
+    rows: slice | None,
+    reading: ReadingOptions,
+    warm_up: int | None,
+    out: Path | None,
+) -> None:
+    """Simulate all outputs of a record from its first samples; print the errors and write the outputs."""
+    if outputs and len(outputs) != len(model.output_names):
+        raise SettingsError(
+            f"the model has the outputs {', '.join(model.output_names)}: give as many --output, or none"
+        )
+    # A model of means reads an input one mean early, not one sample.
+    names = [parse_channel_name(name).base if model.average > 1 else name for name in model.input_names]
+    recorded = CoupledRecord(
+        tuple(
+            read_dataset(record, inputs or names, name, dt, rows, missing_output=True, options=reading)
+            for name in outputs or model.output_names
+        )
+    )
+    data = match_coupled(model, recorded.map(lambda each: match_rate(model, each)))
+    if data.dt != recorded.dt:
+        output.print(f"averaged {model.average} samples of {recorded.dt:g} s each: dt {data.dt:g} s")
+    compile_kernels()
+    simulation = coupled_free_run(model, data, warm_up)
+    if out is not None:
+        write_coupled_simulation(data, simulation.y, out)
+        output.print(f"{out}: {data.samples} rows", markup=False)
+    first = model.maximum_lag if warm_up is None else warm_up
+    output.print(f"free-run after a warm-up of {first} samples: {simulation.outcome}", markup=False)
+    for each, y in zip(data.records, simulation.y.T, strict=True):
+        errors = metrics(each.y, y)
+        output.print(
+            f"{each.output_name}: MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} "
+            f"{each.output_unit}".rstrip(),
+            markup=False,
+        )

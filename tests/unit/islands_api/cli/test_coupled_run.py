@@ -1,0 +1,68 @@
+"""Several outputs on the command line: fitted, simulated and shown; errors name the option."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from support.command_line import fail, succeed
+from support.coupled_systems import TWO_MASSES, make_coupled_record
+
+#: A search that takes a second.
+SMALL = ("--lags", "2", "--degree", "1", "--max-terms", "4", "--certificate", "0", "--average", "1")
+COLUMNS = ("--input", "u", "--output", "y1,y2")
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory):
+    path = tmp_path_factory.mktemp("record") / "masses.csv"
+    data = make_coupled_record(TWO_MASSES, samples=150)
+    with path.open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["t_s", "u", "y1", "y2"])
+        times = (0.1 * np.arange(data.samples)).round(3)
+        writer.writerows(np.column_stack([times, data.records[0].u, data.y]).tolist())
+    return path
+
+
+@pytest.mark.ci
+def test_a_fitted_model_is_simulated_and_shown(record, tmp_path) -> None:
+    folder = tmp_path / "result"
+    printed = succeed("fit", record, *COLUMNS, *SMALL, "--out", folder)
+    assert "* y2(k-1)" in printed
+    assert json.loads((folder / "result.json").read_text())["schema"] == "islands.coupled-result/1"
+    out = tmp_path / "simulated.csv"
+    printed = succeed("simulate", folder, record, "--out", out)
+    assert "y1: MAPE 0.0000 %  R2 1.00000" in printed
+    header, *rows = csv.reader(out.read_text().splitlines())
+    assert header == ["time", "y1_sim", "y2_sim"]
+    assert len(rows) == 150
+    for kind, start in (("plain", "y1(k) ="), ("c", "/*"), ("json", "{")):
+        assert succeed("show", folder, "--format", kind).startswith(start)
+    assert "no format 'fmu'" in fail("show", folder, "--format", "fmu")
+    assert "free runs only" in fail("simulate", folder, record, "--mode", "one-step")
+    assert "as many --output" in fail("simulate", folder, record, "--output", "y1")
+
+
+@pytest.mark.ci
+def test_several_outputs_are_identified_by_evolution(record, tmp_path) -> None:
+    settings = ("--population", "6", "--generations", "1", "--max-terms", "3", "--average", "1")
+    printed = succeed("identify", record, *COLUMNS, *settings, "--out", tmp_path / "result")
+    assert "2 outputs" in printed
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "message"),
+    [
+        ("fit", ("--output", "y1", "--output", "y1"), "y1 is given twice"),
+        ("fit", ("--output", "y1", "--output", "u"), "u is an input and an output"),
+        ("fit", ("--output", "y1,y2", "--constraints", "gain = 2"), "are for one output"),
+        ("fit", ("--output", "y1,y2", "--feedthrough", "yes"), "as u+1"),
+        ("identify", ("--output", "y1,y2", "--test", "0.2"), "are for one output"),
+        ("identify", ("--output", "y1,y1"), "y1 is given twice"),
+    ],
+)
+def test_options_for_one_output_are_refused(record, tmp_path, command, options, message) -> None:
+    assert message in fail(command, record, "--input", "u", *options, "--out", tmp_path / "result")
+    assert not (tmp_path / "result").exists()
