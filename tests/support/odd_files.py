@@ -147,6 +147,14 @@ def write_bomb(path):
     path.write_bytes(content.replace((1000).to_bytes(4, "little"), (2**31).to_bytes(4, "little")))
 
 
+#: Instruments write properties or a word into other columns of the first samples.
+PROPERTIES = table(
+    header="", times=[f"{('Interval,0.01', 'Points,60', ',')[min(k, 2)]},{t:.4f}" for k, t in enumerate(T)]
+)
+DESK = table(
+    'path,"time","In/u","Out/y"',
+    times=[f"{'' if k else 'trace_values'},{t:.4f}" for k, t in enumerate(T)],
+).replace('Out/y"\n', 'Out/y"\ntype,"x","y","y"\nunit,"s","V","-"\n')
 NAMELESS = table(header="")
 GERMAN = table("Zeit [s];Spannung [V];Weg [um]", ";", mark=",")
 INSTRUMENT = ("Model,MDO3024", "Firmware,1.26", "Interval,0.01", "Points,60", "Gain,1", "Zero,0", "")
@@ -204,6 +212,20 @@ ODD_FILES = (
         columns=("1", "2"),
     ),
     OddFile("LabVIEW", "r.txt", text(table("X_Value\tu_V\ty_um\tComment", "\t", above=LVM))),
+    OddFile(
+        "description in a spreadsheet",
+        "r.csv",
+        text(table("t_s;u_V;y_um", ";", mark=",", above=("Bench 3;;", ";;"))),
+    ),
+    OddFile("rows of types and units", "r.csv", text(DESK), columns=("In/u", "Out/y"), units=("V", "")),
+    OddFile(
+        "properties in the first samples",
+        "r.csv",
+        text(PROPERTIES),
+        columns=("c4", "c5"),
+        options={"header": False, "time": "c3"},
+        units=("", ""),
+    ),
     OddFile(
         "quoted fields",
         "r.csv",

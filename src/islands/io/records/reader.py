@@ -27,6 +27,8 @@ READERS: dict[str, Callable[[Path, ReadingOptions], Table]] = {
     ".txt": read_delimited,
     ".tsv": read_delimited,
     ".dat": read_delimited,
+    ".asc": read_delimited,
+    ".lvm": read_delimited,
     ".npz": read_archive,
     ".mat": read_matlab,
     ".parquet": read_parquet,

@@ -129,15 +129,18 @@ def check_values(columns: Columns, name: str, missing: bool = False) -> None:
     if missing or not absent.any():
         return
     sample = int(np.argmax(absent))
+    if absent.all():
+        raise RecordError(f"{rows.file}: column {name} has no values: choose another column")
     if absent[sample:].all():
         raise RecordError(
             f"{rows.place(sample, name)} and all below, to {rows.row(-1)}, are empty or NaN: the channels "
             "have unequal lengths; complete the column or select the rows that are complete"
         )
     count = int(absent.sum())
-    others = f", as are {count - 1} others of the column," if count > 1 else ""
+    others = f" and {count - 1} more of its cells" if count > 1 else ""
     raise RecordError(
-        f"{rows.place(sample, name)}{others} is empty or NaN: give --gaps interpolate to fill it or "
+        f"{rows.place(sample, name)}{others} {'are' if count > 1 else 'is'} empty or NaN: give --gaps "
+        "interpolate to fill it or "
         "--gaps split to leave the row out (library: gaps=), or select rows without it"
     )
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.io.records.sampling.recording import Recording
+from islands.io.records.sampling.recording import Recording, count_text
 
 
 def drop_repeated(recording: Recording, average: bool, steps: list[str]) -> Recording:
@@ -15,7 +15,7 @@ def drop_repeated(recording: Recording, average: bool, steps: list[str]) -> Reco
     equal = same & _rows_equal(recording.values[1:], recording.values[:-1])
     if equal.any():
         where = recording.rows.row(int(np.argmax(equal)) + 1)
-        steps.append(f"{int(equal.sum())} repeated rows are left out, the first is {where}")
+        steps.append(f"left out: {count_text(int(equal.sum()), 'repeated row')}, the first is {where}")
         recording = recording[np.concatenate(([True], ~equal))]
         same = np.diff(recording.stamps) == 0
     if not (average and same.any()):
@@ -26,7 +26,8 @@ def drop_repeated(recording: Recording, average: bool, steps: list[str]) -> Reco
     means = np.add.reduceat(recording.values, starts) / counts[:, None]
     where = recording.rows.row(int(np.argmax(same)) + 1)
     steps.append(
-        f"{int(same.sum())} rows of equal time are averaged with the row before, the first is {where}"
+        f"averaged with the row before: {count_text(int(same.sum()), 'row')} of equal time, the first "
+        f"is {where}"
     )
     return replace(recording[first], values=means)
 
@@ -43,7 +44,7 @@ def repair_missing(
     untimed = np.isnan(recording.stamps)
     if untimed.any():
         steps.append(
-            f"{int(untimed.sum())} rows without a time are left out, the first is "
+            f"left out: {count_text(int(untimed.sum()), 'row')} without a time, the first is "
             f"{_first(recording, untimed)}"
         )
         recording = recording[~untimed]
@@ -54,7 +55,7 @@ def repair_missing(
         return recording, np.zeros(max(len(recording.stamps) - 1, 0), np.bool_)
     if gaps == "split":
         steps.append(
-            f"{int(missing.sum())} rows with missing values are left out, the first is "
+            f"left out: {count_text(int(missing.sum()), 'row')} with missing values, the first is "
             f"{_first(recording, missing)}"
         )
         kept = np.flatnonzero(~missing)
@@ -65,9 +66,10 @@ def repair_missing(
     inner = slice(max(begin for begin, _ in ends), min(end for _, end in ends))
     outside = len(missing) - max(0, inner.stop - inner.start)
     if outside:
-        steps.append(f"{outside} rows before the first or after the last value of a column are left out")
+        rows = count_text(outside, "row")
+        steps.append(f"left out: {rows} before the first or after the last value of a column")
     steps.append(
-        f"{int(absent[inner].sum())} missing values are interpolated, the first is in "
+        f"interpolated: {count_text(int(absent[inner].sum()), 'missing value')}, the first in "
         f"{_first(recording, missing)}"
     )
     values = recording.values.copy()

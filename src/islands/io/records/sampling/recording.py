@@ -39,6 +39,11 @@ class Recording:
         return replace(self, rows=rows, stamps=self.stamps[kept], values=self.values[kept])
 
 
+def count_text(count: int, noun: str) -> str:
+    """Return a number with its noun: ``1 row``, ``2 rows``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class UniformRecording:
     """Uniformly sampled segments.

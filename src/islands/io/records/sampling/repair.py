@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.io.records.sampling.missing_values import drop_repeated, repair_missing
-from islands.io.records.sampling.recording import Recording, UniformRecording
+from islands.io.records.sampling.recording import Recording, UniformRecording, count_text
 from islands.io.records.sampling.resampling import resample
 from islands.io.records.sampling.uniform_grid import (
     GAP,
@@ -66,7 +66,7 @@ def make_uniform(
         values, step = _fill(recording, usual, found, steps)
         return UniformRecording(values, step * recording.seconds, _start(parts), (len(values),), tuple(steps))
     if found.any():
-        steps.append(f"{describe_gaps(recording.stamps, recording.rows, found)}, interpolated")
+        steps.append(f"interpolated: {describe_gaps(recording.stamps, recording.rows, found)}")
     return _resample_parts(parts, usual, dt, steps)
 
 
@@ -109,9 +109,11 @@ def _split(
     lone = [part for part in parts if len(part.stamps) < 2]
     parts = [part for part in parts if len(part.stamps) >= 2]
     where = recording.rows.row(int(np.argmax(breaks)) + 1)
-    steps.append(f"{int(breaks.sum())} gaps separate {len(parts)} segments, the first gap is before {where}")
+    gaps = count_text(int(breaks.sum()), "gap")
+    steps.append(f"split at {gaps} into {count_text(len(parts), 'segment')}, the first gap is before {where}")
     if lone:
-        steps.append(f"{len(lone)} single rows between gaps are left out, the first is {lone[0].rows.row(0)}")
+        rows = count_text(len(lone), "single row")
+        steps.append(f"left out: {rows} between gaps, the first is {lone[0].rows.row(0)}")
     if not parts:
         raise _gap_error(recording, breaks)
     if dt is not None:
@@ -164,10 +166,8 @@ def _fill(
             "rows, whose step is "
             f"{slope:.6g}: give --resample {slope * recording.seconds:.6g} as well (library: resample=)"
         )
-    steps.append(
-        f"{describe_gaps(stamps, recording.rows, found)}: {int(places[-1]) + 1 - len(stamps)} samples "
-        "are interpolated"
-    )
+    samples = count_text(int(places[-1]) + 1 - len(stamps), "sample")
+    steps.append(f"interpolated: {samples} in {describe_gaps(stamps, recording.rows, found)}")
     grid = np.arange(int(places[-1]) + 1)
     return np.column_stack([np.interp(grid, places, column) for column in recording.values.T]), step
 

@@ -24,6 +24,9 @@ _COMMENTS = "#%!"
 #: Lines of samples that decide where a table starts, and lines that may precede it.
 _SAMPLES, _MOST_LINES = 5, 300
 
+#: Labels in the first cell of a row of units.
+_UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
+
 _NO_HEADER = (
     "add a header line, for example t_s,u_V,y_um, or give --no-header for the names c1, c2, ... or "
     "--names a,b,c (library: header=False or names=)"
@@ -46,8 +49,8 @@ class TableStart:
         Index of the line after the header and the units.
     described : bool
         Whether lines with a description of the measurement precede the table.
-    has_units : bool
-        Whether a row of units follows the header.
+    units : int or None
+        Index of the row of units; None if there is none.
     """
 
     separator: str
@@ -55,7 +58,7 @@ class TableStart:
     names: tuple[str, ...]
     first: int
     described: bool
-    has_units: bool
+    units: int | None
 
 
 def find_table(lines: Sequence[str], file: str, options: ReadingOptions = DEFAULT_READING) -> TableStart:
@@ -97,13 +100,28 @@ def find_table(lines: Sequence[str], file: str, options: ReadingOptions = DEFAUL
     if first == len(lines) > start + 1:
         raise RecordError(f"{file}, line {start + 1}: is a quote never closed?")
     names = tuple(name.strip() for name in cells)
-    following = next((at for at in range(first, len(lines)) if lines[at].strip()), None)
-    units = [] if following is None else _read_units(lines[following], separator)
-    has_units = following is not None and len(units) == len(names)
-    _check_header(names, file, start + 1, has_units)
-    if following is not None and has_units:
-        names, first = tuple(map(append_unit, names, units)), following + 1
-    return TableStart(separator, start, names, first, start > top, has_units)
+    properties = _list_properties(lines, first, separator, len(names))
+    rows = {at: _read_units(lines[at], separator) for at in properties}
+    units = next((at for at, row in rows.items() if len(row) == len(names)), None)
+    _check_header(names, file, start + 1, units is not None)
+    if units is not None:
+        names = tuple(map(append_unit, names, rows[units]))
+    first = max([first, *(at + 1 for at in properties)])
+    return TableStart(separator, start, names, first, start > top, units)
+
+
+def _list_properties(lines: Sequence[str], first: int, separator: str, width: int) -> list[int]:
+    """Return the indices of the lines between header and samples: units, types and other words."""
+    found: list[int] = []
+    for at in range(first, min(len(lines), first + _SAMPLES)):
+        if not lines[at].strip():
+            continue
+        cells = _split(lines[at], separator)
+        filled = [cell for cell in cells if not is_missing(cell) or cell.strip() == "-"]
+        if len(cells) != width or not filled or any(is_number(cell) or kind_of(cell) for cell in filled):
+            return found
+        found.append(at)
+    return []  # the table contains text only
 
 
 def _find_without_header(lines: Sequence[str], top: int, file: str, given: tuple[str, ...]) -> TableStart:
@@ -121,7 +139,7 @@ def _find_without_header(lines: Sequence[str], top: int, file: str, given: tuple
             f"{file}, line {samples + 1} has {width} columns, and --names (library: names=) gives "
             f"{len(names)}: name all columns in their order"
         )
-    return TableStart(separator, None, names, samples, samples > top, False)
+    return TableStart(separator, None, names, samples, samples > top, None)
 
 
 def _read_row(lines: Sequence[str], at: int, separator: str) -> tuple[list[str], int]:
@@ -185,8 +203,23 @@ def _find_samples(lines: Sequence[str], top: int) -> tuple[str, int] | None:
                 and {len(row) for row in cells} == {len(cells[0])}
                 and all(map(_is_sample, cells))
             ):
-                return separator, at
+                return separator, _extend_upwards(lines, top, at, separator)
     return None
+
+
+def _extend_upwards(lines: Sequence[str], top: int, samples: int, separator: str) -> int:
+    """Return the first of the lines above the samples that has numbers in the same columns.
+
+    Instruments write properties or the word ``trace_values`` into other columns of the first samples.
+    """
+    cells = _split(lines[samples], separator)
+    numeric = [place for place, cell in enumerate(cells) if is_number(cell)]
+    while samples > top and len(numeric) > 1:
+        above = _split(lines[samples - 1], separator)
+        if len(above) != len(cells) or not all(is_number(above[place]) for place in numeric):
+            break
+        samples -= 1
+    return samples
 
 
 def has_samples(lines: Sequence[str]) -> bool:
@@ -216,22 +249,39 @@ def _find_header(lines: Sequence[str], top: int, samples: int, separator: str, f
         return top
     if not fitting or fitting[-1] != above[-1]:
         raise RecordError(
-            f"{file}, line {samples + 1} is the first sample, and the line above has no names of its {width} "
+            f"{file}, line {samples + 1} is the first sample, and no line above has the names of its {width} "
             f"columns: {_NO_HEADER}"
         )
-    is_units = len(_read_units(lines[fitting[-1]], separator)) == widths[fitting[-1]]
-    return fitting[-2] if is_units and len(fitting) > 1 and fitting[-2] == above[-2] else fitting[-1]
+    # The nearest line with different names; below it are rows of units, of types or of other properties.
+    adjacent = [at for at, other in zip(reversed(fitting), reversed(above), strict=False) if at == other]
+    rows = {at: [cell.strip() for cell in _split(_uncomment(lines[at]), separator)] for at in adjacent}
+    named = [
+        at
+        for at, cells in rows.items()
+        if all(cells)
+        and len(set(cells)) == len(cells)
+        and len(_read_units(lines[at], separator)) != len(cells)
+    ]
+    return named[0] if named else adjacent[0]
 
 
 def _read_units(line: str, separator: str) -> list[str]:
-    """Return the cells of a row of units without brackets; empty if it is not such a row."""
+    """Return the cells of a row of units without brackets; empty if it is not such a row.
+
+    The first cell may be a label: ``unit``.
+    """
     cells = [spell_unit(cell.strip().strip("[]()").strip()) for cell in _split(_uncomment(line), separator)]
+    if cells and cells[0].lower().rstrip(":") in _UNIT_LABELS:
+        cells[0] = ""
     units = [cell for cell in cells if cell not in ("", "-")]
     return cells if units and all(map(is_unit, units)) else []
 
 
 def _check_header(names: Sequence[str], file: str, line: int, has_units: bool) -> None:
-    """Refuse a line of numbers as a header. A few names of channels may be numbers: ``x-axis,1,2``."""
-    number = next((name for name in names if is_number(name)), None)
-    if number is not None and not has_units and (_is_sample(names) or all(map(is_number, names))):
-        raise RecordError(f"{file}, line {line} contains the number {number} instead of a name: {_NO_HEADER}")
+    """Refuse a line of numbers as a header. Numbers of channels are names: ``x-axis,1,2``."""
+    numbers = [name for name in names if is_number(name)]
+    channels = len(numbers) < len(names) and all(name.isdigit() and len(name) < 4 for name in numbers)
+    if numbers and not has_units and not (channels and not _is_sample(names)):
+        raise RecordError(
+            f"{file}, line {line} contains the number {numbers[0]} instead of a name: {_NO_HEADER}"
+        )

@@ -221,6 +221,6 @@ def _list_notes(file: str, start: TableStart, counted: str) -> tuple[str, ...]:
     if start.described:
         what, at = ("table", start.first) if start.header is None else ("header", start.header)
         notes.append(f"the {what} of {file} is {counted} {at + 1}; the lines above are ignored")
-    if start.has_units:
-        notes.append(f"{counted} {start.first} of {file} is read as the units of the columns")
+    if start.units is not None:
+        notes.append(f"{counted} {start.units + 1} of {file} is read as the units of the columns")
     return tuple(notes)

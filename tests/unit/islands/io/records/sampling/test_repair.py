@@ -51,7 +51,7 @@ def test_gaps_become_segments(tmp_path):
     record = read(tmp_path, gone(rows(), 50, 120, 121, 122), gaps="split")
     assert record.segments == (48, 69, 279)
     assert record.dt == pytest.approx(DT, rel=1e-9)
-    assert record.reading == ("2 gaps separate 3 segments, the first gap is before line 50",)
+    assert record.reading == ("split at 2 gaps into 3 segments, the first gap is before line 50",)
 
 
 def test_segments_may_begin_between_the_samples_of_the_grid(tmp_path):
@@ -66,19 +66,19 @@ def test_gaps_are_interpolated_on_the_grid(tmp_path):
     assert (record.samples, record.segments) == (400, (400,))
     assert record.u[48, 0] == pytest.approx((U[47] + U[49]) / 2, abs=1e-8)
     assert np.abs(record.y - Y).max() < 5e-3
-    assert "2 gaps, the longest of 0.04 before line 119: 4 samples are interpolated" in record.reading[0]
+    assert "interpolated: 4 samples in 2 gaps, the longest of 0.04 before line 119" in record.reading[0]
 
 
 def test_missing_values_are_named_interpolated_or_separate_segments(tmp_path):
     table = rows(u=blank(U, 100, 101), y=blank(Y, 300))
     message = refusal(tmp_path, table)
-    assert "line 102, column u_V, as are 1 others of the column, is empty or NaN: give --gaps" in message
+    assert "line 102, column u_V and 1 more of its cells are empty or NaN: give --gaps" in message
     filled = read(tmp_path, table, gaps="interpolate")
     assert np.abs(filled.u[:, 0] - U).max() < 2e-2
-    assert filled.reading == ("3 missing values are interpolated, the first is in line 102",)
+    assert filled.reading == ("interpolated: 3 missing values, the first in line 102",)
     split = read(tmp_path, table, gaps="split")
     assert split.segments == (100, 198, 99)
-    assert split.reading[0] == "3 rows with missing values are left out, the first is line 102"
+    assert split.reading[0] == "left out: 3 rows with missing values, the first is line 102"
 
 
 def test_an_output_that_may_be_missing_remains_missing(tmp_path):
@@ -92,7 +92,7 @@ def test_missing_values_at_the_ends_are_left_out(tmp_path):
     table = rows(u=blank(U, 0, 1, 399))
     record = read(tmp_path, table, gaps="interpolate")
     assert (record.samples, record.start) == (397, pytest.approx(0.02))
-    assert record.reading[0] == "3 rows before the first or after the last value of a column are left out"
+    assert record.reading[0] == "left out: 3 rows before the first or after the last value of a column"
 
 
 def test_a_column_without_values_is_refused(tmp_path):
@@ -131,7 +131,7 @@ def test_repeated_rows_are_left_out_and_other_rows_of_equal_time_averaged(tmp_pa
     assert "line 32, column t_s repeats the time stamp 0.29: give --resample" in refusal(tmp_path, doubled)
     record = read(tmp_path, doubled, gaps="split")
     assert np.array_equal(record.y, read(tmp_path, table).y)
-    assert record.reading == ("1 repeated rows are left out, the first is line 32",)
+    assert record.reading == ("left out: 1 repeated row, the first is line 32",)
     table[31] = table[30].rpartition(",")[0] + ",0.5"
     assert "repeats the time stamp" in refusal(tmp_path, table, gaps="split")
     averaged = read(tmp_path, table, resample=DT)
@@ -162,7 +162,7 @@ def test_resampling_does_not_cross_a_gap_unless_it_is_to_be_interpolated(tmp_pat
     assert len(split.segments) == 2
     whole = read(tmp_path, table, resample=0.02, gaps="interpolate")
     assert whole.samples == 200
-    assert "a gap of 0.31 before line 100, interpolated" in whole.reading[0]
+    assert "interpolated: a gap of 0.31 before line 100" in whole.reading[0]
 
 
 def test_steps_of_irregular_sampling_are_not_gaps(tmp_path):

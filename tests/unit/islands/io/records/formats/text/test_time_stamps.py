@@ -127,7 +127,7 @@ def test_a_missing_stamp_is_left_out_with_gaps(tmp_path):
     assert "line 22, column Timestamp is empty" in refusal(tmp_path, table(stamps), ["u"], "y")
     record = read(tmp_path, table(stamps), gaps="interpolate")
     assert (record.samples, record.u[20, 0]) == (SAMPLES, np.mean([19 % 7, 21 % 7]))
-    assert record.reading[0] == "1 rows without a time are left out, the first is line 22"
+    assert record.reading[0] == "left out: 1 row without a time, the first is line 22"
 
 
 def test_milliseconds_since_1970_are_recognised_by_their_size(tmp_path):
