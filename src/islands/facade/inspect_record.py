@@ -19,7 +19,7 @@ from islands.inspection.columns.record_inspection import (
     InspectedSampling,
     RecordInspection,
 )
-from islands.inspection.columns.stamp_regularity import TimeStamps, describe_stamps
+from islands.inspection.columns.stamp_regularity import NO_BREAKS, TimeStamps, describe_stamps
 from islands.inspection.record_facts import RecordFacts, measure_facts
 from islands.io.records.column_names import find_column, split_structures
 from islands.io.records.preview import ColumnPreview, Preview, preview
@@ -112,7 +112,7 @@ def _inspect_dataset(record: Dataset) -> RecordInspection:
         )
         for channel in channels(record)
     )
-    sampling = InspectedSampling(None, record.samples, record.dt, None, (), (), (), _count(None), "")
+    sampling = InspectedSampling(None, record.samples, record.dt, None, (), (), (), NO_BREAKS, "")
     choice = ColumnChoice(record.input_names, record.output_name, None, "Inputs and output are as given.")
     return RecordInspection("", columns, sampling, choice, measure_facts(record), (), "", record)
 
@@ -196,7 +196,7 @@ class _FileInspection:
             seconds = read[time].numbers[time] * self._scale(read[time], time)
             stamps = describe_stamps(seconds) if np.isfinite(seconds).all() else None
         if stamps is None:
-            return None, InspectedSampling(time, size, dt, None, (), (), (), _count(None), problem)
+            return None, InspectedSampling(time, size, dt, None, (), (), (), NO_BREAKS, problem)
         rows = read[str(time)].rows
         gaps, repeated, backward = (
             tuple(rows.row(sample) for sample in samples[:MOST_ROWS])
@@ -204,7 +204,7 @@ class _FileInspection:
         )
         dt = stamps.dt if dt is None else dt
         return stamps, InspectedSampling(
-            time, size, dt, stamps.jitter, gaps, repeated, backward, _count(stamps), problem
+            time, size, dt, stamps.jitter, gaps, repeated, backward, stamps.counts, problem
         )
 
     def _scale(self, columns: Columns, time: str) -> float:
@@ -281,12 +281,12 @@ class _FileInspection:
         if stamps is not None and stamps.breaks and not self.reading.gaps and self.reading.resample is None:
             words += ["--gaps", "split"]
         for name, value in self.reading.changes().items():
-            words += ["--no-header"] if name == "header" else [f"--{name}", _format_option(value)]
+            words += (
+                ["--no-header"]
+                if name == "header"
+                else [f"--{name}", ",".join(value) if isinstance(value, list) else str(value)]
+            )
         return shlex.join([*words, "--out", "result"])
-
-
-def _format_option(value: object) -> str:
-    return ",".join(value) if isinstance(value, list) else str(value)
 
 
 def _find_sampling_problem(found: Preview, dt: float | None) -> str:
@@ -295,14 +295,3 @@ def _find_sampling_problem(found: Preview, dt: float | None) -> str:
         return ""
     words = ("time", "--dt", "grid", "gap")
     return next((text for text in found.warnings if any(word in text for word in words)), "")
-
-
-def _count(stamps: TimeStamps | None) -> dict[str, int]:
-    if stamps is None:
-        return {"gaps": 0, "missing": 0, "repeated": 0, "backward": 0}
-    return {
-        "gaps": len(stamps.gaps),
-        "missing": stamps.missing,
-        "repeated": len(stamps.repeated),
-        "backward": len(stamps.backward),
-    }

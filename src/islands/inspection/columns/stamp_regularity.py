@@ -5,6 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+#: Numbers of rows of each kind, and of missing samples, of a uniform record.
+NO_BREAKS = {"gaps": 0, "missing": 0, "repeated": 0, "backward": 0}
+
 #: Step, relative to the usual one, from which on samples are missing.
 _GAP = 1.5
 
@@ -37,6 +40,16 @@ class TimeStamps:
     def breaks(self) -> tuple[int, ...]:
         """Samples that do not follow the one before by about one step."""
         return tuple(sorted({*self.gaps, *self.repeated, *self.backward}))
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of rows of each kind, and of missing samples."""
+        return {
+            "gaps": len(self.gaps),
+            "missing": self.missing,
+            "repeated": len(self.repeated),
+            "backward": len(self.backward),
+        }
 
 
 def describe_stamps(stamps: NDArray[np.float64]) -> TimeStamps | None:
