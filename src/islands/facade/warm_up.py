@@ -1,11 +1,17 @@
 """Compilation of all kernels before the first use."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
+from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.facade.fit import fit
 from islands.facade.identify import identify
 from islands.kernels.jit_cache import ready
+from islands.model.expression import Lagged
+from islands.model.model import make_model
+from islands.simulation.coupled_free_run import coupled_free_run
+from islands.simulation.coupled_model import CoupledModel
 from islands.systems.catalogue import make_record
 
 
@@ -32,3 +38,14 @@ def _use_all_kernels() -> None:
     fit(record, max_terms=3)
     for constraints in ("none", "hysteresis"):
         identify(record, population=10, generations=2, shooting=100, constraints=constraints)
+    _simulate_two_outputs(record)
+
+
+def _simulate_two_outputs(record: Dataset) -> None:
+    names = (record.output_name, "other")
+    equations = (
+        make_model([(Lagged(0), 0.5)], (*record.input_names, names[1 - place]), name)
+        for place, name in enumerate(names)
+    )
+    both = CoupledRecord((record, replace(record, output_name="other")))
+    coupled_free_run(CoupledModel(tuple(equations)), both)

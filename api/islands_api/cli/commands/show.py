@@ -7,7 +7,6 @@ import typer
 
 from islands.io.export import EXPORTS, FILE_EXPORTS, export, write_export
 from islands.io.export.closed_form import closed_form
-from islands.io.export.coupled import export_coupled
 from islands.io.export.extension import EXTENDED_EXPORTS
 from islands_api.cli import options
 from islands_api.cli.coupled_run import read_coupled
@@ -25,16 +24,14 @@ def show(
 
     Equations: plain text, LaTeX, MathML. Programs: Python, C, MATLAB. Blocks: FMU of
     FMI 3.0 and 2.0, Simulink S-function, MATLAB System, Modelica. An extended
-    simulation with a closed form is exported like a model. A model of several outputs
-    has the formats plain, latex, mathml, python, c, matlab and json.
+    simulation with a closed form is exported like a model, a model of several outputs
+    as one program or block.
     """
     coupled, extended = read_coupled(model), options.extended(model)
-    if coupled is not None:
-        text = export_coupled(coupled, kind)
-    elif extended is not None and kind in EXTENDED_EXPORTS:
+    if extended is not None and kind in EXTENDED_EXPORTS:
         text = EXTENDED_EXPORTS[kind](extended)
     else:
-        chosen = options.model(model) if extended is None else closed_form(extended)
+        chosen = coupled or (closed_form(extended) if extended is not None else options.model(model))
         if out is not None:
             write_export(chosen, kind, out)
             return

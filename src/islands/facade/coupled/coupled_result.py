@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from islands.data.coupled_record import CoupledRecord
 from islands.facade.results.result import Result
-from islands.io.export.coupled import export_coupled
+from islands.io.export import export
 from islands.io.export.coupled.coupled_document import coupled_json
 from islands.io.export.coupled.coupled_equations import coupled_equation
 from islands.io.result_folder import record_document
@@ -103,7 +103,7 @@ class CoupledResult:
 
     def export(self, kind: str = "python") -> str:
         """Return the coupled model as text in a format of ``COUPLED_EXPORTS``."""
-        return export_coupled(self.model, kind)
+        return export(self.model, kind)
 
     def save(self, folder: str | Path) -> Path:
         """Write ``result.json``, ``model.json``, ``summary.txt``, ``figures/`` and ``outputs/``.

@@ -44,8 +44,8 @@ FILE_EXPORTS: Mapping[str, Callable[[Model | CoupledModel], bytes]] = MappingPro
 )
 
 
-def export(model: Model, kind: str) -> str:
-    """Return a model as text in one of the formats of ``EXPORTS``.
+def export(model: Model | CoupledModel, kind: str) -> str:
+    """Return a model as text in a format of ``EXPORTS``, or of ``COUPLED_EXPORTS`` for several outputs.
 
     Raises
     ------
@@ -54,6 +54,8 @@ def export(model: Model, kind: str) -> str:
     """
     if kind in FILE_EXPORTS:
         raise SettingsError(f"the format {kind} is not text: write a file with --out or write_export")
+    if isinstance(model, CoupledModel):
+        return export_coupled(model, kind)
     lookup({**EXPORTS, **FILE_EXPORTS}, kind, "format")
     return EXPORTS[kind](model)
 
@@ -69,5 +71,4 @@ def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> No
     if kind in FILE_EXPORTS:
         Path(path).write_bytes(FILE_EXPORTS[kind](model))
         return
-    text = export_coupled(model, kind) if isinstance(model, CoupledModel) else export(model, kind)
-    Path(path).write_text(f"{text.rstrip()}\n", encoding="utf-8")
+    Path(path).write_text(f"{export(model, kind).rstrip()}\n", encoding="utf-8")

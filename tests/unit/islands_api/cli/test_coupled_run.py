@@ -40,7 +40,9 @@ def test_a_fitted_model_is_simulated_and_shown(record, tmp_path) -> None:
     assert len(rows) == 150
     for kind, start in (("plain", "y1(k) ="), ("c", "/*"), ("json", "{")):
         assert succeed("show", folder, "--format", kind).startswith(start)
-    assert "no format 'fmu'" in fail("show", folder, "--format", "fmu")
+    succeed("show", folder, "--format", "fmu", "--out", tmp_path / "masses.fmu")
+    assert (tmp_path / "masses.fmu").read_bytes()[:2] == b"PK"
+    assert "write a file with --out" in fail("show", folder, "--format", "fmu")
     assert "free runs only" in fail("simulate", folder, record, "--mode", "one-step")
     assert "as many --output" in fail("simulate", folder, record, "--output", "y1")
 
