@@ -38,18 +38,22 @@ class Result(RankedModels[FittedModel]):
 
     def save(self, folder: str | Path) -> Path:
         """Write ``result.json``, the models, the figures of the recommended model, and the texts."""
+        from islands.figures.model_responses import RESPONSES, draw_responses  # noqa: PLC0415
         from islands.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
         from islands.figures.style import save  # noqa: PLC0415
 
         folder = Path(folder)
         figures = folder / "figures"
         figures.mkdir(parents=True, exist_ok=True)
-        # An earlier result in the folder may have had a loop.
-        (figures / "loop.svg").unlink(missing_ok=True)
+        # An earlier result in the folder may have had a loop or an equilibrium.
+        for name in ("loop", *RESPONSES):
+            (figures / f"{name}.svg").unlink(missing_ok=True)
         for kind in model_figures(self.search_result):
             save(self.best.plot(kind), figures / f"{kind}.svg")
         for name in search_figures(self.search_result):
             save(SEARCH_FIGURES[name](self.search_result), figures / f"{name}.svg")
+        for name, figure in draw_responses(self.best.model, self.search_result.split.estimation).items():
+            save(figure, figures / f"{name}.svg")
         write_result(self.search_result, folder)
         return folder
 
