@@ -106,7 +106,7 @@ class ResultComparison:
 def _write(value: object) -> str:
     if not isinstance(value, float):
         return str(value)
-    return f"{value:.4g}" if isfinite(value) else "diverged"
+    return f"{value:.5g}" if isfinite(value) else "diverged"
 
 
 def compare_models(
