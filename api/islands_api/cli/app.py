@@ -32,6 +32,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "correction.",
         "simulate": "Simulate a model on a record. A free run needs only the first samples of the output.",
         "show": "Show or write a model as an equation, a program, a block for a simulator, or JSON.",
+        "examples": "Records to try the commands on: list them, copy them.",
         "demo": "Identify the record of the paper's case 1 and compare the models with those of the paper.",
         "bench": "Measure evaluations, kernels and whole searches on this machine, which should be otherwise "
         "idle.",

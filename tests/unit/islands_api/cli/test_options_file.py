@@ -24,7 +24,7 @@ def match(group, command, table):
 
 def test_options_are_matched_to_parameters_by_name(group):
     found = match(group, "fit", {"input": "u_V", "output": "y_um", "max-terms": 3, "no-header": True})
-    assert found == {"inputs": ["u_V"], "output_column": "y_um", "max_terms": 3, "reading_header": True}
+    assert found == {"inputs": ["u_V"], "output_columns": ["y_um"], "max_terms": 3, "reading_header": True}
 
 
 def test_the_table_of_a_group_has_tables_of_its_commands(group):
