@@ -31,19 +31,35 @@ def find_model_file(path: str | Path) -> Path:
     Raises
     ------
     ModelError
-        The folder has no ``result.json``, or it is damaged.
+        The folder has no ``result.json``, it is damaged, or it is of several outputs.
     """
     path = Path(path)
     if not path.is_dir():
         return path
     result = path / "result.json"
     document = _read_object(result)
+    check_single_output(document, path)
     try:
         # Results of earlier versions recommend no model.
         rank = int(document.get("recommended", {"rank": 1})["rank"])
     except (ValueError, KeyError, TypeError) as error:
         raise _damaged(result, error) from error
     return path / "models" / f"{rank:02d}.json"
+
+
+def check_single_output(document: Mapping[str, Any], folder: Path) -> None:
+    """Check that ``result.json`` is the result of one output.
+
+    Raises
+    ------
+    ModelError
+        It is a result of several outputs; the message names their folders.
+    """
+    if str(document.get("schema", "")).startswith("islands.coupled-result/"):
+        raise ModelError(
+            f"{folder} has a model of several outputs, which islands simulate, islands show and "
+            f"read_coupled_model take: give the result of one output, as {folder / 'outputs' / '1-NAME'}"
+        )
 
 
 def read_error_measurement(model_file: str | Path) -> ErrorMeasurement | None:

@@ -15,7 +15,7 @@ from islands.facade.results.notebook_html import render_html
 from islands.facade.results.ranked_models import RankedModels, write_validation_key
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import read_model
-from islands.io.result_models import read_shooting_interval
+from islands.io.result_models import check_single_output, read_shooting_interval
 from islands.model.expression import Primitive
 from islands.model.model import Model
 from islands.model.primitives import PRIMITIVES
@@ -142,6 +142,8 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
         raise ModelError(f"{folder} has no result.json: give the folder of a result") from error
     except (OSError, ValueError) as error:
         raise ModelError(f"{file} cannot be read ({error})") from error
+    if isinstance(document, dict):
+        check_single_output(document, folder)
     try:
         entries = document["models"]
         models = [

@@ -6,10 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from islands.data.averaging import average_samples
 from islands.data.coupled_record import CoupledRecord
-from islands.errors import RecordError, SettingsError
+from islands.data.dataset import join
+from islands.errors import ModelError, RecordError, SettingsError
 from islands.facade.coupled.coupled_identification import fit_coupled, identify_coupled
+from islands.facade.results.saved_result import read_result
 from islands.io.export.coupled.coupled_document import read_coupled_model
+from islands.io.result_models import find_model_file
 from islands.simulation.coupled_free_run import coupled_free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 
@@ -56,7 +60,32 @@ def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> Non
             json.loads((folder / each["folder"] / "result.json").read_text())["schema"] == "islands.result/1"
         )
         assert (folder / "figures" / f"free-run-{each['folder'].removeprefix('outputs/')}.svg").exists()
-    assert "y1(k) = " in (folder / "summary.txt").read_text()
+    assert "y1(k) =" in (folder / "summary.txt").read_text()
+    with pytest.raises(ModelError, match="several outputs"):
+        read_result(folder)
+    with pytest.raises(ModelError, match="several outputs"):
+        find_model_file(folder)
+    assert read_result(folder / "outputs" / "1-y1").models[0].model.output_name == "y1"
+
+
+@pytest.mark.ci
+def test_a_model_of_means_simulates_the_record_before_averaging() -> None:
+    record = make_coupled_record(TWO_MASSES, samples=300, noise=0.01)
+    result = fit_coupled(record, **(FAST | {"degree": 1, "average": 2}))
+    assert (result.model.average, result.validation.dt) == (2, 0.2)
+    np.testing.assert_array_equal(
+        result.simulate(record).y,
+        result.simulate(record.map(lambda each: average_samples(each, 2))).y,
+    )
+
+
+@pytest.mark.ci
+def test_several_recordings_give_their_ends_to_the_validation_data() -> None:
+    records = [make_coupled_record(TWO_MASSES, samples=120, seed=seed) for seed in (1, 2)]
+    joined = CoupledRecord(tuple(join(each) for each in zip(*(r.records for r in records), strict=True)))
+    result = fit_coupled(joined, **(FAST | {"degree": 1}))
+    assert result.validation.records[0].segments == (30, 30)
+    assert result.metrics["y2"]["validation"]["free_run"].mape < 1e-6
 
 
 @pytest.mark.ci
