@@ -38,3 +38,29 @@ def lookup(table: Mapping[str, T], name: str, kind: str) -> T:
     if name not in table:
         raise SettingsError(f"unknown {kind} {name!r}: take one of {', '.join(table)}")
     return table[name]
+
+
+def check_at_least(least: int, **values: int) -> None:
+    """Check lower bounds of settings, which are given by name.
+
+    Raises
+    ------
+    SettingsError
+        A value is below the bound.
+    """
+    for name, value in values.items():
+        if value < least:
+            raise SettingsError(f"{name} is at least {least}, got {value}")
+
+
+def check_probabilities(**values: float) -> None:
+    """Check that settings, which are given by name, lie between 0 and 1.
+
+    Raises
+    ------
+    SettingsError
+        A value is not a probability.
+    """
+    for name, value in values.items():
+        if not 0.0 <= value <= 1.0:
+            raise SettingsError(f"{name} lies between 0 and 1, got {value}")

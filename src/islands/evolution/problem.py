@@ -74,7 +74,12 @@ def make_problem(
     if not settings.library:
         return Problem(record, settings)
     regressors = screen_candidates(
-        settings.library, settings.library_degree, settings.library_lags, record, settings.constraints
+        settings.library,
+        settings.library_degree,
+        settings.library_lags,
+        record,
+        settings.constraints,
+        settings.library_delays,
     )
     genes = {item: with_phi(item.expression) for item in regressors}
     admits = constraint(settings.constraints).admits

@@ -7,10 +7,11 @@ from typing import Any, TypeVar
 
 from islands.data.averaging import check_average
 from islands.data.input_lead import check_feedthrough
-from islands.errors import SettingsError, lookup
+from islands.errors import SettingsError, check_at_least, check_probabilities, lookup
 from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
+from islands.estimation.structure_selection.input_delays import check_delays
 from islands.evolution.gp.err_targets import ERR_TARGETS
 from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.gene_structure import STRUCTURES
@@ -107,6 +108,9 @@ class Settings:
         may insert its regressors. Empty for no library.
     library_degree, library_lags : int
         Degree and lags of the library.
+    library_delays : tuple of int
+        Dead times by which the library reads the inputs later, in samples of the record, before averaging:
+        one for all inputs, or one for each.
     swap_search : bool
         Whether a swap search over the library takes the place of the seeds of forward selection.
     from_library : float
@@ -176,6 +180,9 @@ class Settings:
     library: str = ""
     library_degree: int = 5
     library_lags: int = 3
+    library_delays: tuple[int, ...] = _option(
+        (), "Dead time in samples; repeat it for each input.", "--dead-time"
+    )
     swap_search: bool = False
     from_library: float = 0.0
     distinct: bool = False
@@ -200,11 +207,13 @@ class Settings:
     target_error: float = _option(0.0, "Stop after the epoch that reaches this RMSE, in the output's unit.")
 
     def __post_init__(self) -> None:
-        _at_least(1, population=self.population, max_terms=self.max_terms, shooting=self.shooting)
-        _at_least(0, generations=self.generations, max_height=self.max_height)
-        _at_least(1, tournament=self.tournament)
-        _probability(elite=self.elite, crossover=self.crossover, mutation=self.mutation, prune=self.prune)
-        _probability(high_level=self.high_level, outer=self.outer, from_library=self.from_library)
+        check_at_least(1, population=self.population, max_terms=self.max_terms, shooting=self.shooting)
+        check_at_least(0, generations=self.generations, max_height=self.max_height)
+        check_at_least(1, tournament=self.tournament)
+        check_probabilities(
+            elite=self.elite, crossover=self.crossover, mutation=self.mutation, prune=self.prune
+        )
+        check_probabilities(high_level=self.high_level, outer=self.outer, from_library=self.from_library)
         if not self.tolerance >= 0.0:
             raise SettingsError(f"the tolerance of pruning is not negative, got {self.tolerance}")
         fewest, most = self.initial_terms
@@ -220,6 +229,7 @@ class Settings:
             raise SettingsError("genes are made of primitives and back-shifts: give at least one of them")
         if self.library:
             get_library(self.library)
+        check_delays(self.library_delays)
         check_average(self.average)
         check_feedthrough(self.feedthrough)
         lookup(STRUCTURES, self.structure, "structure")
@@ -234,8 +244,8 @@ class Settings:
         self._check_islands()
 
     def _check_islands(self) -> None:
-        _at_least(1, islands=self.islands)
-        _at_least(0, max_evaluations=self.max_evaluations)
+        check_at_least(1, islands=self.islands)
+        check_at_least(0, max_evaluations=self.max_evaluations)
         if self.islands > MOST_ISLANDS:
             raise SettingsError(f"at most {MOST_ISLANDS} islands, got {self.islands}")
         if not 0.0 <= self.target_error < inf:
@@ -274,7 +284,7 @@ class Settings:
 
         A leaf from a library has a lag of the library, and variation can insert it at any depth.
         """
-        leaf = self.library_lags if self.library else 1
+        leaf = self.library_lags + max(self.library_delays, default=0) if self.library else 1
         return leaf + self.max_height * max(self.shifts, default=0)
 
     @property
@@ -286,15 +296,3 @@ class Settings:
 def get_text_type(setting: "Field[Any]") -> Any:
     """Return the type of a setting on the command line and over REST."""
     return setting.metadata.get("text_type") or setting.type
-
-
-def _at_least(least: int, **values: int) -> None:
-    for name, value in values.items():
-        if value < least:
-            raise SettingsError(f"{name} is at least {least}, got {value}")
-
-
-def _probability(**values: float) -> None:
-    for name, value in values.items():
-        if not 0.0 <= value <= 1.0:
-            raise SettingsError(f"{name} lies between 0 and 1, got {value}")

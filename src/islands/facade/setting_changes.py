@@ -33,6 +33,7 @@ class SettingChanges(TypedDict, total=False):
     library: str
     library_degree: int
     library_lags: int
+    library_delays: Sequence[int]
     swap_search: bool
     from_library: float
     distinct: bool

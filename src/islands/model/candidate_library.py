@@ -11,7 +11,7 @@ from types import MappingProxyType
 from islands.errors import SettingsError, lookup
 from islands.model.expression import Apply, Constant, Expression, Lagged
 from islands.model.model import canonical_order
-from islands.model.primitives import MUL, PRIMITIVES
+from islands.model.primitives import MUL, PRIMITIVES, SIGN, SUB
 from islands.model.regressor import Regressor, regressor
 
 #: Maximum number of candidates of a library; their Gram matrix takes 128 MB. Use evolution for more.
@@ -162,6 +162,55 @@ def phi_polynomial(degree: int, lags: int, inputs: int) -> list[Expression]:
     return terms
 
 
+def friction(degree: int, lags: int, inputs: int) -> list[Expression]:
+    """Return the monomials of `polynomial`, and terms of dry friction and of quadratic drag.
+
+    A term of friction is a direction times a monomial, of degree ``degree - 1`` at most, in y(k-1), y(k-2)
+    and the inputs u(k-1). A direction is the sign of y(k-1), of its increment, or of that of an input.
+    """
+    moving = [_increment(channel) for channel in range(inputs + 1)] if lags > 1 else []
+    directions: list[Expression] = [Apply(SIGN, (each,)) for each in (Lagged(0, 1), *moving)]
+    return _add_products(directions, degree, lags, inputs)
+
+
+def magnitude(degree: int, lags: int, inputs: int) -> list[Expression]:
+    """Return the monomials of `polynomial`, and terms of outflow, valves and rectifiers.
+
+    Such a term is the square root or the absolute value of y(k-1), y(k-2) or an input u(k-1), times a
+    monomial in the same signals, of degree ``degree - 1`` at most.
+    """
+    functions = [PRIMITIVES[name] for name in ("sqrt", "abs")]
+    sizes: list[Expression] = [Apply(each, (signal,)) for each in functions for signal in _near(lags, inputs)]
+    return _add_products(sizes, degree, lags, inputs)
+
+
+def _add_products(factors: list[Expression], degree: int, lags: int, inputs: int) -> list[Expression]:
+    levels = _monomials(_near(lags, inputs), degree - 1)
+    return polynomial(degree, lags, inputs) + [_product(head, *level) for head in factors for level in levels]
+
+
+def _near(lags: int, inputs: int) -> list[Lagged]:
+    return [
+        Lagged(0, 1),
+        *([Lagged(0, 2)] if lags > 1 else []),
+        *(Lagged(i, 1) for i in range(1, inputs + 1)),
+    ]
+
+
+def _increment(channel: int) -> Expression:
+    return Apply(SUB, (Lagged(channel, 1), Lagged(channel, 2)))
+
+
+def _count_friction(degree: int, lags: int, inputs: int) -> int:
+    directions = inputs + 2 if lags > 1 else 1
+    return full_set(degree, lags, lags, inputs) + directions * full_set(degree - 1, min(lags, 2), 1, inputs)
+
+
+def _count_magnitude(degree: int, lags: int, inputs: int) -> int:
+    sizes = 2 * (min(lags, 2) + inputs)
+    return full_set(degree, lags, lags, inputs) + sizes * full_set(degree - 1, min(lags, 2), 1, inputs)
+
+
 def _count_phi_polynomial(degree: int, lags: int, inputs: int) -> int:
     # Each of lags - 1 increments, with no direction or one of lags - 1, times each monomial of the levels.
     return 1 + inputs * (lags - 1) * lags * full_set(degree - 1, 1, 1, inputs)
@@ -201,6 +250,22 @@ LIBRARIES: Mapping[str, Library] = MappingProxyType(
             lags=3,
             constraints="none",
             description="all monomials of the lagged signals",
+        ),
+        "friction": Library(
+            friction,
+            _count_friction,
+            degree=3,
+            lags=3,
+            constraints="none",
+            description="the monomials, and directions of motion times monomials",
+        ),
+        "magnitude": Library(
+            magnitude,
+            _count_magnitude,
+            degree=3,
+            lags=3,
+            constraints="none",
+            description="the monomials, and square roots and absolute values times monomials",
         ),
     }
 )

@@ -13,6 +13,7 @@ from math import log
 from islands.data.dataset import Dataset, join
 from islands.errors import SettingsError
 from islands.estimation.forward_selection import forward_selection
+from islands.estimation.structure_selection.input_delays import delay_inputs, expand_delays
 from islands.model.candidate_library import candidates, count_inputs, largest_degree
 from islands.model.expression import Apply, Expression, Lagged
 from islands.model.model import canonical_order
@@ -27,11 +28,16 @@ _ROWS, _BLOCKS = 4000, 8
 
 
 def screen_candidates(
-    name: str, degree: int, lags: int, record: Dataset, constraints: str = "none"
+    name: str,
+    degree: int,
+    lags: int,
+    record: Dataset,
+    constraints: str = "none",
+    delays: Sequence[int] = (),
 ) -> tuple[Regressor, ...]:
     """Return the regressors of a library for a record, in canonical order.
 
-    Equal to `candidates` if the library of all inputs is not too large.
+    Equal to `candidates` if the library of all inputs is not too large and there is no dead time.
 
     Parameters
     ----------
@@ -43,30 +49,41 @@ def screen_candidates(
         Record that ranks the inputs.
     constraints : str
         Name of an entry of ``CONSTRAINTS``, under which the inputs are ranked.
+    delays : sequence of int
+        Dead times in samples: none, one, or one for each input.
 
     Raises
     ------
     SettingsError
-        As in `candidates`, for the library of one input.
+        As in `candidates`, for the library of one input, or as in `expand_delays`.
     """
+    later = expand_delays(delays, record.inputs)
     count = count_inputs(name, degree, lags, record.inputs)
     if count == record.inputs:
-        return candidates(name, degree, lags, record.inputs)
-    kept = sorted(rank_inputs(name, degree, lags, record, constraints)[:count]) or [1]
+        return delay_inputs(candidates(name, degree, lags, record.inputs), later)
+    kept = sorted(rank_inputs(name, degree, lags, record, constraints, later)[:count]) or [1]
     full = (_move_inputs(item.expression, kept) for item in candidates(name, degree, lags, len(kept)))
     linear = candidates(name, 1, lags, record.inputs)
-    return tuple(canonical_order([*linear, *(item for each in full if (item := regressor(each)[1]))]))
+    pool = canonical_order([*linear, *(item for each in full if (item := regressor(each)[1]))])
+    return delay_inputs(pool, later)
 
 
 def rank_inputs(
-    name: str, degree: int, lags: int, record: Dataset, constraints: str = "none"
+    name: str,
+    degree: int,
+    lags: int,
+    record: Dataset,
+    constraints: str = "none",
+    delays: Sequence[int] = (),
 ) -> tuple[int, ...]:
     """Return the numbers of the inputs, from 1, in the order in which forward selection chooses them.
 
     Inputs that it does not choose are left out. Arguments and errors are those of `screen_candidates`.
     """
-    library = candidates(name, largest_degree(name, degree, lags, record.inputs), lags, record.inputs)
-    part = _take_blocks(record, lags)
+    later = expand_delays(delays, record.inputs)
+    largest = largest_degree(name, degree, lags, record.inputs)
+    library = delay_inputs(candidates(name, largest, lags, record.inputs), later)
+    part = _take_blocks(record, lags + max(later))
     # Risk inflation criterion: the largest gain of irrelevant candidates (Foster and George 1994).
     chance = 2.0 * log(len(library)) / part.samples
     found = forward_selection(library, part, constraints, _TERMS, chance)

@@ -153,4 +153,7 @@ def test_candidate_limit_applies_to_the_library_not_the_full_set():
 def test_unknown_library_error_lists_the_known_libraries(look_up):
     with pytest.raises(SettingsError) as caught:
         look_up("wavelets")
-    assert str(caught.value) == "unknown library 'wavelets': take one of phi-polynomial, polynomial"
+    assert (
+        str(caught.value)
+        == "unknown library 'wavelets': take one of phi-polynomial, polynomial, friction, magnitude"
+    )
