@@ -14,7 +14,7 @@ _SPEC: dict[str, Any] = {
     "dataset": _DATASET_ID,
     "inputs": ["u_V"],
     "output": "y_um",
-    "preset": "hysteresis",
+    "preset": "auto",
     "seed": 0,
     "settings": {"islands": 2, "generations": 40},
 }

@@ -15,7 +15,10 @@ ISLANDS = Path(sysconfig.get_path("scripts")) / "islands"
 COLUMNS = ("--input", "u_V", "--output", "y_um")
 
 #: Settings of a search on that record that takes a second.
-BUDGET = ("--population", "30", "--max-terms", "5", "--shooting", "200", "--seed", "2")
+BUDGET = (
+    *("--preset", "hysteresis", "--population", "30", "--max-terms", "5", "--shooting", "200"),
+    *("--seed", "2"),
+)
 
 
 def write_hysteresis(path: Path) -> Path:

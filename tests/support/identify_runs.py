@@ -7,6 +7,8 @@ from islands.evolution.engine import SerialEngine
 from islands.evolution.presets import resolve_settings
 
 SMALL = (
+    "--preset",
+    "hysteresis",
     "--population",
     "10",
     "--generations",

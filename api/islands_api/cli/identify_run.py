@@ -14,9 +14,10 @@ import islands
 from islands.data.compatibility import match_rate, match_record
 from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
-from islands.evolution.presets import resolve_settings
+from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
+from islands.facade.automatic.kind_choice import choice_from_document, choose_preset
 from islands.io.checkpoints import (
     read_checkpoint,
     state_document,
@@ -93,12 +94,12 @@ def run(
     spent : float
         Seconds that the search took to reach this state.
     """
-    settings = resolve_settings(job["preset"], job["changes"])
-    data, held_out, test_data = _read_data(job, settings)
+    possible = _resolve_possible(job)
+    data, held_out, test_data = _read_data(job, max(each.maximum_lag for each in possible))
     folder.mkdir(parents=True, exist_ok=True)
     compile_kernels()
-    start_engine = ENGINES[run_options.engine_for(settings.islands)]
-    if run_options.engine is None and settings.islands > 1 and not has_ray():
+    start_engine = ENGINES[run_options.engine_for(possible[0].islands)]
+    if run_options.engine is None and possible[0].islands > 1 and not has_ray():
         print_message(SERIAL_NOTICE)
     with (
         progress("identify") as show,
@@ -110,8 +111,18 @@ def run(
             # Delete the files of an earlier run.
             for name in (CHECKPOINT, HALL, TEST):
                 (folder / name).unlink(missing_ok=True)
+        preset = job["preset"]
+        if preset == AUTO:
+            stored = job.get("choice")
+            preset = (
+                choice_from_document(stored)
+                if stored
+                else choose_preset(data, held_out, job["changes"], show)
+            )
+            # Checkpoints contain the job, so a resumed run does not choose again.
+            job = {**job, "choice": preset.to_document()}
         checkpoints = _CheckpointWriter(folder, job, show, state, spent)
-        arguments: dict[str, Any] = {"preset": job["preset"], "seed": job["seed"], **job["changes"]}
+        arguments: dict[str, Any] = {"preset": preset, "seed": job["seed"], **job["changes"]}
         began = perf_counter() - spent
         try:
             result = islands.identify(
@@ -144,6 +155,13 @@ def run(
         _evaluate_test(result, test_data, folder)
 
 
+def _resolve_possible(job: dict[str, Any]) -> tuple[Settings, ...]:
+    """Return the settings of a job, or of every kind of record among which the preset auto chooses."""
+    if job["preset"] == AUTO:
+        return tuple(resolve_kinds(job["changes"]).values())
+    return (resolve_settings(job["preset"], job["changes"]),)
+
+
 def _evaluate_test(result: islands.Result, test_data: islands.Dataset, folder: Path) -> None:
     """Simulate the recommended model on the test data; print and write the metrics."""
     test_data = match_rate(result.best.model, test_data)
@@ -160,7 +178,7 @@ def _evaluate_test(result: islands.Result, test_data: islands.Dataset, folder: P
 
 
 def _read_data(
-    job: dict[str, Any], settings: Settings
+    job: dict[str, Any], lag: int
 ) -> tuple[islands.Dataset, islands.Dataset | float, islands.Dataset | None]:
     """Read the data for estimation, validation (or its fraction) and the final test."""
     for name, known in job["sha256"].items():
@@ -180,13 +198,13 @@ def _read_data(
             data, test_data = parts.estimation, parts.validation
         else:
             test_data = given
-        _check_test(test_data, [data] if isinstance(held_out, float) else [data, held_out], settings)
+        _check_test(test_data, [data] if isinstance(held_out, float) else [data, held_out], lag)
     # Check the validation data before the folder is made; the search repeats this.
     split_data(data, held_out)
     return data, held_out, test_data
 
 
-def _check_test(test_data: islands.Dataset, others: list[islands.Dataset], settings: Settings) -> None:
+def _check_test(test_data: islands.Dataset, others: list[islands.Dataset], lag: int) -> None:
     """Check that the test data overlaps no other data, has the same sampling time and is long enough."""
     test_data = match_record(others[0], test_data, "the record", "the test data")
     for other in others:
@@ -195,7 +213,6 @@ def _check_test(test_data: islands.Dataset, others: list[islands.Dataset], setti
                 "--test has samples that are used for estimation or validation: exclude them by --rows and "
                 "--validation"
             )
-    lag = settings.maximum_lag
     if test_data.samples <= lag:
         raise RecordError(
             f"the test data has {test_data.samples} samples, and the largest lag is {lag}: give more samples"

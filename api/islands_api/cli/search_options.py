@@ -9,10 +9,10 @@ from typing import Annotated, Any, get_args
 
 import typer
 
-from islands.evolution.presets import PRESETS
+from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings, get_text_type
 
-Preset = Annotated[str, typer.Option("--preset", help=", ".join(PRESETS))]
+Preset = Annotated[str, typer.Option("--preset", help=", ".join(PRESET_NAMES))]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")]
 
 
@@ -26,7 +26,7 @@ class SearchOptions:
         Settings that were given, by name. All others have the value of the preset.
     """
 
-    preset: str = "hysteresis"
+    preset: str = AUTO
     seed: int = 0
     changes: Mapping[str, Any] = field(default_factory=dict)
 

@@ -12,6 +12,7 @@ from uuid import uuid4
 import httpx
 
 from islands.errors import SettingsError
+from islands.evolution.presets import AUTO
 from islands_api.client.response_parsing import read_as, read_mapping
 from islands_api.schemas import (
     DatasetPage,
@@ -87,7 +88,7 @@ def submit(
     inputs: str | Sequence[str],
     output: str,
     *,
-    preset: str = "hysteresis",
+    preset: str = AUTO,
     seed: int = 0,
     dt: float | None = None,
     rows: str | None = None,

@@ -10,9 +10,11 @@ from typing import Any
 import structlog
 
 from islands.evolution.engine import Engine
+from islands.evolution.presets import AUTO
 from islands.evolution.search_result import SearchResult
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
+from islands.facade.automatic.kind_choice import Choice, choice_from_document, choose_preset
 from islands.facade.identify import identify
 from islands.io.checkpoints import (
     archipelago_from_document,
@@ -62,17 +64,24 @@ def run_identification_job(
     spec = parse_identification(job.spec)
     datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
     record, validation = read_record_and_validation(spec, datasets, blobs)
-    start, spent = _load_checkpoint(job, blobs)
+    start, spent, choice = _load_checkpoint(job, blobs)
     reporter = _ProgressReporter(lease, store, blobs, check, every, start, spent)
 
     def stop() -> bool:
         check()
         return False
 
+    preset: str | Choice = spec.preset
+    if preset == AUTO and start is not None:
+        # A job of an earlier version without preset stored no choice, and had this default.
+        preset = choice or "hysteresis"
+    elif preset == AUTO:
+        preset = choose_preset(record, validation, spec.changes, reporter.report_stage)
+    reporter.choice = preset if isinstance(preset, Choice) else None
     result = identify(
         record,
         validation=validation,
-        preset=spec.preset,
+        preset=preset,
         seed=spec.seed,
         progress=reporter,
         stage=reporter.report_stage,
@@ -108,13 +117,14 @@ def make_outcome(found: SearchResult) -> JobOutcome:
     return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
 
 
-def _load_checkpoint(job: Job, blobs: Blobs) -> tuple[SearchState | None, float]:
-    """Return the search state at the last checkpoint of a job, and the seconds spent until then."""
+def _load_checkpoint(job: Job, blobs: Blobs) -> tuple[SearchState | None, float, Choice | None]:
+    """Return the search state at the last checkpoint of a job, the seconds spent, and the choice of auto."""
     if job.checkpoint is None:
-        return None, 0.0
+        return None, 0.0, None
     text = gzip.decompress(blobs.read(job.checkpoint)).decode()
     archipelago, about = archipelago_from_document(text, f"the checkpoint of job {job.id}")
-    return state_from_document(archipelago, about), float(about["wall_s"])
+    choice = choice_from_document(about["choice"]) if about.get("choice") else None
+    return state_from_document(archipelago, about), float(about["wall_s"]), choice
 
 
 class _ProgressReporter:
@@ -139,6 +149,8 @@ class _ProgressReporter:
         self._stored_points = 0 if start is None else len(start.history) - 1
         self._report_at = self._checkpoint_at = monotonic()  # store the first populations immediately
         self._last: tuple[SearchState, Settings] | None = None
+        #: Choice of the preset auto, which checkpoints contain.
+        self.choice: Choice | None = None
 
     @property
     def spent(self) -> float:
@@ -215,5 +227,6 @@ class _ProgressReporter:
         return tuple((*point[:3], tuple(point[3])) for point in new), after
 
     def _checkpoint(self, state: SearchState) -> bytes:
-        about = {"job": self._lease.job.id, "wall_s": self.spent, **state_document(state)}
+        choice = None if self.choice is None else self.choice.to_document()
+        about = {"job": self._lease.job.id, "wall_s": self.spent, "choice": choice, **state_document(state)}
         return gzip.compress(checkpoint_text(state.archipelago, about).encode(), compresslevel=1, mtime=0)

@@ -20,7 +20,8 @@ from pydantic import (
 
 from islands.errors import SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.presets import PRESETS, resolve_settings
+from islands.estimation.structure_selection.input_delays import expand_delays
+from islands.evolution.presets import AUTO, PRESET_NAMES, resolve_kinds, resolve_settings
 from islands.evolution.settings import Settings, get_text_type
 from islands.io.simulator_spec.specification import ColumnSpec, SimulationSpec, innermost
 from islands.model.candidate_library import candidates, count_inputs
@@ -141,7 +142,7 @@ class Identification(BaseModel):
         default=0.25,
         description="The fraction at the end of every recording that selects the models, or a data set.",
     )
-    preset: str = Field(default="hysteresis", json_schema_extra={"enum": list(PRESETS)})
+    preset: str = Field(default=AUTO, json_schema_extra={"enum": list(PRESET_NAMES)})
     seed: Seed = 0
     settings: SettingsChanges = Field(default_factory=SettingsChanges)  # type: ignore[valid-type]
 
@@ -242,8 +243,10 @@ def _parse(form: type[S], document: Mapping[str, Any]) -> S:
         ) from error
 
 
-def resolve_job_settings(spec: Identification, max_islands: int, max_evaluations: int) -> Settings:
-    """Return the search settings of a job from an untrusted client.
+def resolve_job_settings(
+    spec: Identification, max_islands: int, max_evaluations: int
+) -> tuple[Settings, ...]:
+    """Return the search settings of a job from an untrusted client; those of every kind for the preset auto.
 
     Raises
     ------
@@ -262,8 +265,16 @@ def resolve_job_settings(spec: Identification, max_islands: int, max_evaluations
             raise SettingsError(f"{name} has {len(value)} entries, and {_MAX_ENTRIES} is the most")
     if any(shift > MAX_SHIFT for shift in changes.get("shifts", ())):
         raise SettingsError(f"back-shifts are at most {MAX_SHIFT} on this service, got {changes['shifts']}")
-    settings = resolve_settings(spec.preset, changes)
-    constraint(settings.constraints).check_inputs(len(spec.inputs))
+    kinds = tuple(resolve_kinds(changes).values()) if spec.preset == AUTO else ()
+    found = kinds or (resolve_settings(spec.preset, changes),)
+    for settings in found:
+        _check_settings(settings, len(spec.inputs), max_evaluations)
+    return found
+
+
+def _check_settings(settings: Settings, inputs: int, max_evaluations: int) -> None:
+    constraint(settings.constraints).check_inputs(inputs)
+    expand_delays(settings.library_delays, inputs)
     asked = settings.population * (settings.generations + 1) * settings.islands
     if asked > max_evaluations:
         raise SettingsError(
@@ -271,8 +282,7 @@ def resolve_job_settings(spec: Identification, max_islands: int, max_evaluations
             f"most {max_evaluations:.3g} for a job: fewer generations, islands or individuals are needed"
         )
     if settings.library:
-        _check_library(settings.library, settings.library_degree, settings.library_lags, len(spec.inputs))
-    return settings
+        _check_library(settings.library, settings.library_degree, settings.library_lags, inputs)
 
 
 @lru_cache

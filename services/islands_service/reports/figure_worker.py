@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from islands.data.split import average_split, match_split, split_data
 from islands.errors import IslandsError, SettingsError
-from islands.evolution.presets import resolve_settings
+from islands.evolution.presets import AUTO, resolve_settings
 from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics
 from islands.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
 from islands.figures.style import save
@@ -103,7 +103,6 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     spec = parse_identification(job.spec)
     datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
     record, validation = read_record_and_validation(spec, datasets, blobs)
-    settings = resolve_settings(spec.preset, spec.changes)
     document = store.results.document(job.id)
     stored = store.results.models(job.id, rank)
     if document is None or not stored:
@@ -115,9 +114,12 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     ensemble = ensemble_from_document(document.get("ensemble"), models[0])
     assessed = []
     for entry, model in zip(stored, models, strict=True):
-        # Results of earlier versions do not state their warm-up.
-        warm_up = entry.document.get("warm_up", settings.maximum_lag)
-        assessment = assess(model, split, shooting, warm_up, settings.constraints)
+        warm_up = entry.document.get("warm_up")
+        if warm_up is None:
+            # Results of earlier versions do not state their warm-up; their default was this preset.
+            preset = "hysteresis" if spec.preset == AUTO else spec.preset
+            warm_up = resolve_settings(preset, spec.changes).maximum_lag
+        assessment = assess(model, split, shooting, warm_up, document["settings"]["constraints"])
         bands = bands_from_document(entry.document.get("bands"), ensemble)
         assessed.append(RankedModel(model, assessment, bands))
     search = _search(document["search"], store.results.history(job.id))

@@ -1,11 +1,12 @@
 """Table of presets. The presets `paper-*` are those of the paper."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from islands.errors import lookup
+from islands.errors import SettingsError, lookup
+from islands.estimation.parameter_constraints import constraint
 from islands.evolution.settings import Settings
 
 #: Section 6.1, theoretical piezo: shooting over 500 steps, tolerance 1e-5.
@@ -91,6 +92,82 @@ PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
 )
 
 
+#: Preset that is chosen among `KINDS` by trials on the record. It is the default of all commands.
+AUTO = "auto"
+
+#: Names of the presets that a user may choose, the default first.
+PRESET_NAMES = (AUTO, *PRESETS)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordKind:
+    """A kind of record that the preset ``auto`` distinguishes, and the search for it.
+
+    Attributes
+    ----------
+    preset : str
+        An entry of ``PRESETS``.
+    changes : mapping
+        Settings that differ from those of the preset. ``fit`` uses the library only.
+    systems : str
+        Systems of this kind, for the documentation.
+    """
+
+    preset: str
+    changes: Mapping[str, Any]
+    systems: str
+
+
+#: Kinds in the order of preference between equal errors.
+KINDS: Mapping[str, RecordKind] = MappingProxyType(
+    {
+        "smooth": RecordKind("narx", {}, "smooth dynamics: thermal, electrical and chemical processes"),
+        "magnitude": RecordKind(
+            "narx",
+            {"library": "magnitude", "primitives": ("mul", "sqrt", "abs")},
+            "square roots and absolute values: tanks, valves, rectifiers, drag",
+        ),
+        "friction": RecordKind(
+            "narx",
+            {"library": "friction", "primitives": ("mul", "sign")},
+            "directions of motion: dry friction, drag, backlash",
+        ),
+        "hysteresis": RecordKind(
+            "hysteresis", {}, "the output stays constant at constant input: piezo actuators, magnetics"
+        ),
+    }
+)
+
+
+def resolve_kind(kind: str, delays: tuple[int, ...], changes: Mapping[str, Any]) -> Settings:
+    """Return the settings of a kind of record with dead times; changes take precedence over both.
+
+    Raises
+    ------
+    SettingsError
+        The kind or a setting is unknown, or a setting is out of range.
+    """
+    entry = lookup(KINDS, kind, "kind of record")
+    return resolve_settings(entry.preset, {**entry.changes, "library_delays": delays, **changes})
+
+
+def resolve_kinds(changes: Mapping[str, Any]) -> Mapping[str, Settings]:
+    """Return the settings of every kind of record that a search with these changes permits.
+
+    The constraint ``hysteresis`` permits hysteresis only, whose models are made of terms with which the
+    constraint can be met.
+
+    Raises
+    ------
+    SettingsError
+        A setting is unknown, or out of range.
+    """
+    settings = {kind: resolve_kind(kind, (), changes) for kind in KINDS}
+    if "constraints" in changes and constraint(changes["constraints"]).sums:
+        return {"hysteresis": settings["hysteresis"]}
+    return settings
+
+
 def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
     """Return the settings of a preset with changes.
 
@@ -99,7 +176,9 @@ def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
     SettingsError
         The preset or a setting is unknown, or a setting is out of range.
     """
-    base = lookup(PRESETS, preset, "preset")
+    if preset == AUTO:
+        raise SettingsError("the preset auto needs the record of one output: name another preset")
+    base = lookup({AUTO: _PAPER, **PRESETS}, preset, "preset")
     for name in changes:
         lookup(asdict(base), name, "setting")
     if "max_terms" in changes and "initial_terms" not in changes:
@@ -108,3 +187,8 @@ def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
     if "max_height" in changes and "initial_height" not in changes:
         changes = {**changes, "initial_height": max(0, min(base.initial_height, changes["max_height"]))}
     return replace(base, **changes)
+
+
+def with_tuples(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return changed settings with tuples in place of lists."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}

@@ -42,13 +42,14 @@ from islands.evolution.search_result import (
     with_bands,
 )
 from islands.evolution.settings import Settings
+from islands.facade.automatic.kind_choice import choose_library
 from islands.facade.feedthrough_selection import select_feedthrough
 from islands.facade.final_models import screen
-from islands.facade.rate_selection import TrialLibrary, select_rate
+from islands.facade.rate_selection import select_rate
 from islands.facade.results.result import Result
 from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
-from islands.model.candidate_library import full_set, get_library
+from islands.model.candidate_library import full_set
 from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
@@ -74,9 +75,10 @@ def fit(
     inputs: str | Sequence[str] = (),
     output: str | None = None,
     validation: "RecordLike | float" = 0.25,
-    library: str = "phi-polynomial",
+    library: str = AUTO,
     degree: int | None = None,
     lags: int | None = None,
+    delays: Sequence[int] | None = None,
     max_terms: int = 10,
     constraints: str | None = None,
     estimator: str = "least-squares",
@@ -104,9 +106,13 @@ def fit(
     validation : Dataset, data frame or float
         Data that rank the models: a separate record, or the fraction at the end of ``record``.
     library : str
-        An entry of ``LIBRARIES``: ``phi-polynomial`` for hysteresis, ``polynomial`` for smooth systems.
+        An entry of ``LIBRARIES``, such as ``phi-polynomial`` for hysteresis or ``polynomial`` for smooth
+        systems. ``auto`` chooses the library by trials on the estimation data, as the preset ``auto`` does.
     degree, lags : int, optional
         Degree and lags of the library; None takes the defaults of the library.
+    delays : sequence of int, optional
+        Dead times by which the library reads the inputs later, in samples of the record: one, or one for each
+        input. None estimates them with the library ``auto``, and is none with others.
     max_terms : int
         Size of the largest model.
     constraints : str, optional
@@ -144,30 +150,28 @@ def fit(
         The record is too short or incomplete, or the validation data has other columns or sampling time.
     """
     record, validation = read_data(record, y, dt, inputs, output, validation)
-    entry = get_library(library)
-    degree = entry.degree if degree is None else degree
-    lags = entry.lags if lags is None else lags
-    constraints = entry.constraints if constraints is None else constraints
-    constraint(constraints).check_inputs(record.inputs)
     lookup(ESTIMATORS, estimator, "estimator")
     if max_terms < 1:
         raise SettingsError(f"a model has at least one term, got max_terms = {max_terms}")
     if certificate < 0:
         raise SettingsError(f"a search has at least 0 nodes, got certificate = {certificate}")
-    trial = TrialLibrary(library, degree, lags, constraints)
-    progress("sampling rate and direct feedthrough", 0.0)
     whole = split_data(record, validation)
     shooting = min(SHOOTING, max(1, whole.estimation.samples // 10)) if shooting is None else shooting
     if shooting < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {shooting}")
-    parts, samples = select_rate(whole, average, trial, lags + 3)
-    parts = select_feedthrough(parts, feedthrough, trial)
+    choice, trial = choose_library(whole.estimation, library, degree, lags, constraints, delays, progress)
+    constraints = trial.constraints
+    progress("sampling rate and direct feedthrough", 0.0)
+    parts, samples = select_rate(whole, average, trial, trial.lags + 3 + max(trial.delays, default=0))
+    rated = trial.at_rate(samples)
+    parts = select_feedthrough(parts, feedthrough, rated)
     interval = count_means(shooting, samples)
 
     settings = Settings(
-        library=library,
-        library_degree=degree,
-        library_lags=lags,
+        library=trial.name,
+        library_degree=trial.degree,
+        library_lags=trial.lags,
+        library_delays=rated.delays,
         shifts=(),
         max_terms=max_terms,
         initial_terms=(1, max_terms),
@@ -198,7 +202,7 @@ def fit(
     for ranked in rank_models(models):
         best_of_size.setdefault(ranked.model.size, ranked)
     rows = sum(max(0, length - warm_up) for length in parts.estimation.segments)
-    count = full_set(degree, lags, lags, record.inputs)
+    count = full_set(trial.degree, trial.lags, trial.lags, record.inputs)
     search = SearchStatistics(
         sum(outcomes.values()),
         dict(outcomes),
@@ -207,9 +211,10 @@ def fit(
     )
     described = {
         "method": "fit",
-        "library": library,
-        "degree": degree,
-        "lags": lags,
+        "library": trial.name,
+        "degree": trial.degree,
+        "lags": trial.lags,
+        "delays": trial.delays,
         "max_terms": max_terms,
         "constraints": constraints,
         "estimator": estimator,
@@ -219,6 +224,7 @@ def fit(
         "certificate": certificate,
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
     }
+    described |= {} if choice is None else {"choice": choice.to_document()}
     result = SearchResult(record, parts, seed, described, search, tuple(best_of_size.values()))
     minimised = ESTIMATORS[estimator].interval(interval)
     estimates = [
@@ -249,6 +255,7 @@ def _select(
             settings.library_lags,
             deviations.estimation,
             constraints,
+            settings.library_delays,
         )
         warm_up = max(item.maximum_lag for item in pool)
         progress(f"inner products of {len(pool)} candidates", 0.0)

@@ -23,21 +23,23 @@ from islands.estimation.structure_selection.deviations import (
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import Engine, Stop
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.presets import resolve_settings
+from islands.evolution.presets import AUTO, resolve_kind, resolve_settings, with_tuples
 from islands.evolution.problem import Problem, make_problem
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
+from islands.facade.automatic.kind_choice import Choice, choose_preset
+from islands.facade.automatic.trial_library import make_trial_library
 from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.feedthrough_selection import select_feedthrough
 from islands.facade.final_models import estimate_candidates, select_final_models
-from islands.facade.rate_selection import TrialLibrary, select_rate
+from islands.facade.rate_selection import select_rate
 from islands.facade.results.result import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
-from islands.model.candidate_library import full_set, get_library
+from islands.model.candidate_library import full_set
 from islands.model.expression import Primitive
 from islands.model.primitives import PRIMITIVES
 from islands.model.user_primitive import get_source
@@ -66,7 +68,7 @@ def identify(
     inputs: str | Sequence[str] = (),
     output: str | None = None,
     validation: "RecordLike | float" = 0.25,
-    preset: str = "hysteresis",
+    preset: str | Choice = AUTO,
     seed: int = 0,
     progress: SearchCallback | None = None,
     stage: ProgressCallback = ignore_progress,
@@ -91,8 +93,9 @@ def identify(
         Names of the columns of a frame.
     validation : Dataset, data frame or float
         Data that select among the hall of fame: a separate record, or the fraction at the end of ``record``.
-    preset : str
-        An entry of ``PRESETS``.
+    preset : str or Choice
+        An entry of ``PRESETS``, or ``auto``, which chooses library, primitives, constraints and lags by
+        trials on the estimation data. A choice of `choose_preset` is not made again.
     seed : int
         Seed of the random generator; the same seed gives the same result, bit for bit.
     progress : callable, optional
@@ -125,11 +128,14 @@ def identify(
         The function of a primitive of your own does not compile.
     """
     record, validation = read_data(record, y, dt, inputs, output, validation)
-    settings = resolve_settings(
-        preset, {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
-    )
     if seed < 0:
         raise SettingsError(f"a seed is not negative, got {seed}")
+    if preset == AUTO:
+        preset = choose_preset(record, validation, changes, stage)
+    if isinstance(preset, Choice):
+        settings = resolve_kind(preset.kind, preset.delays, with_tuples(changes))
+    else:
+        settings = resolve_settings(preset, with_tuples(changes))
     for entry in _own_primitives(settings):
         row_address(entry)  # compile it before the search starts
     stage("sampling rate and direct feedthrough", 0.0)
@@ -138,7 +144,11 @@ def identify(
     split = select_feedthrough(split, settings.feedthrough, trial.at_rate(count))
     _check_validation_length(split.validation, settings)
     offsets = _find_search_offsets(split.estimation, settings)
-    scaled = replace(settings, shooting=count_means(settings.shooting, count))
+    scaled = replace(
+        settings,
+        shooting=count_means(settings.shooting, count),
+        library_delays=tuple(delay // count for delay in settings.library_delays),
+    )
     search_problem = make_problem(subtract_offsets(split.estimation, offsets), scaled, stage)
     stop = stop or (lambda: False)
     state = start or SearchState(empty_archipelago(settings.islands, seed))
@@ -168,6 +178,8 @@ def identify(
             "record"
         )
     described = {"method": "identify", "preset": preset, **_describe(settings)}
+    if isinstance(preset, Choice):
+        described.update(preset=AUTO, choice=preset.to_document())
     described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
     statistics = _make_statistics(state, search_problem)
     found = SearchResult(record, split, seed, described, statistics, models)
@@ -188,18 +200,6 @@ def _describe(settings: Settings) -> dict[str, Any]:
     if own := _own_primitives(settings):
         document["own_primitives"] = {entry.name: get_source(entry) for entry in own}
     return document
-
-
-def make_trial_library(settings: Settings) -> TrialLibrary:
-    """Return the library and the constraints of the models that compare sampling rates."""
-    if settings.library:
-        name, degree, lags = settings.library, settings.library_degree, settings.library_lags
-    else:
-        # Without a library in the settings, the rates are compared with the default one of the constraint.
-        name = "phi-polynomial" if constraint(settings.constraints).sums else "polynomial"
-        degree, lags = get_library(name).degree, get_library(name).lags
-    shooting = settings.shooting if settings.refine else None
-    return TrialLibrary(name, degree, lags, settings.constraints, shooting)
 
 
 def _check_validation_length(validation: Dataset, settings: Settings) -> None:

@@ -5,13 +5,13 @@ one-step-ahead error describes the noise. Means of consecutive samples change mo
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, isfinite, lcm
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.averaging import AUTO, average_samples, check_average, count_means
+from islands.data.averaging import AUTO, average_samples, check_average
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
 from islands.data.split import Split, average_split
@@ -25,7 +25,7 @@ from islands.estimation.structure_selection.deviations import (
     no_offsets,
     subtract_offsets,
 )
-from islands.estimation.structure_selection.input_ranking import screen_candidates
+from islands.facade.automatic.trial_library import TrialLibrary
 from islands.inspection.oversampling import COUNTS, is_noisy, keeps_bandwidth
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
@@ -45,25 +45,6 @@ _LEAST_SHARE = 0.9
 
 #: Terms of the trial models, at most.
 _TERMS = 10
-
-
-@dataclass(frozen=True, slots=True)
-class TrialLibrary:
-    """Candidate library and constraints of the models that compare rates.
-
-    ``shooting`` is the interval over which the search refines parameters, in samples of the data; None if it
-    does not refine them.
-    """
-
-    name: str
-    degree: int
-    lags: int
-    constraints: str
-    shooting: int | None = None
-
-    def at_rate(self, count: int) -> "TrialLibrary":
-        """Return the library for means of ``count`` samples, with the same interval of time."""
-        return self if self.shooting is None else replace(self, shooting=count_means(self.shooting, count))
 
 
 def select_rate(split: Split, average: int | str, library: TrialLibrary, least: int) -> tuple[Split, int]:
@@ -160,7 +141,7 @@ def compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[n
     estimation, validation = (
         subtract_offsets(part, offsets) for part in (split.estimation, split.validation)
     )
-    pool = screen_candidates(library.name, library.degree, library.lags, estimation, library.constraints)
+    pool = library.screen(estimation)
     structures = forward_selection(pool, estimation, library.constraints, _TERMS)
     warm_up = max(item.maximum_lag for item in pool)
     estimated = (

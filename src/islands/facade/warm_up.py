@@ -35,9 +35,16 @@ def _use_all_kernels() -> None:
     """Call every kernel once with each of its argument types."""
     whole = make_record("bouc-wen-piezo", "authors", "estimation")
     record = Dataset(whole.u[:1200], whole.y[:1200], whole.dt)
-    fit(record, max_terms=3)
+    fit(record, library="phi-polynomial", max_terms=3)
     for constraints in ("none", "hysteresis"):
-        identify(record, population=10, generations=2, shooting=100, constraints=constraints)
+        identify(
+            record,
+            preset="hysteresis",
+            population=10,
+            generations=2,
+            shooting=100,
+            constraints=constraints,
+        )
     _simulate_two_outputs(record)
 
 

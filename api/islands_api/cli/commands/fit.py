@@ -8,6 +8,7 @@ import typer
 
 import islands
 from islands.data.averaging import AUTO
+from islands.errors import SettingsError
 from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
@@ -20,8 +21,8 @@ from islands_api.cli.output_folder import check_folder, show_result
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
 
-#: Default libraries.
-ONE_OUTPUT, SEVERAL_OUTPUTS = "phi-polynomial", "polynomial"
+#: Default library for several outputs.
+SEVERAL_OUTPUTS = "polynomial"
 
 
 @with_reading_options
@@ -40,17 +41,21 @@ def fit(
         ),
     ] = None,
     library: Annotated[
-        str | None,
+        str,
         typer.Option(
             "--library",
-            help=f"{' or '.join(LIBRARIES)}. "
-            f"By default {ONE_OUTPUT}, and {SEVERAL_OUTPUTS} for several outputs.",
+            help=f"{AUTO} (trials on the record), {', '.join(LIBRARIES)}. "
+            f"For several outputs {AUTO} is {SEVERAL_OUTPUTS}.",
         ),
-    ] = None,
+    ] = AUTO,
     degree: Annotated[
         int | None, typer.Option("--degree", help="By default the value of the library.")
     ] = None,
     lags: Annotated[int | None, typer.Option("--lags", help="By default the value of the library.")] = None,
+    dead_time: Annotated[
+        list[int] | None,
+        typer.Option("--dead-time", help="Dead time in samples; repeat it for each input."),
+    ] = None,
     max_terms: Annotated[int, typer.Option("--max-terms", help="Size of the largest model.")] = 10,
     constraints: Annotated[
         str | None,
@@ -95,6 +100,7 @@ def fit(
             "library": library,
             "degree": degree,
             "lags": lags,
+            "delays": dead_time,
             "max_terms": max_terms,
             "constraints": constraints,
             "estimator": estimator,
@@ -106,12 +112,14 @@ def fit(
             "progress": show,
         }
         if len(outputs) > 1:
+            if dead_time:
+                raise SettingsError("--dead-time is for one output: leave it out")
+            given["library"] = SEVERAL_OUTPUTS if library == AUTO else library
             pair = couple_data(data, held_out, len(outputs))
             coupled = islands.fit_coupled(pair[0], validation=pair[1], **coupled_options(given))
             show("figures", 1.0)
             coupled.save(out)
         else:
-            given["library"] = library or ONE_OUTPUT
             result = islands.fit(data, validation=held_out, **given)
             result = result.with_wall_time(perf_counter() - began)
             show("figures", 1.0)

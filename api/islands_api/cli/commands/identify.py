@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from islands.errors import SettingsError, lookup
+from islands.evolution.presets import AUTO
 from islands.io.records import fingerprint
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands_api.cli import options
@@ -94,8 +95,7 @@ def identify(
             data = couple_data(
                 recordings.read(rows), recordings.read_held_out(validation, rows), len(outputs)
             )
-            source = context.get_parameter_source("preset")
-            preset = search.preset if source is not None and source.name == "COMMANDLINE" else COUPLED_PRESET
+            preset = COUPLED_PRESET if search.preset == AUTO else search.preset
             identify_several(run_options, out, data, preset, search.seed, search.changes)
             return
         paths = [str(path.resolve()) for path in records]

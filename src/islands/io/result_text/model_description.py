@@ -83,10 +83,17 @@ def describe_findings(found: SearchResult) -> list[str]:
         *_describe_recordings(found, entry),
         *_describe_uncertainty(found, entry),
         *_describe_constraints(entry),
+        *_describe_preset(found),
         f"Good for: {'; '.join(good) or 'no use: every check failed'}.",
         f"Fails at: {'; '.join(bad) or 'none of the checks'}.",
         f"Next: {'; '.join(_list_next_steps(found, entry))}.",
     ]
+
+
+def _describe_preset(found: SearchResult) -> Iterator[str]:
+    """Yield the choice of the preset auto and its reasons."""
+    if reasons := found.settings.get("choice", {}).get("reasons"):
+        yield " ".join(reasons)
 
 
 def _describe_feedthrough(found: SearchResult) -> str:

@@ -43,7 +43,8 @@ def method_text(found: SearchResult) -> str:
 
 
 def _describe_settings(found: SearchResult) -> str:
-    settings = {name: value for name, value in found.settings.items() if name != "own_primitives"}
+    hidden = ("own_primitives", "choice")
+    settings = {name: value for name, value in found.settings.items() if name not in hidden}
     settings["seed"] = found.seed
     return ", ".join(f"{name} {_format_setting(name, value)}" for name, value in settings.items())
 

@@ -45,7 +45,7 @@ def with_output(record, y):
 
 @pytest.fixture(scope="module")
 def result():
-    return islands.fit(piezo(), max_terms=5)
+    return islands.fit(piezo(), library="phi-polynomial", max_terms=5)
 
 
 # Attributes and methods of a result.
@@ -153,7 +153,7 @@ def test_result_is_saved_as_a_folder(result, tmp_path):
 
 
 def test_equal_arguments_give_equal_bits(result):
-    again = islands.fit(piezo(), max_terms=5)
+    again = islands.fit(piezo(), library="phi-polynomial", max_terms=5)
     assert result_json(again.search_result) == result_json(result.search_result)
     assert [model.export("json") for model in again.models] == [
         model.export("json") for model in result.models
@@ -174,6 +174,7 @@ def test_result_has_the_values_of_default_settings():
         "library": "polynomial",
         "degree": 3,
         "lags": 3,
+        "delays": (),
         "max_terms": 2,
         "constraints": "none",
         "estimator": "least-squares",
@@ -225,7 +226,7 @@ def test_validation_record_does_not_affect_the_parameters_of_a_structure():
 
 def test_validation_data_need_the_same_inputs_and_sampling_time():
     record, renamed = piezo(), piezo(200, seed=1, input_names=("u_val_V",), output_name="y_val_um")
-    made = islands.fit(record, validation=renamed, max_terms=2)
+    made = islands.fit(record, library="phi-polynomial", validation=renamed, max_terms=2)
     assert made.best.model.input_names == ("u_V",)
     two = Dataset(walk(200, 0, inputs=2), piezo(200).y, 0.01)
     with pytest.raises(RecordError, match=r"has 1 inputs \(u_V\), the validation data 2 \(u1, u2\)"):
@@ -243,7 +244,7 @@ def test_two_inputs_are_fitted_by_every_library():
     for k in range(2, 600):
         y[k] = y[k - 1] + 0.5 * (u[k - 1, 0] - u[k - 2, 0]) - 0.3 * (u[k - 1, 1] - u[k - 2, 1])
     record = Dataset(u, y, 0.1, ("left_V", "right_V"))
-    by_size = {m.model.size: m for m in islands.fit(record, max_terms=3).models}
+    by_size = {m.model.size: m for m in islands.fit(record, library="phi-polynomial", max_terms=3).models}
     assert by_size[3].equation == "y(k) = 1*y(k-1) + 0.5*(u1(k-1) - u1(k-2)) - 0.3*(u2(k-1) - u2(k-2))"
     assert by_size[3].model.input_names == ("left_V", "right_V")
     assert by_size[3].physics.property_1 is True
@@ -254,7 +255,7 @@ def test_two_inputs_are_fitted_by_every_library():
 
 
 def test_model_of_one_term_is_fitted():
-    made = islands.fit(piezo(), max_terms=1)
+    made = islands.fit(piezo(), library="phi-polynomial", max_terms=1)
     assert [model.equation for model in made.models] == ["y(k) = 1*y(k-1)"]
     assert islands.fit(tank(), library="polynomial", max_terms=1).best.model.size == 1
 
@@ -342,7 +343,7 @@ def test_progress_fractions_are_monotonic(samples):
 )
 def test_setting_out_of_range_raises_settings_error(settings, message):
     with pytest.raises(SettingsError) as caught:
-        islands.fit(piezo(), **settings)
+        islands.fit(piezo(), **{"library": "phi-polynomial", **settings})
     assert message in str(caught.value)
 
 

@@ -17,7 +17,7 @@ from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.model.rendering import plain
 from islands.simulation.predictors import free_run
-from support.identifications import BUDGET, record
+from support.identifications import BUDGET, identify, record
 
 LAW = {"y(k-1)": 0.6, "u(k-1)": 0.5, "u(k-2)": 0.3, "u(k-1)^3": 0.1}
 
@@ -202,7 +202,7 @@ def test_statement_that_the_record_does_not_fit_raises_settings_error():
 def test_information_criteria_of_a_result_count_free_parameters():
     """Every model of the hysteresis library has the cluster of y, which fixes one parameter."""
     data = record()
-    for found in (islands.fit(data, max_terms=3), islands.identify(data, **BUDGET, seed=0, islands=1)):
+    for found in (islands.fit(data, library="phi-polynomial", max_terms=3), identify(data, **BUDGET, seed=0)):
         for fitted in found.models:
             assessment = fitted.ranked_model.assessment
             criteria, free = assessment.information, fitted.model.size - len(fitted.physics.clusters)

@@ -36,7 +36,7 @@ def parameters() -> dict[str, Any]:
 
 
 def test_command_without_options_receives_the_defaults() -> None:
-    assert run() == SearchOptions("hysteresis", 0, {})
+    assert run() == SearchOptions("auto", 0, {})
 
 
 def test_given_options_are_the_only_changes() -> None:

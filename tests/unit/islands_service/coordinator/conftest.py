@@ -49,6 +49,7 @@ def undisturbed(record: Path) -> tuple[list[Any], list[Any]]:
     states = []
     found = identify(
         read_record(record, ["u_V"], "y_um"),
+        preset="hysteresis",
         seed=SEED,
         progress=lambda state, _: states.append(state),
         engine=SerialEngine(),
@@ -80,5 +81,6 @@ def job(store: Store, blobs: Blobs, record: Path) -> Job:
     data = record.read_bytes()
     described = asdict(preview(record))
     dataset, _ = store.datasets.add(ALICE, "record.csv", ".csv", blobs.write(data), len(data), described)
-    spec = {"dataset": dataset.id, "inputs": ["u_V"], "output": "y_um", "seed": SEED, "settings": SETTINGS}
+    columns = {"inputs": ["u_V"], "output": "y_um"}
+    spec = {"dataset": dataset.id, **columns, "preset": "hysteresis", "seed": SEED, "settings": SETTINGS}
     return store.jobs.submit(Submission(ALICE, spec))[0]

@@ -31,18 +31,18 @@ def refused(settings, **changes):
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_preset_is_accepted_unchanged(preset):
-    assert resolve_job_settings(order(preset=preset), 256, 10**10) == PRESETS[preset]
+    assert resolve_job_settings(order(preset=preset), 256, 10**10) == (PRESETS[preset],)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_setting_of_a_preset_can_be_given(preset):
     given = asdict(PRESETS[preset])
-    assert resolve_job_settings(order(preset=preset, settings=given), 256, 10**10) == PRESETS[preset]
+    assert resolve_job_settings(order(preset=preset, settings=given), 256, 10**10) == (PRESETS[preset],)
 
 
 def test_constraints_of_a_job_are_statements_about_its_inputs():
     text = "odd; gain = 2.5; [u(k-1)] >= 0"
-    assert resolve_job_settings(order(settings={"constraints": text}), 256, 10**10).constraints == text
+    assert resolve_job_settings(order(settings={"constraints": text}), 256, 10**10)[0].constraints == text
     assert "unknown constraints 'gain = x'" in refused({"constraints": "gain = x"})
     assert "the record has 1: correct one of them" in refused({"constraints": "[u2(k-1)] = 0"})
 
@@ -108,13 +108,13 @@ def test_settings_that_exhaust_memory_or_time_are_refused_at_once(settings, word
 
 def test_library_of_many_inputs_is_screened():
     inputs = [f"u{number}" for number in range(16)]
-    settings = resolve_job_settings(order(settings={"library_degree": 5}, inputs=inputs), 256, 10**9)
+    (settings,) = resolve_job_settings(order(settings={"library_degree": 5}, inputs=inputs), 256, 10**9)
     assert settings.library_degree == 5
 
 
 def test_budget_includes_the_first_population():
     settings = {"population": 10, "generations": 9, "islands": 1, "max_terms": 3}
-    assert resolve_job_settings(order(settings=settings), 256, 100).population == 10
+    assert resolve_job_settings(order(settings=settings), 256, 100)[0].population == 10
     with pytest.raises(SettingsError, match="100 individuals, and this service evaluates at most 99"):
         resolve_job_settings(order(settings=settings), 256, 99)
 

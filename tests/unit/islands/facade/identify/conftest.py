@@ -2,8 +2,7 @@
 
 import pytest
 
-from islands.facade.identify import identify
-from support.identifications import BUDGET, record, record_states
+from support.identifications import BUDGET, identify, record, record_states
 
 
 @pytest.fixture(scope="session")

@@ -12,8 +12,7 @@ from islands.evolution.history import HistoryPoint
 from islands.evolution.island import StepInfo
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState, advance, stop_reason
-from islands.facade.identify import identify
-from support.identifications import BUDGET, RecordingEngine, record_states
+from support.identifications import BUDGET, RecordingEngine, identify, record_states
 
 
 def make_info(*best, evaluations=10):

@@ -12,14 +12,13 @@ from islands.estimation.estimate import estimate
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
-from islands.facade.identify import identify
 from islands.facade.results.model_simulation import SIMULATION_MODES
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.model.candidate_library import full_set
 from islands.validation.assessment import MODES
 from islands.validation.metrics import metrics
 from islands.validation.physics import check_physics
-from support.identifications import BUDGET, RecordingEngine, parameters, record
+from support.identifications import BUDGET, RecordingEngine, identify, parameters, record
 
 # Contents of a result.
 

@@ -11,11 +11,10 @@ from islands.errors import RecordError, SettingsError
 from islands.estimation.estimate import estimate
 from islands.evolution.presets import PRESETS, resolve_settings
 from islands.evolution.problem import make_problem
-from islands.facade.identify import identify
 from islands.simulation.predictors import free_run
 from islands.validation.metrics import metrics
 from islands.validation.physics import check_physics
-from support.identifications import BUDGET, parameters, record, two_inputs
+from support.identifications import BUDGET, identify, parameters, record, two_inputs
 from support.searches import distinct_genes
 
 
@@ -114,7 +113,7 @@ def test_presets_run_with_a_small_budget(data, preset):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"preset": "hystersis"}, "unknown preset 'hystersis': take one of paper-case1"),
+        ({"preset": "hystersis"}, "unknown preset 'hystersis': take one of auto, paper-case1"),
         ({"populatoin": 3}, "unknown setting 'populatoin': take one of population, generations"),
         ({"population": 0}, "population is at least 1, got 0"),
         ({"generations": -1}, "generations is at least 0, got -1"),

@@ -16,7 +16,7 @@ LOST = EvaluationOutcome(Status.DIVERGED, "|y| left 1e+06 at sample 17")
 
 @pytest.fixture(scope="module")
 def findings():
-    return islands.fit(record(300), max_terms=4).search_result
+    return islands.fit(record(300), library="phi-polynomial", max_terms=4).search_result
 
 
 def with_first(findings, **changes):

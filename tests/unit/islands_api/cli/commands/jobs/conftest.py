@@ -63,7 +63,8 @@ def in_background() -> Iterator[Callable[..., None]]:
 def found(service: Service) -> JobOutcome:
     """Outcome of a small search, run by the function of the coordinator without Ray."""
     dataset = service.upload(csv(400)).json()["id"]
-    spec = {"dataset": dataset, "inputs": ["u_V"], "output": "y_um", "settings": SMALL}
+    columns = {"inputs": ["u_V"], "output": "y_um"}
+    spec = {"dataset": dataset, **columns, "preset": "hysteresis", "settings": SMALL}
     job, _ = service.store.jobs.submit(Submission("local", spec, priority=100))
     blobs = Blobs(service.settings.blobs)
     lease = taken(service.store, job.id)

@@ -27,6 +27,7 @@ VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
     "max_terms": (("6",), 6),
     "max_height": (("4",), 4),
     "shooting": (("50",), 50),
+    "library_delays": (("3",), [3]),
     "primitives": (("mul", "phi1"), ["mul", "phi1"]),
     "constraints": (("none",), "none"),
     "estimator": (("free-run",), "free-run"),

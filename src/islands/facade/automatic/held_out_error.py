@@ -1,0 +1,121 @@
+"""Trial of a candidate library: free-run errors of small models on held-out parts of the estimation data."""
+
+from collections.abc import Iterator, Sequence
+from math import inf, isfinite
+
+from islands.data.dataset import Dataset, join
+from islands.data.split import Split
+from islands.errors import IslandsError
+from islands.estimation.estimate import estimate
+from islands.estimation.forward_selection import (
+    Structure,
+    make_selection_problem,
+    select_forward,
+    select_pool,
+)
+from islands.estimation.parameter_constraints import constraint
+from islands.estimation.structure_selection.deviations import (
+    OPERATING_POINT,
+    find_offsets,
+    no_offsets,
+    subtract_offsets,
+)
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.generation.swap_search import swap_search
+from islands.evolution.settings import Settings
+from islands.facade.automatic.trial_library import TrialLibrary
+from islands.model.regressor import Regressor
+from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.predictors import free_run
+
+#: Part of the record that is held out, at its end and at its start in turn.
+_HELD_OUT = 0.3
+
+#: Samples of a trial, at most, and number of parts of a longer record that contain them.
+_SAMPLES, _PARTS = 20_000, 4
+
+#: Terms of the models of forward selection, at most.
+_TERMS = 10
+
+#: Structures of each size of the swap search that are simulated.
+_DEPTH = 3
+
+#: Samples of a shooting interval, at most a tenth of the record.
+_SHOOTING = 500
+
+
+def hold_out(record: Dataset) -> tuple[Split, Split]:
+    """Return two splits of a record, which hold out its end and its start.
+
+    A long record is replaced by parts at equal distances.
+    """
+    if record.samples > _SAMPLES:
+        length = _SAMPLES // _PARTS
+        starts = [part * (record.samples - length) // (_PARTS - 1) for part in range(_PARTS)]
+        record = join(tuple(record[start : start + length] for start in starts))
+    held = max(1, round(_HELD_OUT * record.samples))
+    return Split(record[:-held], record[-held:]), Split(record[held:], record[:held])
+
+
+def measure_library(splits: Sequence[Split], library: TrialLibrary, terms: int) -> tuple[float, ...]:
+    """Return the root mean squared error of the best model of each held-out part.
+
+    It is infinite if no model can be estimated and simulated, for example because a part is too short.
+
+    Parameters
+    ----------
+    splits : sequence of Split
+        Estimation data, and a held-out part as validation data.
+    library : TrialLibrary
+    terms : int
+        Terms of the models of the swap search, at most.
+    """
+    return tuple(min(_measure_models(split, library, terms), default=inf) ** 0.5 for split in splits)
+
+
+def _measure_models(split: Split, library: TrialLibrary, terms: int) -> Iterator[float]:
+    """Yield the mean squared errors of the free runs that do not diverge."""
+    try:
+        free = constraint(library.constraints).allows_offsets
+        offsets = find_offsets(split.estimation, OPERATING_POINT) if free else no_offsets(split.estimation)
+        estimation, held = (subtract_offsets(part, offsets) for part in (split.estimation, split.validation))
+        pool = library.screen(estimation)
+        warm_up = max(item.maximum_lag for item in pool)
+        for structure in _select(pool, estimation, library, terms):
+            found = estimate(structure, estimation, library.constraints, warm_up)
+            if not isinstance(found, EvaluationOutcome):
+                error = free_run(found.model, held, warm_up).mean_squared_error
+                if isfinite(error):
+                    yield error
+    except IslandsError:
+        return  # The search with this library reports what is wrong.
+
+
+def _select(
+    pool: Sequence[Regressor], record: Dataset, library: TrialLibrary, terms: int
+) -> Iterator[Structure]:
+    """Yield the structures of a forward selection, and those of a swap search that starts from them."""
+    problem = make_selection_problem(pool, record, library.constraints)
+    if isinstance(problem, EvaluationOutcome):
+        return
+    structures = select_forward(problem, _TERMS)
+    yield from structures
+    settings = Settings(
+        library=library.name,
+        library_degree=library.degree,
+        library_lags=library.lags,
+        library_delays=library.delays,
+        shifts=(),
+        max_terms=terms,
+        initial_terms=(1, terms),
+        constraints=library.constraints,
+        shooting=min(_SHOOTING, max(1, record.samples // 10)),
+    )
+    by_size = swap_search(
+        Evaluator(record, settings),
+        [item.expression for item in select_pool(pool, problem, terms)],
+        [tuple(item.expression for item in structure) for structure in structures if len(structure) <= terms],
+        depth=_DEPTH,
+    )
+    for individuals in by_size:
+        yield from (each.regressors for each in individuals)

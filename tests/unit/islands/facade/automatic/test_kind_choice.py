@@ -1,0 +1,149 @@
+"""Choice of the preset auto: the kind of a record, its dead times, and precedence of explicit settings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset
+from islands.data.split import split
+from islands.errors import SettingsError
+from islands.evolution.presets import KINDS, resolve_kind, resolve_kinds
+from islands.facade.automatic.held_out_error import hold_out, measure_library
+from islands.facade.automatic.kind_choice import choice_from_document, choose_library, choose_preset
+from islands.facade.automatic.trial_library import take_library
+from support.portfolio_records import KINDS as RECORDS
+
+#: Smallest search, for the settings of its result.
+SMALL = {"population": 10, "generations": 0, "max_terms": 3, "shooting": 50, "swap_search": False}
+
+
+def record(kind, samples=600):
+    return replace(RECORDS[kind], samples=samples).record(1)[0]
+
+
+def choose(data, constraints=None, delays=None, **changes):
+    return choose_library(data, "auto", changes.get("degree", 2), None, constraints, delays)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("first order", "smooth"),
+        ("Coulomb friction", "friction"),
+        ("tank", "magnitude"),
+        ("Bouc-Wen", "hysteresis"),
+    ],
+)
+@pytest.mark.ci
+def test_record_gets_the_library_of_its_kind(name, kind):
+    choice, library = choose(record(name))
+    assert choice.kind == kind
+    assert library.name == resolve_kind(kind, (), {}).library
+    assert choice.errors[kind] <= 1.05 * min(choice.errors.values())
+
+
+@pytest.mark.ci
+def test_dead_time_is_added_to_the_lags():
+    choice, library = choose(record("dead time"))
+    assert choice.delays == library.delays == (7,)
+    assert "dead time of 7 samples" in choice.reasons[1]
+    given, library = choose(record("dead time"), delays=[0])
+    assert given.delays == library.delays == (0,)
+    assert given.errors["smooth"] > 10.0 * choice.errors["smooth"]
+
+
+@pytest.mark.ci
+def test_reasons_are_two_sentences():
+    choice, _ = choose(record("first order", 300))
+    assert len(choice.reasons) == 2
+    assert choice.reasons[0].startswith("Preset auto chose smooth (library polynomial of degree 2")
+
+
+@pytest.mark.ci
+def test_choice_is_the_same_again_and_survives_json():
+    data = record("first order", 300)
+    choice, _ = choose(data)
+    assert choose(data)[0] == choice
+    assert choice_from_document(choice.to_document()) == choice
+
+
+def test_damaged_choice_is_refused():
+    with pytest.raises(SettingsError, match="start a new run"):
+        choice_from_document({"kind": "smooth"})
+
+
+@pytest.mark.ci
+def test_validation_data_take_no_part_in_the_choice():
+    data = record("first order", 300)
+    spoilt = Dataset(data.u, np.where(np.arange(300) < 225, data.y, 0.0), data.dt)
+    changes = {"library_degree": 1}
+    assert choose_preset(data, 0.25, changes) == choose_preset(spoilt, 0.25, changes)
+
+
+def test_constraint_hysteresis_permits_hysteresis_only():
+    assert list(resolve_kinds({"constraints": "hysteresis"})) == ["hysteresis"]
+    assert list(resolve_kinds({"constraints": "odd"})) == list(KINDS)
+
+
+def test_explicit_settings_take_precedence():
+    changes = {"library": "polynomial", "library_degree": 1, "primitives": ("mul", "tanh"), "library_lags": 2}
+    for kind, settings in resolve_kinds(changes).items():
+        assert {name: getattr(settings, name) for name in changes} == changes, kind
+    assert resolve_kind("friction", (3,), {"library_delays": (0,)}).library_delays == (0,)
+
+
+def test_constant_output_needs_no_comparison():
+    data = record("first order", 200)
+    choice, _ = choose(Dataset(data.u, np.ones(200), data.dt))
+    assert (choice.kind, dict(choice.errors)) == ("hysteresis", {})
+    assert "the output is constant" in choice.reasons[0]
+
+
+def test_record_that_is_too_short_gets_the_simplest_kind():
+    choice, _ = choose(record("first order", 8))
+    assert choice.kind == "smooth"
+    assert "too short" in choice.reasons[0]
+
+
+def test_both_ends_of_a_record_are_held_out_in_turn():
+    data = record("first order", 100)
+    last, first = hold_out(data)
+    assert np.array_equal(last.validation.y, data.y[-30:])
+    assert np.array_equal(first.validation.y, data.y[:30])
+    assert np.array_equal(first.estimation.y, data.y[30:])
+
+
+def test_held_out_error_of_the_true_library_is_the_noise():
+    clean = record("first order, clean", 300)
+    noisy = Dataset(clean.u, clean.y + 0.01 * np.random.default_rng(2).standard_normal(300), clean.dt)
+    library = take_library("polynomial", 1, 2, None)
+    assert max(measure_library(hold_out(clean), library, 4)) < 1e-9
+    assert all(0.008 < error < 0.015 for error in measure_library(hold_out(noisy), library, 4))
+
+
+@pytest.mark.ci
+def test_result_of_identify_contains_the_choice():
+    data = record("first order", 300)
+    result = islands.identify(data, **SMALL, library_degree=1)
+    settings = result.search_result.settings
+    choice = choose_preset(data, 0.25, SMALL | {"library_degree": 1})
+    assert (settings["preset"], settings["choice"]) == ("auto", choice.to_document())
+    assert " ".join(choice.reasons) in " ".join(str(result).split())
+    again = islands.identify(data, preset=choice, **SMALL, library_degree=1)
+    assert [each.model for each in again.models] == [each.model for each in result.models]
+    assert again.search_result.settings == settings
+
+
+@pytest.mark.ci
+def test_result_of_fit_contains_the_choice():
+    data = record("first order", 300)
+    result = islands.fit(data, degree=1, max_terms=2, certificate=0)
+    settings = result.search_result.settings
+    choice, library = choose_library(split(data).estimation, "auto", 1, None, None, None)
+    assert (settings["library"], settings["choice"]) == (library.name, choice.to_document())
+    assert " ".join(choice.reasons) in " ".join(str(result).split())
+    named = islands.fit(data, library=library.name, degree=1, max_terms=2, certificate=0)
+    assert [each.model for each in named.models] == [each.model for each in result.models]
+    assert "choice" not in named.search_result.settings
