@@ -89,10 +89,9 @@ class Preview(ResponseModel):
     samples: int | None
     columns: tuple[Column, ...]
     time: str | None = Field(default=None, description="Name of the time column.")
-    dt: float | None = Field(
-        default=None, description="Sampling time in seconds. None if the file does not give it."
-    )
+    dt: float | None = Field(default=None, description="Sampling time in seconds. None if it is unknown.")
     warnings: tuple[str, ...] = ()
+    reading: dict[str, Any] = Field(default_factory=dict, description="Options of reading.")
     inspection: Inspection | None = Field(
         default=None, description="Facts about the record. None if no two columns form one."
     )

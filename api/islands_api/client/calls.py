@@ -64,22 +64,27 @@ def upload(
     inputs: str | Sequence[str] = (),
     output: str | None = None,
     dt: float | None = None,
+    reading: Mapping[str, Any] | None = None,
 ) -> RequestSpec[DatasetView]:
-    """Upload a record.
+    """Upload a record in text, XLSX, NPZ, MAT, HDF5, Parquet or TDMS.
 
     Parameters
     ----------
     path : str or Path
-        CSV, NPZ, MAT or Parquet file.
     inputs : str or sequence of str
         Input columns. If columns are given, the service checks the record as it does for a job.
-    output : str, optional
-        Output column.
-    dt : float, optional
-        Sampling time in seconds, if the record has no time column.
+    output, dt : str, float, optional
+        Output column, and sampling time in seconds if the record has no time column.
+    reading : mapping, optional
+        Options of `islands.read_record` for all jobs, such as ``{"header": False}``.
     """
-    given: dict[str, Any] = {"inputs": as_list(inputs) or None, "output": output, "dt": dt}
+    given: dict[str, Any] = {
+        "output": output,
+        "dt": dt,
+        "reading": json.dumps(dict(reading)) if reading else None,
+    }
     form = {name: value for name, value in given.items() if value is not None}
+    form |= {"inputs": as_list(inputs)} if inputs else {}
     return RequestSpec("POST", "/v1/datasets", read_as(DatasetView), data=form, file=Path(path))
 
 

@@ -9,14 +9,15 @@ import resource
 import sys
 from asyncio.subprocess import PIPE
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from islands.errors import RecordError
+from islands.errors import RecordError, SettingsError
 
 if TYPE_CHECKING:
     from islands.io.records import Preview
+    from islands.io.records.reading_options import ReadingOptions
 
 #: Environment of the process, without any secret.
 _ENVIRONMENT = {"PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
@@ -47,12 +48,15 @@ class InspectionRequest:
         Columns to read in the same way as a job; without an output the file is only described.
     dt, rows : float, str or None
         As in a job of `islands_service.domain.job_spec`.
+    reading : mapping
+        Options of `islands.io.records.reading_options.ReadingOptions` that differ from the default.
     """
 
     inputs: tuple[str, ...] = ()
     output: str | None = None
     dt: float | None = None
     rows: str | None = None
+    reading: Mapping[str, Any] = field(default_factory=dict)
 
 
 async def inspect_file(
@@ -68,7 +72,7 @@ async def inspect_file(
     Returns
     -------
     mapping
-        An `islands.io.records.preview.Preview` as a document, with the key ``inspection``.
+        An `islands.io.records.preview.Preview` as a document, with the keys ``inspection`` and ``reading``.
 
     Raises
     ------
@@ -113,26 +117,35 @@ def main() -> None:
     message = json.load(sys.stdin)
     _limit(message["memory"], message["seconds"])
     # Import after the limits are set, so that the imported code is subject to them.
-    from islands.io.records import read_record  # noqa: PLC0415
+    from islands.io.records import read_dataset  # noqa: PLC0415
     from islands.io.records.preview import preview  # noqa: PLC0415
+    from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
     from islands.io.records.row_range import parse_rows  # noqa: PLC0415
 
     request = InspectionRequest(**message["asked"])
     try:
-        found = preview(message["path"])
+        options = ReadingOptions(**request.reading)
+        found = preview(message["path"], options)
         # Check this first: a message about missing columns lists the existing ones.
         _check_readable(found, message["path"])
         if request.inputs and request.output is not None:
-            read_record(message["path"], request.inputs, request.output, request.dt, parse_rows(request.rows))
-        else:
+            rows = parse_rows(request.rows)
+            read_dataset(message["path"], request.inputs, request.output, request.dt, rows, options=options)
+        elif options.gaps is None:
             _check_usable({column.name: column.problem for column in found.columns}, request)
-    except RecordError as error:
+    except (RecordError, SettingsError) as error:
         json.dump({"error": str(error)}, sys.stdout)
         sys.exit(_REFUSED)
-    json.dump(asdict(found) | {"inspection": _measure(found, message["path"], request)}, sys.stdout)
+    measured = _measure(found, message["path"], request, options)
+    if options.resample is not None:
+        found = replace(found, dt=options.resample)
+    document = {**asdict(found), "inspection": measured, "reading": options.changes()}
+    json.dump(document, sys.stdout)
 
 
-def _measure(found: "Preview", path: str, request: InspectionRequest) -> dict[str, Any] | None:
+def _measure(
+    found: "Preview", path: str, request: InspectionRequest, options: "ReadingOptions"
+) -> dict[str, Any] | None:
     """Return the choice of columns and the facts about the record; None if there is no record."""
     from islands.facade.inspect_record import inspect_file  # noqa: PLC0415
     from islands.inspection.record_facts import MOST_SAMPLES  # noqa: PLC0415
@@ -143,7 +156,9 @@ def _measure(found: "Preview", path: str, request: InspectionRequest) -> dict[st
         first = (found.samples - MOST_SAMPLES) // 2
         rows = f"{first}:{first + MOST_SAMPLES}"
     try:
-        inspected = inspect_file(path, found, request.inputs, request.output, request.dt, parse_rows(rows))
+        inspected = inspect_file(
+            path, found, request.inputs, request.output, request.dt, parse_rows(rows), options
+        )
     except RecordError:
         # The preview states the problems of the file.
         return None

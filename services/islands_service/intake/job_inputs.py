@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset, join
-from islands.io.records import read_record
+from islands.io.records import read_dataset
+from islands.io.records.reading_options import ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
 from islands_service.store.blobs import Blobs, translate_disk_full
@@ -46,10 +47,15 @@ def read_record_and_validation(
     def read(part: Part) -> Dataset:
         stored = datasets[part.dataset]
         with link_blob(blobs.path(stored.blob), stored.name) as path:
-            return read_record(path, spec.inputs, spec.output, spec.dt, parse_rows(part.rows))
+            rows, options = parse_rows(part.rows), _reading_options(stored)
+            return read_dataset(path, spec.inputs, spec.output, spec.dt, rows, options=options)
 
     record = join(tuple(read(part) for part in spec.estimation))
     return record, read(spec.validation) if isinstance(spec.validation, Part) else spec.validation
+
+
+def _reading_options(stored: StoredDataset) -> ReadingOptions:
+    return ReadingOptions(**stored.preview.get("reading", {}))
 
 
 def read_record_and_columns(
@@ -65,6 +71,7 @@ def read_record_and_columns(
         The data folder has lost a file.
     """
     with link_blob(blobs.path(stored.blob), stored.name) as path:
-        whole = read_record(path, spec.inputs, spec.output, spec.dt, parse_rows(spec.rows))
+        rows, options = parse_rows(spec.rows), _reading_options(stored)
+        whole = read_dataset(path, spec.inputs, spec.output, spec.dt, rows, options=options)
     kept = 1 + len(spec.channels)
     return whole.first_inputs(kept), dict(zip(spec.recorded_columns, whole.u[:, kept:].T, strict=True))

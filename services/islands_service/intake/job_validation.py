@@ -68,9 +68,9 @@ def validate_job(
         _check_sampling(datasets)
     for part, dataset in zip(parts, datasets, strict=True):
         if not _is_readable(spec, part, dataset.preview, dataset.name):
-            pending.append(
-                PendingInspection(dataset, InspectionRequest(spec.inputs, spec.output, spec.dt, part.rows))
-            )
+            reading = dataset.preview.get("reading", {})
+            request = InspectionRequest(spec.inputs, spec.output, spec.dt, part.rows, reading)
+            pending.append(PendingInspection(dataset, request))
     return tuple(pending)
 
 

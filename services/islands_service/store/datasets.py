@@ -1,5 +1,6 @@
 """Uploaded data sets by owner. The bytes are blobs; the rows describe their content."""
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,7 +31,8 @@ class StoredDataset:
     Attributes
     ----------
     id : str
-        Derived from content and format: the same bytes in the same format are the same data set.
+        Derived from content, format and options of reading: the same bytes that are read in the same way are
+        the same data set.
     name, suffix : str
         File name, and its suffix, which selects the reader.
     blob : str
@@ -38,7 +40,8 @@ class StoredDataset:
     bytes : int
         Size of the file.
     preview : mapping
-        Columns with units and statistics, sampling, warnings: see `islands.io.records.preview`.
+        Columns with units and statistics, sampling, warnings: see `islands.io.records.preview`. Jobs read the
+        file with the options ``reading``.
     """
 
     owner: str
@@ -79,7 +82,7 @@ class Datasets:
         QuotaError
             The data sets of the owner would exceed ``most_bytes``.
         """
-        identity = dataset_id(blob, suffix)
+        identity = dataset_id(blob, suffix, preview.get("reading"))
 
         def operation(connection: Connection) -> tuple[StoredDataset, bool]:
             dialect.lock_owner(connection, owner)
@@ -103,7 +106,15 @@ class Datasets:
 
         return self._database.write(operation)
 
-    def check_room(self, owner: str, suffix: str, blob: str, size: int, most_bytes: int) -> None:
+    def check_room(
+        self,
+        owner: str,
+        suffix: str,
+        blob: str,
+        size: int,
+        most_bytes: int,
+        reading: Mapping[str, Any] | None = None,
+    ) -> None:
         """Raise the error that `add` would raise, before the bytes are stored.
 
         Raises
@@ -111,7 +122,8 @@ class Datasets:
         QuotaError
         """
         with self._database.read() as connection:
-            if connection.execute(_select(owner, dataset_id(blob, suffix))).one_or_none() is None:
+            identity = dataset_id(blob, suffix, reading)
+            if connection.execute(_select(owner, identity)).one_or_none() is None:
                 _check_quota(connection, owner, size, most_bytes)
 
     def get(self, owner: str, dataset: str) -> StoredDataset:
@@ -168,8 +180,10 @@ class Datasets:
         self._database.write(operation)
 
 
-def dataset_id(blob: str, suffix: str) -> str:
-    """Return the id of a data set: the same bytes in the same format have the same id."""
+def dataset_id(blob: str, suffix: str, reading: Mapping[str, Any] | None = None) -> str:
+    """Return the id of a data set: the same bytes that are read in the same way have the same id."""
+    if reading:
+        blob = hashlib.sha256(f"{blob} {json.dumps(reading, sort_keys=True)}".encode()).hexdigest()
     return f"{blob[:32]}-{suffix.removeprefix('.')}"
 
 

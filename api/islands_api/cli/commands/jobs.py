@@ -7,10 +7,12 @@ from typing import Annotated, Any
 import typer
 
 from islands.errors import SettingsError
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands_api.cli import job_views as views
 from islands_api.cli import options
 from islands_api.cli.console import errors, output
 from islands_api.cli.output_folder import check_folder
+from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, Seed, with_search_options
 from islands_api.client import Client, JobFailedError
 from islands_api.client.diagnosis_calls import parse_simulation
@@ -50,6 +52,7 @@ _MAX_NAME_LENGTH = 200
 
 
 @jobs.command()
+@with_reading_options
 @with_search_options
 def submit(
     records: options.Records,
@@ -57,6 +60,7 @@ def submit(
     output_column: options.Output,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
+    reading: ReadingOptions = DEFAULT_READING,
     validation: Annotated[
         str | None,
         typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
@@ -77,11 +81,13 @@ def submit(
         raise SettingsError(f"--validation {held_out}: with several recordings, give a file or a fraction")
     with _client(url, key) as client:
         whole = output_column if rows is None else None
-        dataset, *others = (client.upload(record, names, whole, dt) for record in records)
+        dataset, *others = (client.upload(record, names, whole, dt, reading.changes()) for record in records)
         validation_data: float | dict[str, Any] | None
         match held_out:
             case Path():
-                validation_data = {"dataset": client.upload(held_out, names, output_column, dt).id}
+                validation_data = {
+                    "dataset": client.upload(held_out, names, output_column, dt, reading.changes()).id
+                }
             case str():
                 validation_data = {"dataset": dataset.id, "rows": held_out}
             case _:
@@ -110,6 +116,7 @@ def submit(
 
 
 @jobs.command()
+@with_reading_options
 def diagnose(
     record: Annotated[Path, typer.Argument(help="The record: CSV, NPZ, MAT or Parquet.")],
     inputs: options.Inputs,
@@ -119,6 +126,7 @@ def diagnose(
     tolerance: options.Tolerances = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
+    reading: ReadingOptions = DEFAULT_READING,
     seed: Seed = 0,
     name: Name = "",
     priority: Priority = 0,
@@ -136,7 +144,7 @@ def diagnose(
     with _client(url, key) as client:
         whole = output_column if rows is None else None
         job = client.diagnose(
-            client.upload(record, read, whole, dt),
+            client.upload(record, read, whole, dt, reading.changes()),
             driving,
             output_column,
             simulation,

@@ -1,5 +1,8 @@
 """Data sets: upload, inspect, list, delete."""
 
+import json
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -7,6 +10,8 @@ import fastapi
 from fastapi import APIRouter, File, Form, UploadFile
 from pydantic import FiniteFloat
 
+from islands.errors import SettingsError
+from islands.io.records.reading_options import ReadingOptions
 from islands_api.schemas import DatasetPage, DatasetView
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
@@ -49,27 +54,67 @@ Id = Annotated[
     form_limits={"max_files": 1, "max_fields": 200, "max_part_size": 10_000},
 )
 async def upload(
-    file: Annotated[UploadFile, File(description="CSV, NPZ, MAT or Parquet, optionally compressed as .gz")],
+    file: Annotated[UploadFile, File(description="Text, XLSX, NPZ, MAT, HDF5, Parquet or TDMS; also .gz")],
     caller: Writer,
     state: AppStateDep,
     inputs: Annotated[list[Name], Form(max_length=16, description="Columns to check as inputs.")] = [],  # noqa: B006
     output: Annotated[Name | None, Form(description="Column to check as the output.")] = None,
     dt: Annotated[FiniteFloat | None, Form(description="Sampling time in seconds.", gt=0.0)] = None,
+    reading: Annotated[
+        str, Form(max_length=10_000, description='Options of reading as JSON: `{"names": ["t", "u", "y"]}`.')
+    ] = "{}",
 ) -> Any:
     """Upload a record.
 
     The response lists the columns with units and statistics, and the problems of columns that cannot be used.
     With `inputs` and `output`, the record is validated as for a job and rejected if a job could not use it;
-    with only one of them, only these columns are validated. The same bytes are the same data set: the status
-    is then 200 instead of 201.
+    with only one of them, only these columns are validated. The same bytes that are read in the same way are
+    the same data set: the status is then 200 instead of 201.
     """
     name, compressed = parse_file_name(file.filename)
     stored, new = await _store_upload(
-        state, caller.owner, file, name, compressed, InspectionRequest(tuple(inputs), output, dt)
+        state,
+        caller.owner,
+        file,
+        name,
+        compressed,
+        InspectionRequest(tuple(inputs), output, dt, reading=_parse_reading(reading)),
     )
     state.metrics.received.inc(stored.bytes if new else 0)
     headers = {"Location": f"{router.prefix}/{stored.id}"}
     return JSONDocument(dataset_document(stored), 201 if new else 200, headers)
+
+
+def _parse_reading(text: str) -> Mapping[str, Any]:
+    """Read the options of reading.
+
+    Raises
+    ------
+    SettingsError
+        They are not a JSON object, or an option is unknown or invalid.
+    """
+    try:
+        given = json.loads(text)
+    except (ValueError, RecursionError):
+        given = None
+    if not isinstance(given, dict) or not all(_is_option(name, value) for name, value in given.items()):
+        raise SettingsError(
+            'reading is a JSON object of options, for example {"names": ["t", "u", "y"], "gaps": "split"}'
+        )
+    return ReadingOptions(**given).changes()
+
+
+def _is_option(name: str, value: Any) -> bool:
+    """Return whether an option exists and the value has its type."""
+    match name:
+        case "names":
+            return isinstance(value, list) and all(isinstance(each, str) for each in value)
+        case "header":
+            return isinstance(value, bool)
+        case "resample":
+            return isinstance(value, int | float) and not isinstance(value, bool)
+        case _:
+            return isinstance(value, str) and name in {option.name for option in fields(ReadingOptions)}
 
 
 async def _store_upload(
@@ -88,7 +133,13 @@ async def _store_upload(
                 )
             suffix = Path(name).suffix.lower()
             await state.run_blocking(
-                state.store.datasets.check_room, owner, suffix, blob, size, settings.max_stored
+                state.store.datasets.check_room,
+                owner,
+                suffix,
+                blob,
+                size,
+                settings.max_stored,
+                preview["reading"],
             )
             # An upload that was rejected before this line is deleted at the end of the block.
             await state.run_blocking(state.blobs.keep, stream)

@@ -59,11 +59,11 @@ def test_upload_returns_the_preview_of_the_record(client: Any, record: Path) -> 
 @pytest.mark.ci
 def test_upload_with_columns_is_checked_like_a_job(client: Any, me: Any, tmp_path: Path) -> None:
     path = tmp_path / "record.csv"
-    path.write_bytes(csv(y_um={8: "nan"}))
+    path.write_bytes(csv(u_V={8: "nan"}))
     with pytest.raises(ServiceError) as caught:
         client.upload(path, "u_V", "y_um")
     assert (caught.value.status, caught.value.type) == (422, "/problems/invalid-record")
-    assert "record.csv, line 8, column y_um" in caught.value.detail
+    assert "record.csv, line 8, column u_V" in caught.value.detail
     assert [dataset.id for dataset in client.datasets().items] == [me.dataset]
 
 
