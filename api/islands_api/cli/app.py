@@ -26,8 +26,10 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
     {
         "inspect": "Describe a record: columns, sampling, dead time, noise, excitation, and the next "
         "command.",
-        "identify": "Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR continues.",
-        "fit": "Fit small models to a record by subset selection and least squares, and assess them.",
+        "identify": "Identify recordings of a system by evolution. Ctrl-C keeps the best so far; --resume "
+        "DIR continues.",
+        "fit": "Fit small models to recordings of a system by subset selection and least squares, and assess "
+        "them.",
         "diagnose": "Find the errors of a simulation on a record, name their causes, and measure the gain of "
         "correction.",
         "simulate": "Simulate a model on a record. A free run needs only the first samples of the output.",
