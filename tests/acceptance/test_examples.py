@@ -20,7 +20,6 @@ README = (tutorials.ROOT / "examples" / "README.md").read_text()
 PUBLIC = {
     "islands": set(islands.__all__),
     "islands_api": {"Client", "AsyncClient"},
-    "islands_service.engines": {"ray_engine"},
 }
 
 #: Libraries that examples may import besides the standard library.
