@@ -78,13 +78,9 @@ def upload(
     reading : mapping, optional
         Options of `islands.read_record` for all jobs, such as ``{"header": False}``.
     """
-    given: dict[str, Any] = {
-        "output": output,
-        "dt": dt,
-        "reading": json.dumps(dict(reading)) if reading else None,
-    }
-    form = {name: value for name, value in given.items() if value is not None}
-    form |= {"inputs": as_list(inputs)} if inputs else {}
+    options = json.dumps(dict(reading)) if reading else None
+    given: dict[str, Any] = {"inputs": as_list(inputs) or None, "output": output, "dt": dt}
+    form = {name: value for name, value in (given | {"reading": options}).items() if value is not None}
     return RequestSpec("POST", "/v1/datasets", read_as(DatasetView), data=form, file=Path(path))
 
 
