@@ -15,6 +15,7 @@ from typing import Any
 _PUBLIC = {
     "data.coupled_record": ("CoupledRecord",),
     "data.dataset": ("Dataset", "join"),
+    "data.preprocessing": ("preprocess",),
     "data.split": ("Split", "split"),
     "discrepancy.detectability": ("self_test",),
     "discrepancy.diagnosis": ("Diagnosis",),

@@ -2,6 +2,7 @@
 from islands.data.coupled_record import CoupledRecord as CoupledRecord
 from islands.data.dataset import Dataset as Dataset
 from islands.data.dataset import join as join
+from islands.data.preprocessing import preprocess as preprocess
 from islands.data.split import Split as Split
 from islands.data.split import split as split
 from islands.discrepancy.detectability import self_test as self_test

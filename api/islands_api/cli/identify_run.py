@@ -12,6 +12,7 @@ from typing import Any
 
 import islands
 from islands.data.compatibility import match_rate, match_record
+from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
@@ -187,7 +188,8 @@ def _read_data(
     # Checkpoints of versions with one recording have its path under another name.
     paths = [Path(name) for name in job.get("records") or [job["record"]]]
     reading = ReadingOptions(**job.get("reading", {}))
-    recordings = Recordings(paths, job["inputs"], job["output"], job["dt"], reading)
+    steps = PreprocessingSteps(**job.get("preprocessing", {}))
+    recordings = Recordings(paths, job["inputs"], job["output"], job["dt"], reading, steps)
     data = recordings.read(job["rows"])
     held_out = recordings.read_held_out(job["validation"], job["rows"])
     test_data: islands.Dataset | None = None

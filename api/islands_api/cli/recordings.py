@@ -1,10 +1,12 @@
 """Recordings of one system that a command reads."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from islands.data.dataset import Dataset, join
+from islands.data.preprocessing import preprocess
+from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError
 from islands.io.records import read_dataset
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
@@ -29,6 +31,8 @@ class Recordings:
     dt : float, optional
         Sampling time in seconds, for files that do not contain it.
     reading : ReadingOptions
+    steps : PreprocessingSteps
+        Steps of all recordings. The offsets are those of the estimation data.
     """
 
     paths: Sequence[Path]
@@ -36,9 +40,13 @@ class Recordings:
     output: str
     dt: float | None = None
     reading: ReadingOptions = DEFAULT_READING
+    steps: PreprocessingSteps = NO_STEPS
 
     def read(self, rows: str | None = None) -> Dataset:
-        """Read ``START:STOP`` of every recording, or all of it, and join the recordings."""
+        """Read ``START:STOP`` of every recording, or all of it, join the recordings and preprocess them."""
+        return preprocess(self._read_measured(rows), **asdict(self.steps))
+
+    def _read_measured(self, rows: str | None) -> Dataset:
         return join(tuple(self._read_file(path, rows) for path in self.paths))
 
     def read_held_out(
@@ -63,17 +71,21 @@ class Recordings:
         if text is None:
             return FRACTION
         if Path(text).exists():
-            return self._read_file(Path(text))
+            return self._preprocess_held_out(self._read_file(Path(text)), used)
         if ":" in text:
             if used is None or overlap(parse_rows(used), parse_rows(text)):
                 raise SettingsError(f"{option} {text}: give --rows START:STOP, other samples for estimation")
-            return self.read(text)
+            return self._preprocess_held_out(self._read_measured(text), used)
         try:
             return float(text)
         except ValueError:
             raise SettingsError(
                 f"{option} {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
             ) from None
+
+    def _preprocess_held_out(self, record: Dataset, used: str | None) -> Dataset:
+        """Do the steps with the offsets of the estimation data."""
+        return record if self.steps.is_none else preprocess(record, like=self.read(used))
 
     def _read_file(self, path: Path, rows: str | None = None) -> Dataset:
         return read_dataset(path, self.inputs, self.output, self.dt, parse_rows(rows), options=self.reading)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import RecordError
 
 #: Largest relative difference between equal sampling times. A printed time column is not more precise.
@@ -40,6 +41,8 @@ class Dataset:
         Hexadecimal hash of the source file. Empty if unknown.
     reading : tuple of str
         What was done to the samples of the file, such as resampling, in this order.
+    preprocessing : Preprocessing or None
+        Steps that were done with the samples, see `islands.data.preprocessing.preprocess`.
 
     Raises
     ------
@@ -60,6 +63,7 @@ class Dataset:
     start: float = 0.0
     sha256: str = ""
     reading: tuple[str, ...] = ()
+    preprocessing: Preprocessing | None = None
 
     def __post_init__(self) -> None:
         u = np.array(self.u, dtype=np.float64, order="C", ndmin=1)

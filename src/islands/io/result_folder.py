@@ -42,6 +42,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
             "dt": found.split.estimation.dt,
             "feedthrough": list(found.direct_inputs),
             "shooting_interval": found.shooting_interval,
+            "steps": None if found.record.preprocessing is None else found.record.preprocessing.as_document(),
         },
         "seed": found.seed,
         "settings": dict(found.settings),

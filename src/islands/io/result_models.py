@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 
 
@@ -93,6 +94,30 @@ def read_shooting_interval(document: Mapping[str, Any]) -> int:
     # Results of earlier versions had intervals of as many means as the setting has samples.
     preprocessing = document.get("preprocessing", {})
     return int(preprocessing.get("shooting_interval", document["settings"]["shooting"]))
+
+
+def read_preprocessing(model_file: str | Path) -> Preprocessing | None:
+    """Return the steps that the record of a model was preprocessed with; None if there were none.
+
+    Parameters
+    ----------
+    model_file : str or Path
+        File of a model. A file outside of a result folder has no steps.
+
+    Raises
+    ------
+    ModelError
+        ``result.json`` is damaged.
+    """
+    file = Path(model_file).absolute()
+    result = file.parent.parent / "result.json"
+    if file.parent.name != "models" or not result.is_file():
+        return None
+    steps = _read_object(result).get("preprocessing", {}).get("steps")
+    try:
+        return None if steps is None else Preprocessing.from_document(steps)
+    except (ValueError, KeyError, TypeError) as error:
+        raise _damaged(result, error) from error
 
 
 def _read_object(result: Path) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import typer
 
 import islands
 from islands.data.averaging import AUTO
+from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError
 from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
@@ -18,6 +19,7 @@ from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, progress
 from islands_api.cli.coupled_run import couple_data, coupled_options, join_columns, show_coupled
 from islands_api.cli.output_folder import check_folder, show_result
+from islands_api.cli.preprocessing_options import check_one_output, with_preprocessing_options
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
 
@@ -26,6 +28,7 @@ SEVERAL_OUTPUTS = "polynomial"
 
 
 @with_reading_options
+@with_preprocessing_options
 def fit(
     records: options.Records,
     inputs: options.Inputs,
@@ -34,6 +37,7 @@ def fit(
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     reading: ReadingOptions = DEFAULT_READING,
+    steps: PreprocessingSteps = NO_STEPS,
     validation: Annotated[
         str | None,
         typer.Option(
@@ -89,7 +93,8 @@ def fit(
     check_folder(out, force)
     outputs = options.columns(output_columns)
     names, output_column = join_columns(options.columns(inputs), outputs)
-    recordings = Recordings(records, names, output_column, dt, reading)
+    check_one_output(steps, len(outputs))
+    recordings = Recordings(records, names, output_column, dt, reading, steps)
     compile_kernels()
     with progress("fit") as show:
         show("reading", 0.0)

@@ -1,10 +1,12 @@
 """``islands identify``: search by MGGP/FROE, refinement, validation."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError, lookup
 from islands.evolution.presets import AUTO
 from islands.io.records import fingerprint
@@ -13,6 +15,7 @@ from islands_api.cli import options
 from islands_api.cli.coupled_run import couple_data, identify_several, join_columns
 from islands_api.cli.identify_run import RunOptions, load_run, run
 from islands_api.cli.output_folder import check_folder
+from islands_api.cli.preprocessing_options import check_one_output, with_preprocessing_options
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, with_search_options
@@ -26,6 +29,7 @@ COUPLED_PRESET = "narx"
 
 
 @with_reading_options
+@with_preprocessing_options
 @with_search_options
 def identify(
     context: typer.Context,
@@ -39,6 +43,7 @@ def identify(
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     reading: ReadingOptions = DEFAULT_READING,
+    steps: PreprocessingSteps = NO_STEPS,
     validation: Annotated[
         str | None,
         typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
@@ -88,6 +93,7 @@ def identify(
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
         check_folder(out, force)
         names, output_column = join_columns(options.columns(inputs), outputs)
+        check_one_output(steps, len(outputs))
         if len(outputs) > 1:
             if test is not None or wall_time is not None:
                 raise SettingsError("--test and --wall-time are for one output: leave them out")
@@ -115,6 +121,7 @@ def identify(
             "dt": dt,
             "rows": rows,
             "reading": reading.changes(),
+            "preprocessing": asdict(steps),
             "preset": search.preset,
             "seed": search.seed,
             "changes": dict(search.changes),

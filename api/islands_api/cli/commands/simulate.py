@@ -1,5 +1,6 @@
 """``islands simulate``: prediction of a record by a model."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from islands.data.channel_names import parse_channel_name
 from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
+from islands.data.preprocessing import apply_preprocessing
+from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import SettingsError
 from islands.facade.fit import SHOOTING
 from islands.facade.results.model_simulation import simulate as run
@@ -17,7 +20,12 @@ from islands.io.ensembles import read_bands
 from islands.io.records import read_dataset, write_simulation
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
-from islands.io.result_models import ErrorMeasurement, find_model_file, read_error_measurement
+from islands.io.result_models import (
+    ErrorMeasurement,
+    find_model_file,
+    read_error_measurement,
+    read_preprocessing,
+)
 from islands.io.simulator_spec.factory import simulate_spec
 from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost
 from islands.validation.metrics import metrics
@@ -105,9 +113,13 @@ def simulate(
     )
     for step in recorded.reading:
         output.print(step, markup=False)
-    data = match_rate(chosen, recorded)
-    if data is not recorded:
-        output.print(f"averaged {chosen.average} samples of {recorded.dt:g} s each: dt {data.dt:g} s")
+    done = read_preprocessing(find_model_file(model))
+    prepared = recorded if done is None else apply_preprocessing(recorded, done)
+    if done is not None:
+        output.print(_describe_steps(done), markup=False)
+    data = match_rate(chosen, prepared)
+    if data is not prepared:
+        output.print(f"averaged {chosen.average} samples of {prepared.dt:g} s each: dt {data.dt:g} s")
     compile_kernels()
     reported = read_error_measurement(find_model_file(model)) or ErrorMeasurement(None, SHOOTING)
     interval = reported.shooting if shooting is None else shooting
@@ -116,9 +128,22 @@ def simulate(
     if bands is not None:
         band = read_bands(find_model_file(model), chosen).predict(chosen, data, bands, first)
     simulation = run(chosen, data, mode, interval, warm_up=first)
-    _print_metrics(
-        data, simulation.y, f"{mode} after a warm-up of {first} samples: {simulation.outcome}", out, band
-    )
+    y, offset = simulation.y, 0.0 if done is None else done.output_offset
+    if offset:
+        data, y = replace(data, y=data.y + offset), y + offset
+        if band is not None:
+            moved = (band.y + offset, band.lower + offset, band.upper + offset)
+            band = PredictionBand(band.level, *moved)
+    _print_metrics(data, y, f"{mode} after a warm-up of {first} samples: {simulation.outcome}", out, band)
+
+
+def _describe_steps(done: Preprocessing) -> str:
+    """Return the steps that a record was preprocessed with as text."""
+    steps = done.steps
+    parts = [f"low-pass {steps.lowpass:g} Hz"] if steps.lowpass is not None else []
+    parts += [f"every {steps.decimate} samples"] if steps.decimate > 1 else []
+    parts += ["offsets of the estimation data, added to the simulation"] if steps.detrend != "none" else []
+    return f"preprocessed as the record of the model: {', '.join(parts)}"
 
 
 def _simulate_extended(

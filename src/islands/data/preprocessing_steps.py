@@ -1,0 +1,96 @@
+"""Preprocessing of a record as a value: what was done, and with which offsets."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import Any
+
+from islands.errors import SettingsError
+
+#: Values of ``detrend``.
+DETREND = ("none", "constant", "linear")
+
+
+@dataclass(frozen=True, slots=True)
+class PreprocessingSteps:
+    """Steps before a search, in the order in which they are done.
+
+    Attributes
+    ----------
+    lowpass : float or None
+        Cutoff in hertz of a zero-phase low-pass filter of all signals.
+    decimate : int
+        Every how many samples one is kept, behind a zero-phase low-pass filter.
+    detrend : str
+        ``constant`` subtracts the mean of every signal; ``linear`` also a straight line from the output.
+
+    Raises
+    ------
+    SettingsError
+        A value is out of range.
+    """
+
+    lowpass: float | None = None
+    decimate: int = 1
+    detrend: str = "none"
+
+    def __post_init__(self) -> None:
+        if self.lowpass is not None and not (isfinite(self.lowpass) and self.lowpass > 0.0):
+            raise SettingsError(f"lowpass is a frequency in hertz above 0, got {self.lowpass}")
+        if self.decimate < 1:
+            raise SettingsError(f"decimate is a number of samples from 1 on, got {self.decimate}")
+        if self.detrend not in DETREND:
+            raise SettingsError(f"detrend is {' or '.join(DETREND)}, got {self.detrend!r}")
+
+    @property
+    def is_none(self) -> bool:
+        """Whether there is no step."""
+        return self == NO_STEPS
+
+
+#: No preprocessing.
+NO_STEPS = PreprocessingSteps()
+
+
+@dataclass(frozen=True, slots=True)
+class Preprocessing:
+    """Steps that were done with a record, and the values with which another record repeats them.
+
+    Attributes
+    ----------
+    steps : PreprocessingSteps
+    dt : float
+        Sampling time in seconds before the steps.
+    input_offsets, output_offset : tuple of float, float
+        Values that were subtracted. A model of the record reads and predicts deviations from them.
+    output_slope : float
+        Slope, per second, of the line that was subtracted from the output. It describes a drift of this
+        record only, so it is neither subtracted from another one nor added to a simulation.
+    """
+
+    steps: PreprocessingSteps
+    dt: float
+    input_offsets: tuple[float, ...]
+    output_offset: float
+    output_slope: float
+
+    def as_document(self) -> dict[str, Any]:
+        """Return the preprocessing as JSON values."""
+        return asdict(self) | {"input_offsets": list(self.input_offsets)}
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> "Preprocessing":
+        """Return the preprocessing of a document.
+
+        Raises
+        ------
+        KeyError, TypeError
+            The document is damaged.
+        """
+        return cls(
+            PreprocessingSteps(**document["steps"]),
+            float(document["dt"]),
+            tuple(float(offset) for offset in document["input_offsets"]),
+            float(document["output_offset"]),
+            float(document["output_slope"]),
+        )
