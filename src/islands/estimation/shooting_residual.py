@@ -52,7 +52,8 @@ class ShootingResidual:
         )
         if ending == DIVERGED:
             return None
-        return np.ascontiguousarray((predicted - self._y)[self._predicted])
+        # The memory of other samples is not initialised: differences of it may overflow.
+        return predicted[self._predicted] - self._y[self._predicted]
 
     def mean_square(self, error: NDArray[np.float64]) -> float:
         """Return the mean square of a residual."""
