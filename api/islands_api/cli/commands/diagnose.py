@@ -19,6 +19,7 @@ from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.records import read_dataset
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
+from islands.io.result_text.text_layout import wrap
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import ColumnSpec, innermost, parse_spec
@@ -85,7 +86,8 @@ def diagnose(
             )
         show("figures", 0.9)
         write(diagnosis, out, record.name, wall, limits, formula)
-    output.print(summarise(diagnosis, formula), markup=False)
+    for paragraph in summarise(diagnosis, formula).splitlines():
+        output.print("\n".join(wrap(paragraph, "    ")), markup=False)
     if limits is not None:
         output.print(summarise_self_test(limits), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)

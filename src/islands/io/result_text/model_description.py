@@ -141,13 +141,17 @@ def _describe_recordings(found: SearchResult, entry: RankedModel) -> Iterator[st
 def _describe_uncertainty(found: SearchResult, entry: RankedModel) -> Iterator[str]:
     if entry.bands is None or found.ensemble is None:
         return
-    # Rounded down: a term below the limit never shows the limit.
-    doubtful = [f"{term} {floor(100 * share) / 100:.2f}" for term, share in _list_doubtful(found, entry)]
+    doubtful = [f"{term} {_round_down(share)}" for term, share in _list_doubtful(found, entry)]
     text = f"the {100 * LEVEL:g} % prediction band of the free run has a median half-width of "
     text += f"{_unit(found, entry.bands.typical_half_width())}; "
     terms = f"doubtful terms, with the probability of their inclusion: {', '.join(doubtful)}"
     certain = f"every term has an inclusion probability of {_CERTAIN:g} or more"
     yield f"Uncertainty: {text}{terms if doubtful else certain}."
+
+
+def _round_down(share: float) -> str:
+    # A term below a limit never shows the limit.
+    return f"{floor(100 * share) / 100:.2f}"
 
 
 def _list_doubtful(found: SearchResult, entry: RankedModel) -> list[tuple[str, float]]:
@@ -266,7 +270,7 @@ def _list_next_steps(found: SearchResult, entry: RankedModel) -> list[str]:
     if unlikely[1] < _UNLIKELY and not weak:
         steps.append(
             f"try a longer record, since models without {unlikely[0]} are about as good (probability of its "
-            f"inclusion {unlikely[1]:.2f})"
+            f"inclusion {_round_down(unlikely[1])})"
         )
     steps.append("check the model on a record that was not used (islands simulate)")
     return steps

@@ -1,0 +1,62 @@
+"""Picture of the README: the four example records, the equations found in them, and their free runs.
+
+``python docs/_scripts/gallery.py`` draws ``docs/pictures/gallery.svg`` again.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+import islands
+from islands.data.split import split
+from islands.figures.style import (
+    MEASURED,
+    MEASURED_WIDTH,
+    SIMULATED,
+    SIMULATED_WIDTH,
+    blank,
+    finish,
+    house_style,
+    label,
+    save,
+)
+from islands.systems.example_records import EXAMPLE_RECORDS
+
+PICTURE = Path(__file__).parents[1] / "pictures" / "gallery.svg"
+
+#: Samples of each record that are shown.
+SHOWN = 150
+
+
+def draw(axes: Axes, name: str) -> None:
+    """Draw the first part of the validation data, and the free run of the recommended model."""
+    record = EXAMPLE_RECORDS[name].make()
+    validation = split(record).validation
+    best = islands.fit(record).best
+    run = best.simulate(validation).y[:SHOWN]
+    time, measured = validation.time[:SHOWN], validation.y[:SHOWN]
+    axes.plot(time, measured, color=MEASURED, lw=MEASURED_WIDTH, label="measured")
+    axes.plot(time, run, color=SIMULATED, lw=2 * SIMULATED_WIDTH, label="simulated")
+    error = best.metrics["validation"]["free_run"].mape
+    axes.set_title(
+        f"{name}: {best.model.size} terms, free-run error {error:.2g} % of the range", fontsize=8.0
+    )
+    axes.set_ylabel(label(record.output_name, record.output_unit))
+    axes.set_xlim(float(np.min(time)), float(np.max(time)))
+    axes.set_xlabel("time (s)")
+
+
+@house_style()
+def draw_gallery() -> None:
+    """Draw and save the picture."""
+    figure = blank(4.4, "")
+    places = figure.subplots(2, 2)
+    for axes, name in zip(places.flat, EXAMPLE_RECORDS, strict=True):
+        draw(axes, name)
+    places[0, 0].legend(fontsize=7.0, loc="lower right")
+    save(finish(figure), PICTURE)
+
+
+if __name__ == "__main__":
+    draw_gallery()
