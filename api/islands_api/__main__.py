@@ -36,6 +36,13 @@ _BACKLOG = 2048
 
 def main() -> int:
     """Serve until SIGTERM or SIGINT."""
+    if sys.argv[1:]:
+        print(
+            f"islands: the web server takes no arguments, got {' '.join(sys.argv[1:])}: "
+            "the command line is 'islands' or 'python -m islands'",
+            file=sys.stderr,
+        )
+        return MISCONFIGURED
     try:
         settings = service_settings()
         configure_logs(settings.log_format, "api")

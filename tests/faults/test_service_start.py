@@ -9,7 +9,8 @@ from threading import Timer
 import pytest
 import trustme
 
-from islands_api.__main__ import open_listener
+from islands_api.__main__ import main, open_listener
+from islands_service.supervisor import MISCONFIGURED
 from support.command_line import succeed
 from support.processes import eventually, kill
 from support.service_processes import free_port, serving, started
@@ -146,3 +147,11 @@ def test_event_stream_ends_cleanly_when_the_service_stops(tmp_path: Path) -> Non
             # A truncated response would raise an error here.
             assert not [line for line in lines if line.startswith("id: ")]
         assert service.process.wait(30) == 0
+
+
+def test_the_server_refuses_arguments(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["islands_api", "inspect", "r.csv"])
+    assert main() == MISCONFIGURED
+    assert "takes no arguments, got inspect r.csv: the command line is 'islands'" in capsys.readouterr().err
