@@ -210,8 +210,8 @@ DEFECTIVE = {
         ("a.csv, line 7, column y_um: 'oops' is not a number", "correct the cell or leave its row out"),
     ),
     "NaN": (
-        csv(y_um={7: "NaN"}),
-        ("a.csv, line 7, column y_um is empty or NaN", "interpolation, or select rows without it"),
+        csv(u_V={7: "NaN"}),
+        ("a.csv, line 7, column u_V is empty or NaN", "or select rows without it"),
     ),
     "infinite": (csv(y_um={7: "inf"}), ("a.csv, line 7, column y_um is infinite", "repair it")),
     "constant": (
@@ -248,8 +248,8 @@ def test_defect_of_a_record_is_reported_and_rejects_its_jobs(service, case):
     assert stored.status_code == 201
     preview = stored.json()["preview"]
     problems = {each["name"]: each["problem"] for each in preview["columns"]}
-    assert [name for name, problem in problems.items() if problem and name != "dt"] in ([], ["y_um"])
-    message = problems["y_um"] or " ".join(preview["warnings"])
+    assert [name for name, problem in problems.items() if problem and name != "dt"] in ([], ["u_V"], ["y_um"])
+    message = problems["u_V"] or problems["y_um"] or " ".join(preview["warnings"])
     job = problem_of(service.submit(**spec(stored.json()["id"])), 422, "invalid-record")
     for word in words:
         assert word in message

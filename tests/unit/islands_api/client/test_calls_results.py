@@ -17,7 +17,7 @@ from islands_api.client import ServiceError
 from islands_api.schemas import HistoryPage, ModelView
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.store.blobs import Blobs
-from support.service import Service, csv
+from support.service import Service, csv, spec
 
 #: Settings of a very short search on two islands.
 SMALL = {
@@ -40,7 +40,7 @@ def finished(service: Service) -> tuple[str, str]:
     headers = {"Authorization": f"Bearer {secret}"}
     files = {"file": ("record.csv", csv(400))}
     dataset = service.client.post("/v1/datasets", files=files, headers=headers).json()["id"]
-    body = {"dataset": dataset, "inputs": ["u_V"], "output": "y_um", "settings": SMALL}
+    body = spec(dataset, settings=SMALL)
     job = service.client.post("/v1/jobs", json=body, headers=headers).json()["id"]
     lease = service.store.leases.claim("test", 3600.0)
     assert lease is not None

@@ -134,6 +134,7 @@ def test_validation_is_rows_or_a_file(
     assert found == expected
 
 
+@pytest.mark.ci
 def test_several_recordings_are_one_job(run: Run, service: Service, owner: str, tmp_path: Path) -> None:
     (tmp_path / "v.csv").write_bytes(csv(120))
     code, out, err = run("submit", "r.csv", "v.csv", *COLUMNS, "--json")
