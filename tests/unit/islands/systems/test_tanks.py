@@ -49,7 +49,12 @@ def test_caught_overflow_is_not_lost() -> None:
 
 
 @given(
-    st.floats(0.2, 3.0), st.floats(0.5, 2.0), st.floats(0.5, 2.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0)
+    # From 0.4 on, one step of 0.1 s does not empty a tank, which would be a cycle in place of a steady state.
+    st.floats(0.45, 3.0),
+    st.floats(0.5, 2.0),
+    st.floats(0.5, 2.0),
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 1.0),
 )
 def test_outflow_equals_inflow_in_the_steady_state(
     u: float, k1: float, k2: float, linear: float, own: float
