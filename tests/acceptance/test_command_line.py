@@ -29,7 +29,8 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def fit(base: Path, out: str) -> None:
     succeed(
         *("fit", base / "long.csv", "--input", "u_V", "--output", "y_um", "--rows", "0:5000"),
-        *("--validation", base / "sine.csv", "--max-terms", 6, "--out", base / out),
+        *("--validation", base / "sine.csv", "--library", "phi-polynomial", "--max-terms", 6),
+        *("--out", base / out),
     )
 
 

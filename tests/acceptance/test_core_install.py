@@ -71,6 +71,7 @@ def test_the_help_lists_commands_of_all_extras(folder):
         assert f" {command} " in printed
 
 
+@pytest.mark.nightly
 def test_a_record_is_fitted_simulated_and_exported(folder):
     succeed(folder, "fit", "record.csv", *COLUMNS, "--max-terms", 4, "--out", "fit")
     succeed(folder, "simulate", "fit", "record.csv", "--out", "simulated.csv")
@@ -79,6 +80,7 @@ def test_a_record_is_fitted_simulated_and_exported(folder):
     assert (folder / "model.fmu").read_bytes().startswith(b"PK")
 
 
+@pytest.mark.nightly
 def test_systems_make_records(folder):
     succeed(folder, "systems", "make", "s1", "--out", "system.csv")
     assert (folder / "system.csv").is_file()
@@ -91,6 +93,7 @@ def test_a_search_of_two_islands_runs_serially_and_says_so(folder):
     assert json.loads((folder / "found/result.json").read_text())["models"]
 
 
+@pytest.mark.nightly
 def test_a_simulation_is_diagnosed(folder):
     simulation = ("--simulation", "column:simulated_um", "--rows", "0:400")
     succeed(folder, "diagnose", "record.csv", *COLUMNS, *simulation, "--out", "diagnosis")

@@ -17,9 +17,6 @@ FOUND = {
     "tanks": "r2_val",
 }
 
-#: The one that runs for every change; the others run every night.
-MARKS = {"hysteresis": pytest.mark.ci}
-
 
 def cells(path: Path) -> list[dict]:
     return json.loads(path.read_text("utf-8"))["cells"]
@@ -43,7 +40,7 @@ def test_notebooks_are_stored_without_outputs(path: Path) -> None:
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize(
     "path",
-    [pytest.param(path, marks=MARKS.get(path.stem, pytest.mark.nightly), id=path.stem) for path in NOTEBOOKS],
+    [pytest.param(path, marks=pytest.mark.nightly, id=path.stem) for path in NOTEBOOKS],
 )
 def test_a_notebook_runs_and_finds_its_law(path: Path, tmp_path: Path) -> None:
     import nbformat
