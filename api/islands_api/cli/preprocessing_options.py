@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import fields
-from functools import wraps
-from inspect import Parameter, signature
+from inspect import Parameter
 from typing import Annotated, Any
 
 import typer
 
 from islands.data.preprocessing_steps import DETREND, PreprocessingSteps
 from islands.errors import SettingsError
+from islands_api.cli.option_groups import group_options, make_option
 
 #: Types and descriptions of the options, by the field.
 _OPTIONS: dict[str, tuple[Any, str]] = {
@@ -24,25 +24,13 @@ def with_preprocessing_options(command: Callable[..., None]) -> Callable[..., No
 
     The command receives their values as one `PreprocessingSteps`.
     """
-    names = [field.name for field in fields(PreprocessingSteps)]
-    options = [_parameter(name) for name in names]
+    return group_options(
+        command, "steps", [_make_option(each.name) for each in fields(PreprocessingSteps)], _collect
+    )
 
-    @wraps(command)
-    def run(**given: Any) -> None:
-        values = {name: given.pop(name) for name in names}
-        command(
-            steps=PreprocessingSteps(**{name: value for name, value in values.items() if value is not None}),
-            **given,
-        )
 
-    declared = signature(command)
-    parameters = [
-        parameter
-        for each in declared.parameters.values()
-        for parameter in (options if each.name == "steps" else [each])
-    ]
-    run.__signature__ = declared.replace(parameters=parameters)  # type: ignore[attr-defined]
-    return run
+def _collect(values: dict[str, Any]) -> PreprocessingSteps:
+    return PreprocessingSteps(**{name: value for name, value in values.items() if value is not None})
 
 
 def check_one_output(steps: PreprocessingSteps, outputs: int) -> None:
@@ -57,7 +45,6 @@ def check_one_output(steps: PreprocessingSteps, outputs: int) -> None:
         raise SettingsError("--lowpass, --decimate and --detrend are for one output: leave them out")
 
 
-def _parameter(name: str) -> Parameter:
+def _make_option(name: str) -> Parameter:
     kind, text = _OPTIONS[name]
-    annotation: Any = Annotated[kind, typer.Option(f"--{name}", help=text)]
-    return Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, default=None, annotation=annotation)
+    return make_option(name, Annotated[kind, typer.Option(f"--{name}", help=text)])

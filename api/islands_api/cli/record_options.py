@@ -2,13 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import Field, fields
-from functools import wraps
-from inspect import Parameter, signature
+from inspect import Parameter
 from typing import Annotated, Any
 
 import typer
 
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.reading_options import ReadingOptions
+from islands_api.cli.option_groups import group_options, make_option
 
 #: Prefix of the parameters, which keeps them apart from those of a search.
 _PREFIX = "reading_"
@@ -17,7 +17,7 @@ _PREFIX = "reading_"
 _TYPES: dict[str, Any] = {"resample": float | None}
 
 
-def _parameter(option: Field[Any]) -> Parameter:
+def _make_option(option: Field[Any]) -> Parameter:
     if option.name == "header":
         annotation: Any = Annotated[bool, typer.Option("--no-header", help=option.metadata["help"])]
         default = False
@@ -25,9 +25,7 @@ def _parameter(option: Field[Any]) -> Parameter:
         kind = _TYPES.get(option.name, str | None)
         annotation = Annotated[kind, typer.Option(f"--{option.name}", help=option.metadata["help"])]
         default = None
-    return Parameter(
-        _PREFIX + option.name, Parameter.POSITIONAL_OR_KEYWORD, default=default, annotation=annotation
-    )
+    return make_option(_PREFIX + option.name, annotation, default)
 
 
 def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -35,22 +33,14 @@ def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
 
     The command receives their values as one `ReadingOptions`.
     """
-    options = [_parameter(option) for option in fields(ReadingOptions)]
+    return group_options(
+        command, "reading", [_make_option(option) for option in fields(ReadingOptions)], _collect
+    )
 
-    @wraps(command)
-    def run(**given: Any) -> None:
-        values = {option.name: given.pop(_PREFIX + option.name) for option in fields(ReadingOptions)}
-        changes = {name: value for name, value in values.items() if value is not None}
-        changes["header"] = not changes["header"]
-        if "names" in changes:
-            changes["names"] = tuple(changes["names"].split(","))
-        command(reading=ReadingOptions(**changes) if changes else DEFAULT_READING, **given)
 
-    declared = signature(command)
-    parameters = [
-        parameter
-        for each in declared.parameters.values()
-        for parameter in (options if each.name == "reading" else [each])
-    ]
-    run.__signature__ = declared.replace(parameters=parameters)  # type: ignore[attr-defined]
-    return run
+def _collect(values: dict[str, Any]) -> ReadingOptions:
+    changes = {name.removeprefix(_PREFIX): value for name, value in values.items() if value is not None}
+    changes["header"] = not changes["header"]
+    if "names" in changes:
+        changes["names"] = tuple(changes["names"].split(","))
+    return ReadingOptions(**changes)

@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields
-from functools import wraps
-from inspect import Parameter, signature
+from inspect import Parameter
 from types import MappingProxyType
 from typing import Annotated, Any, get_args
 
@@ -11,6 +10,7 @@ import typer
 
 from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings, get_text_type
+from islands_api.cli.option_groups import group_options, make_option
 
 Preset = Annotated[str, typer.Option("--preset", help=", ".join(PRESET_NAMES))]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")]
@@ -51,10 +51,6 @@ _FIELDS = _option_fields()
 SETTINGS = tuple(_FIELDS)
 
 
-def _parameter(name: str, annotation: Any, default: Any) -> Parameter:
-    return Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, default=default, annotation=annotation)
-
-
 def _setting_parameter(setting: Field[Any]) -> Parameter:
     """Return the parameter of a setting: repeatable for a tuple, text for a union of types."""
     declared = setting.metadata["command_line"]
@@ -67,7 +63,7 @@ def _setting_parameter(setting: Field[Any]) -> Parameter:
         help=declared["help"],
         show_default="that of the preset",
     )
-    return _parameter(setting.name, Annotated[kind | None, option], None)
+    return make_option(setting.name, Annotated[kind | None, option])
 
 
 def with_search_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -76,22 +72,14 @@ def with_search_options(command: Callable[..., None]) -> Callable[..., None]:
     The command receives their values as one `SearchOptions`.
     """
     options = [
-        _parameter("preset", Preset, DEFAULTS.preset),
+        make_option("preset", Preset, DEFAULTS.preset),
         *map(_setting_parameter, _FIELDS.values()),
-        _parameter("seed", Seed, DEFAULTS.seed),
+        make_option("seed", Seed, DEFAULTS.seed),
     ]
 
-    @wraps(command)
-    def run(**given: Any) -> None:
-        changes = {name: given.pop(name) for name in SETTINGS}
-        changes = {name: value for name, value in changes.items() if value is not None}
-        command(search=SearchOptions(given.pop("preset"), given.pop("seed"), changes), **given)
+    return group_options(command, "search", options, _collect)
 
-    declared = signature(command)
-    parameters = [
-        parameter
-        for each in declared.parameters.values()
-        for parameter in (options if each.name == "search" else [each])
-    ]
-    run.__signature__ = declared.replace(parameters=parameters)  # type: ignore[attr-defined]
-    return run
+
+def _collect(values: dict[str, Any]) -> SearchOptions:
+    changes = {name: values[name] for name in SETTINGS if values[name] is not None}
+    return SearchOptions(values["preset"], values["seed"], changes)
