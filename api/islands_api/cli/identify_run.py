@@ -18,7 +18,8 @@ from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.facade.automatic.kind_choice import choice_from_document, choose_preset
+from islands.facade.automatic.kind_choice import choice_from_document
+from islands.facade.automatic.preset_choice import choose_preset
 from islands.io.checkpoints import (
     read_checkpoint,
     state_document,

@@ -14,7 +14,8 @@ from islands.evolution.presets import AUTO
 from islands.evolution.search_result import SearchResult
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.facade.automatic.kind_choice import Choice, choice_from_document, choose_preset
+from islands.facade.automatic.kind_choice import Choice, choice_from_document
+from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.identify import identify
 from islands.io.checkpoints import (
     archipelago_from_document,

@@ -29,14 +29,15 @@ from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
-from islands.facade.automatic.kind_choice import Choice, choose_preset
-from islands.facade.automatic.trial_library import make_trial_library
+from islands.facade.automatic.kind_choice import Choice
+from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.engine_choice import Ray, open_engine
-from islands.facade.feedthrough_selection import select_feedthrough
 from islands.facade.final_models import estimate_candidates, select_final_models
-from islands.facade.rate_selection import select_rate
 from islands.facade.results.result import Result
 from islands.facade.setting_changes import SettingChanges
+from islands.facade.trials.feedthrough_selection import select_feedthrough
+from islands.facade.trials.rate_selection import select_rate
+from islands.facade.trials.trial_library import make_trial_library
 from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set
@@ -95,7 +96,7 @@ def identify(
         Data that select among the hall of fame: a separate record, or the fraction at the end of ``record``.
     preset : str or Choice
         An entry of ``PRESETS``, or ``auto``, which chooses library, primitives, constraints and lags by
-        trials on the estimation data. A choice of `choose_preset` is not made again.
+        fits that are compared on the validation data. A choice of `choose_preset` is not made again.
     seed : int
         Seed of the random generator; the same seed gives the same result, bit for bit.
     progress : callable, optional

@@ -14,7 +14,7 @@ from islands.data.dataset import Dataset
 from islands.data.preprocessing import apply_preprocessing
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import SettingsError
-from islands.facade.fit import SHOOTING
+from islands.facade.library_fit import SHOOTING
 from islands.facade.results.model_simulation import simulate as run
 from islands.io.ensembles import read_bands
 from islands.io.records import read_dataset, write_simulation

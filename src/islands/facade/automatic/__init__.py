@@ -1,1 +1,1 @@
-"""Choice of the preset `auto`: library, constraints and lags, by trials on the record."""
+"""Choice of the preset `auto`: library, constraints and dead times, by trials and fits of several kinds."""

@@ -15,15 +15,15 @@ from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.engine import Engine
 from islands.evolution.presets import resolve_settings
 from islands.evolution.progress import ProgressCallback, ignore_progress
-from islands.facade.automatic.trial_library import TrialLibrary, make_trial_library
 from islands.facade.coupled.coupled_result import CoupledResult
 from islands.facade.coupled.coupled_selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
 from islands.facade.fit import fit
 from islands.facade.identify import SearchCallback, identify
-from islands.facade.rate_selection import select_rate
 from islands.facade.results.result import Result
 from islands.facade.setting_changes import SettingChanges
+from islands.facade.trials.rate_selection import select_rate
+from islands.facade.trials.trial_library import TrialLibrary, make_trial_library
 from islands.io.data_frames import as_record
 from islands.model.candidate_library import get_library
 from islands.simulation.coupled_model import CoupledModel

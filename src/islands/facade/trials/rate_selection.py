@@ -25,7 +25,7 @@ from islands.estimation.structure_selection.deviations import (
     no_offsets,
     subtract_offsets,
 )
-from islands.facade.automatic.trial_library import TrialLibrary
+from islands.facade.trials.trial_library import TrialLibrary
 from islands.inspection.oversampling import COUNTS, is_noisy, keeps_bandwidth
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome

@@ -22,8 +22,7 @@ from islands.estimation.structure_selection.deviations import (
 )
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.swap_search import swap_search
-from islands.evolution.settings import Settings
-from islands.facade.automatic.trial_library import TrialLibrary
+from islands.facade.trials.trial_library import TrialLibrary
 from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
@@ -34,8 +33,8 @@ _HELD_OUT = 0.3
 #: Samples of a trial, at most, and number of parts of a longer record that contain them.
 _SAMPLES, _PARTS = 20_000, 4
 
-#: Terms of the models of forward selection, at most.
-_TERMS = 10
+#: Terms of the models of forward selection, and of the swap search, at most.
+_FORWARD_TERMS, _SWAP_TERMS = 10, 6
 
 #: Structures of each size of the swap search that are simulated.
 _DEPTH = 3
@@ -57,7 +56,7 @@ def hold_out(record: Dataset) -> tuple[Split, Split]:
     return Split(record[:-held], record[-held:]), Split(record[held:], record[:held])
 
 
-def measure_library(splits: Sequence[Split], library: TrialLibrary, terms: int) -> tuple[float, ...]:
+def measure_library(splits: Sequence[Split], library: TrialLibrary) -> tuple[float, ...]:
     """Return the root mean squared error of the best model of each held-out part.
 
     It is infinite if no model can be estimated and simulated, for example because a part is too short.
@@ -67,13 +66,11 @@ def measure_library(splits: Sequence[Split], library: TrialLibrary, terms: int) 
     splits : sequence of Split
         Estimation data, and a held-out part as validation data.
     library : TrialLibrary
-    terms : int
-        Terms of the models of the swap search, at most.
     """
-    return tuple(min(_measure_models(split, library, terms), default=inf) ** 0.5 for split in splits)
+    return tuple(min(_measure_models(split, library), default=inf) ** 0.5 for split in splits)
 
 
-def _measure_models(split: Split, library: TrialLibrary, terms: int) -> Iterator[float]:
+def _measure_models(split: Split, library: TrialLibrary) -> Iterator[float]:
     """Yield the mean squared errors of the free runs that do not diverge."""
     try:
         free = constraint(library.constraints).allows_offsets
@@ -81,7 +78,7 @@ def _measure_models(split: Split, library: TrialLibrary, terms: int) -> Iterator
         estimation, held = (subtract_offsets(part, offsets) for part in (split.estimation, split.validation))
         pool = library.screen(estimation)
         warm_up = max(item.maximum_lag for item in pool)
-        for structure in _select(pool, estimation, library, terms):
+        for structure in _select(pool, estimation, library):
             found = estimate(structure, estimation, library.constraints, warm_up)
             if not isinstance(found, EvaluationOutcome):
                 error = free_run(found.model, held, warm_up).mean_squared_error
@@ -91,30 +88,22 @@ def _measure_models(split: Split, library: TrialLibrary, terms: int) -> Iterator
         return  # The search with this library reports what is wrong.
 
 
-def _select(
-    pool: Sequence[Regressor], record: Dataset, library: TrialLibrary, terms: int
-) -> Iterator[Structure]:
+def _select(pool: Sequence[Regressor], record: Dataset, library: TrialLibrary) -> Iterator[Structure]:
     """Yield the structures of a forward selection, and those of a swap search that starts from them."""
     problem = make_selection_problem(pool, record, library.constraints)
     if isinstance(problem, EvaluationOutcome):
         return
-    structures = select_forward(problem, _TERMS)
+    structures = select_forward(problem, _FORWARD_TERMS)
     yield from structures
-    settings = Settings(
-        library=library.name,
-        library_degree=library.degree,
-        library_lags=library.lags,
-        library_delays=library.delays,
-        shifts=(),
-        max_terms=terms,
-        initial_terms=(1, terms),
-        constraints=library.constraints,
-        shooting=min(_SHOOTING, max(1, record.samples // 10)),
-    )
+    shooting = min(_SHOOTING, max(1, record.samples // 10))
     by_size = swap_search(
-        Evaluator(record, settings),
-        [item.expression for item in select_pool(pool, problem, terms)],
-        [tuple(item.expression for item in structure) for structure in structures if len(structure) <= terms],
+        Evaluator(record, library.make_settings(_SWAP_TERMS, shooting)),
+        [item.expression for item in select_pool(pool, problem, _SWAP_TERMS)],
+        [
+            tuple(item.expression for item in structure)
+            for structure in structures
+            if len(structure) <= _SWAP_TERMS
+        ],
         depth=_DEPTH,
     )
     for individuals in by_size:

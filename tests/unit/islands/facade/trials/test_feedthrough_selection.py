@@ -11,8 +11,8 @@ from islands.data.dataset import Dataset, join
 from islands.data.split import split
 from islands.errors import SettingsError
 from islands.estimation.structure_selection.direct_feedthrough import find_direct_inputs
-from islands.facade.feedthrough_selection import select_feedthrough
-from islands.facade.rate_selection import TrialLibrary
+from islands.facade.trials.feedthrough_selection import select_feedthrough
+from islands.facade.trials.rate_selection import TrialLibrary
 from islands.io.models import model_from_json, model_json
 from islands.io.result_folder import result_json
 from islands.io.result_text.summary_text import summary

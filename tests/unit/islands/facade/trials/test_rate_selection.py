@@ -10,7 +10,7 @@ import islands
 from islands.data.averaging import average_samples
 from islands.data.dataset import Dataset, join
 from islands.data.split import average_split, split
-from islands.facade.rate_selection import TrialLibrary, select_rate
+from islands.facade.trials.rate_selection import TrialLibrary, select_rate
 from islands.io.models import model_from_json, model_json
 from islands.io.result_folder import result_json, write_result
 from islands.io.result_models import read_error_measurement

@@ -32,9 +32,35 @@ class TrialLibrary:
         shooting = None if self.shooting is None else count_means(self.shooting, count)
         return replace(self, shooting=shooting, delays=tuple(delay // count for delay in self.delays))
 
+    def with_delays(self, delays: Sequence[int]) -> "TrialLibrary":
+        """Return the library with other dead times."""
+        return replace(self, delays=tuple(delays))
+
     def screen(self, record: Dataset) -> tuple[Regressor, ...]:
         """Return the regressors of the library for a record."""
         return screen_candidates(self.name, self.degree, self.lags, record, self.constraints, self.delays)
+
+    def make_settings(self, max_terms: int, shooting: int) -> Settings:
+        """Return the settings of a swap search over the library.
+
+        Parameters
+        ----------
+        max_terms : int
+            Terms of the largest model.
+        shooting : int
+            Samples of a shooting interval.
+        """
+        return Settings(
+            library=self.name,
+            library_degree=self.degree,
+            library_lags=self.lags,
+            library_delays=self.delays,
+            shifts=(),
+            max_terms=max_terms,
+            initial_terms=(1, max_terms),
+            constraints=self.constraints,
+            shooting=shooting,
+        )
 
 
 def make_trial_library(settings: Settings) -> TrialLibrary:

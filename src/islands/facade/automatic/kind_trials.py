@@ -1,0 +1,118 @@
+"""Trials of the kinds of records: dead times, and kinds whose models may be the best.
+
+Small models of the library of every kind are compared in free run on held-out parts of the estimation data.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from types import MappingProxyType
+
+from islands.data.channel_names import parse_channel_name
+from islands.data.dataset import Dataset
+from islands.evolution.progress import ProgressCallback
+from islands.facade.trials.held_out_error import hold_out, measure_library
+from islands.facade.trials.trial_library import TrialLibrary
+from islands.inspection.dead_time import estimate_dead_time
+
+#: Kinds up to this factor of the least error are compared with larger models.
+PROMISING = 3.0
+
+#: Error as a fraction of the output range that is a rounding error.
+ROUNDING = 1e-6
+
+#: Largest error with dead times relative to that without.
+_LARGEST_RATIO = 0.9
+
+#: Smallest dead time in samples that is tried. Lags of the library cover shorter ones.
+_LEAST_DELAY = 2
+
+NO_DEAD_TIME = "No dead time beyond the lags of the library was found."
+
+
+@dataclass(frozen=True, slots=True)
+class KindTrials:
+    """Result of the trials of the kinds on the estimation data.
+
+    Attributes
+    ----------
+    delays : tuple of int
+        Dead time of each input in samples of the record; empty if there is none.
+    sentence : str
+        What is known about the dead times.
+    errors : mapping
+        Free-run error of the small models of each kind, as a fraction of the output range; infinite if no
+        model could be simulated.
+    """
+
+    delays: tuple[int, ...]
+    sentence: str
+    errors: Mapping[str, float]
+
+    @property
+    def promising(self) -> tuple[str, ...]:
+        """Kinds whose error is at most three times the least, in the order of preference."""
+        least = min(self.errors.values())
+        return tuple(kind for kind, error in self.errors.items() if error <= PROMISING * least)
+
+
+def try_kinds(
+    record: Dataset,
+    libraries: Mapping[str, TrialLibrary],
+    delays: Sequence[int] | None,
+    progress: ProgressCallback,
+) -> KindTrials:
+    """Compare small models of every kind, with dead times if they reduce the error of the simplest kind.
+
+    Parameters
+    ----------
+    record : Dataset
+        Estimation data without missing values, whose output is not constant.
+    libraries : mapping
+        Library and constraints of each kind that may be chosen, the simplest first.
+    delays : sequence of int or None
+        Dead times; None estimates them.
+    progress : callable
+        Called with a message and the completed fraction.
+    """
+    splits = hold_out(record)
+
+    def measure(kind: str, delays: Sequence[int]) -> float:
+        progress(f"preset auto: trial of {kind}", None)
+        parts = measure_library(splits, libraries[kind].with_delays(delays))
+        error = (sum(part**2 for part in parts) / len(parts)) ** 0.5 / record.output_range
+        return float(max(error, ROUNDING)) if isfinite(error) else inf
+
+    simplest, *others = libraries
+    chosen = tuple(delays or ())
+    errors = {simplest: measure(simplest, chosen)}
+    sentence = f"The dead times are as given: {list(chosen)}."
+    if delays is None:
+        progress("preset auto: dead times", None)
+        estimated = _estimate_delays(record)
+        sentence = NO_DEAD_TIME
+        if any(estimated):
+            delayed = measure(simplest, estimated)
+            gain = f"the error of {simplest} models from {percent(errors[simplest])} to {percent(delayed)}"
+            samples = ", ".join(map(str, estimated))
+            sentence = f"A dead time of {samples} samples is not used: it changes {gain}."
+            if delayed <= _LARGEST_RATIO * errors[simplest]:
+                chosen, errors[simplest] = estimated, delayed
+                sentence = f"A dead time of {samples} samples is added to the lags: it reduces {gain}."
+    errors |= {kind: measure(kind, chosen) for kind in others}
+    return KindTrials(chosen, sentence, MappingProxyType(errors))
+
+
+def _estimate_delays(record: Dataset) -> tuple[int, ...]:
+    """Return by how many samples the response to each input is late; 0 where it is not known to be."""
+    late = []
+    for place, name in enumerate(record.input_names):
+        onset = None if parse_channel_name(name).at_once else estimate_dead_time(record, place).value
+        delay = 0 if onset is None else int(onset) - 1
+        late.append(delay if delay >= _LEAST_DELAY else 0)
+    return tuple(late)
+
+
+def percent(error: float) -> str:
+    """Return an error as a percentage, for a sentence."""
+    return f"{100.0 * error:.3g} %" if isfinite(error) else "no finite error"

@@ -1,0 +1,80 @@
+"""Choices of the preset ``auto`` for `identify` and of the library ``auto`` for `fit`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from islands.data.dataset import Dataset
+from islands.data.split import Split, split_data
+from islands.estimation.parameter_constraints import constraint
+from islands.estimation.structure_selection.input_delays import check_delays
+from islands.evolution.presets import AUTO, resolve_kinds, with_tuples
+from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.search_result import SearchResult
+from islands.facade.automatic.kind_choice import Choice, choose_kind
+from islands.facade.library_fit import FitSettings, fit_library
+from islands.facade.trials.trial_library import make_trial_library, take_library
+
+
+def choose_preset(
+    record: Dataset,
+    validation: Dataset | float,
+    changes: Mapping[str, Any],
+    progress: ProgressCallback = ignore_progress,
+) -> Choice:
+    """Choose the kind of record and the dead times of the preset ``auto`` for ``identify``.
+
+    Parameters
+    ----------
+    record : Dataset
+    validation : Dataset or float
+        Validation data or fraction.
+    changes : mapping
+        Settings of the user, which take precedence over the choice.
+
+    Raises
+    ------
+    SettingsError, RecordError
+        As in `islands.identify`.
+    """
+    changes = with_tuples(changes)
+    constraint(changes.get("constraints", "none")).check_inputs(record.inputs)
+    libraries = {kind: make_trial_library(each) for kind, each in resolve_kinds(changes).items()}
+    split = split_data(record, validation)
+    common = {name: changes[name] for name in ("average", "feedthrough", "shooting") if name in changes}
+    fit_kind = partial(fit_library, record, split, settings=FitSettings(**common))
+    return choose_kind(split.estimation, libraries, changes.get("library_delays"), fit_kind, progress)[0]
+
+
+def fit_chosen_library(
+    record: Dataset,
+    split: Split,
+    library: str,
+    degree: int | None,
+    lags: int | None,
+    constraints: str | None,
+    delays: Sequence[int] | None,
+    settings: FitSettings,
+    seed: int,
+    progress: ProgressCallback,
+) -> SearchResult:
+    """Fit a library, or the one that is chosen if its name is ``auto``; see `islands.fit`.
+
+    Values that are None are chosen, or have the default of the library.
+
+    Raises
+    ------
+    SettingsError, RecordError
+        As in `islands.fit`.
+    """
+    check_delays(delays or ())
+    constraint(constraints or "none").check_inputs(record.inputs)
+    fit_one = partial(fit_library, record, split, settings=settings, seed=seed, progress=progress)
+    if library != AUTO:
+        return fit_one(take_library(library, degree, lags, constraints, delays or ()))
+    kinds = resolve_kinds({} if constraints is None else {"constraints": constraints})
+    libraries = {kind: take_library(each.library, degree, lags, constraints) for kind, each in kinds.items()}
+    choice, results = choose_kind(split.estimation, libraries, delays, fit_one, progress)
+    found = results.get(choice.kind) or fit_one(libraries[choice.kind].with_delays(choice.delays))
+    return replace(found, settings={**found.settings, "choice": choice.to_document()})

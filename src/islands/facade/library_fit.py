@@ -1,0 +1,243 @@
+"""Subset selection over one candidate library, (constrained) least squares, assessment."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+from islands.data.averaging import AUTO, count_means
+from islands.data.dataset import Dataset
+from islands.data.split import Split
+from islands.errors import SettingsError, lookup
+from islands.estimation.estimator_table import ESTIMATORS
+from islands.estimation.estimators import estimate_with
+from islands.estimation.forward_selection import (
+    Structure,
+    make_selection_problem,
+    select_forward,
+    select_pool,
+)
+from islands.estimation.parameter_constraints import constraint
+from islands.estimation.structure_selection.certificate import Certificate, certify, combine_certificates
+from islands.estimation.structure_selection.deviations import (
+    LARGE_OFFSET,
+    OPERATING_POINT,
+    Offsets,
+    estimate_deviations,
+    find_offsets,
+    no_offsets,
+    subtract_offsets,
+)
+from islands.estimation.structure_selection.input_ranking import screen_candidates
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.generation.swap_search import swap_search
+from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.search_result import (
+    RankedModel,
+    SearchResult,
+    SearchStatistics,
+    rank_models,
+    with_average,
+    with_bands,
+)
+from islands.evolution.settings import Settings
+from islands.facade.final_models import screen
+from islands.facade.trials.feedthrough_selection import select_feedthrough
+from islands.facade.trials.rate_selection import select_rate
+from islands.facade.trials.trial_library import TrialLibrary
+from islands.model.candidate_library import full_set
+from islands.model.regressor import Regressor
+from islands.simulation.outcome import EvaluationOutcome
+from islands.validation.assessment import assess
+from islands.validation.ensemble import ValidatedModel
+
+#: Samples of a shooting interval (case 1 of the paper); at most a tenth of a short record.
+SHOOTING = 500
+
+#: Structures of every size that are simulated on the validation data.
+_SCREENED = 150
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitSettings:
+    """Settings of `fit_library`, as the parameters of `fit`."""
+
+    max_terms: int = 10
+    estimator: str = "least-squares"
+    average: int | str = AUTO
+    feedthrough: str = AUTO
+    shooting: int | None = None
+    certificate: int = 10_000
+
+    def __post_init__(self) -> None:
+        lookup(ESTIMATORS, self.estimator, "estimator")
+        if self.max_terms < 1:
+            raise SettingsError(f"a model has at least one term, got max_terms = {self.max_terms}")
+        if self.certificate < 0:
+            raise SettingsError(f"a search has at least 0 nodes, got certificate = {self.certificate}")
+        if self.shooting is not None and self.shooting < 1:
+            raise SettingsError(f"a shooting interval has at least 1 sample, got {self.shooting}")
+
+
+def fit_library(
+    record: Dataset,
+    split: Split,
+    library: TrialLibrary,
+    settings: FitSettings,
+    seed: int = 0,
+    progress: ProgressCallback = ignore_progress,
+) -> SearchResult:
+    """Fit models of increasing size from one library and rank them on the validation data.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record as passed by the user, which the result contains.
+    split : Split
+        Estimation data and validation data at the rate of the record.
+    library : TrialLibrary
+    settings : FitSettings
+    seed : int
+        Stored in the result.
+    progress : callable, optional
+        Called with a message and the completed fraction.
+
+    Raises
+    ------
+    SettingsError
+        No model could be estimated.
+    RecordError
+        The record is too short.
+    """
+    constraints = library.constraints
+    shooting = settings.shooting or min(SHOOTING, max(1, split.estimation.samples // 10))
+    progress("sampling rate and direct feedthrough", 0.0)
+    least = library.lags + 3 + max(library.delays, default=0)
+    split, samples = select_rate(split, settings.average, library, least)
+    rated = library.at_rate(samples)
+    split = select_feedthrough(split, settings.feedthrough, rated)
+    interval = count_means(shooting, samples)
+    swaps = rated.make_settings(settings.max_terms, interval)
+    structures, certificates, warm_up = _select(split, swaps, settings.certificate, progress)
+    models, outcomes = _estimate(structures, split, settings, swaps, warm_up, progress)
+    best_of_size: dict[int, RankedModel] = {}
+    for ranked in rank_models(models):
+        best_of_size.setdefault(ranked.model.size, ranked)
+    rows = sum(max(0, length - warm_up) for length in split.estimation.segments)
+    count = full_set(library.degree, library.lags, library.lags, record.inputs)
+    search = SearchStatistics(
+        sum(outcomes.values()),
+        dict(outcomes),
+        {"candidates": count, "bytes": 8 * count * rows},
+        certificates={found.terms: found for found in certificates},
+    )
+    described = {
+        "method": "fit",
+        "library": library.name,
+        "degree": library.degree,
+        "lags": library.lags,
+        "delays": library.delays,
+        "constraints": constraints,
+        **asdict(settings),
+        "shooting": shooting,
+    }
+    result = SearchResult(record, split, seed, described, search, tuple(best_of_size.values()))
+    minimised = ESTIMATORS[settings.estimator].interval(interval)
+    estimates = [
+        ValidatedModel(entry.model, minimised, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
+        for entry in models
+    ]
+    return with_average(with_bands(result, estimates, constraints, warm_up), samples)
+
+
+def _estimate(
+    structures: Sequence[tuple[Structure, Offsets]],
+    split: Split,
+    settings: FitSettings,
+    swaps: Settings,
+    warm_up: int,
+    progress: ProgressCallback,
+) -> tuple[list[RankedModel], Counter[str]]:
+    """Estimate and assess a model of every structure; return the models and the number of each outcome."""
+    constraints, interval = swaps.constraints, swaps.shooting
+    outcomes: Counter[str] = Counter()
+    models = []
+    for done, (structure, offsets) in enumerate(structures, start=1):
+        estimated = estimate_deviations(structure, offsets, split.estimation, constraints, warm_up)
+        if not isinstance(estimated, EvaluationOutcome):
+            estimated = estimate_with(
+                settings.estimator, estimated, split.estimation, constraints, warm_up, interval
+            )
+        if isinstance(estimated, EvaluationOutcome):
+            outcomes[estimated.verdict.name.lower()] += 1
+            continue
+        if estimated.model.size > settings.max_terms:
+            continue
+        outcomes["ok"] += 1
+        assessment = assess(estimated.model, split, interval, warm_up, constraints)
+        models.append(RankedModel(estimated.model, assessment))
+        progress(f"model of {estimated.model.size} terms", done / len(structures))
+    if not models:
+        raise SettingsError(
+            f"no model could be estimated: {dict(outcomes)}; take another library or a longer record"
+        )
+    return models, outcomes
+
+
+def _select(
+    split: Split, settings: Settings, nodes: int, progress: ProgressCallback
+) -> tuple[list[tuple[Structure, Offsets]], tuple[Certificate, ...], int]:
+    """Return structures, each with the offsets of its signals, the certificates, and the largest lag."""
+    # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
+    # in deviations from it. The validation data tell which one holds.
+    record, constraints = split.estimation, settings.constraints
+    tried = [no_offsets(record)]
+    if constraint(constraints).allows_offsets:
+        tried = [find_offsets(record, limit) for limit in (LARGE_OFFSET, OPERATING_POINT)]
+    structures: list[tuple[Structure, Offsets]] = []
+    certificates: tuple[Certificate, ...] | None = None
+    warm_up = 0
+    for offsets in dict.fromkeys(tried):
+        deviations = Split(*(subtract_offsets(part, offsets) for part in (record, split.validation)))
+        pool = screen_candidates(
+            settings.library,
+            settings.library_degree,
+            settings.library_lags,
+            deviations.estimation,
+            constraints,
+            settings.library_delays,
+        )
+        warm_up = max(item.maximum_lag for item in pool)
+        progress(f"inner products of {len(pool)} candidates", 0.0)
+        problem = make_selection_problem(pool, deviations.estimation, constraints)
+        if isinstance(problem, EvaluationOutcome):
+            raise SettingsError(f"nothing can be fitted with these settings: {problem}")
+        progress(f"best subsets of {len(pool)} candidates", 0.0)
+        found = certify(problem, settings.max_terms, nodes)
+        certificates = combine_certificates(certificates, found)
+        starts = [*select_forward(problem, settings.max_terms), *(entry.structure for entry in found)]
+        exchanged = select_pool(pool, problem, settings.max_terms)
+        chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, progress)]
+        structures += [(structure, offsets) for structure in chosen]
+    return list(dict.fromkeys(structures)), certificates or (), warm_up
+
+
+def _search_swaps(
+    pool: Sequence[Regressor],
+    starts: Sequence[Structure],
+    split: Split,
+    settings: Settings,
+    progress: ProgressCallback,
+) -> list[Structure]:
+    """Return, for every size, the structure of a swap search with the least error on the validation data."""
+    by_size = swap_search(
+        Evaluator(split.estimation, settings),
+        [item.expression for item in pool],
+        [tuple(item.expression for item in structure) for structure in starts],
+        depth=_SCREENED,
+        progress=progress,
+    )
+    return [
+        each.regressors
+        for individuals in by_size
+        for each in screen(individuals, split.validation, settings.maximum_lag, most_valid=1)
+    ]
