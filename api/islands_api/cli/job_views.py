@@ -20,8 +20,8 @@ from islands_service.domain.job import DISCREPANCY, TERMINAL
 #: Largest number of islands that have a line each.
 _SHOWN_ISLANDS = 16
 
-#: Line of a job in a list.
-_LINE = "{:32}  {:9}  {:>13}  {:>10}  {:19}  {}"
+#: Lines of a job in a list.
+_LINE, _SECOND_LINE = "{:32}  {:9}  {:>13}  {:>10}", "  {:16}  {}"
 
 
 def show_job(job: JobView, as_json: bool) -> None:
@@ -59,14 +59,16 @@ def show_jobs(jobs: Sequence[JobView], as_json: bool) -> None:
         print_json({"items": [job.model_dump(mode="json") for job in jobs]})
         return
     # Not a table: it would truncate the ids in a narrow terminal or a pipe.
-    output.print(_LINE.format("job", "state", "generation", "best error", "created", "name"), markup=False)
+    output.print(_LINE.format("job", "state", "generation", "best error"), markup=False)
+    output.print(_SECOND_LINE.format("created (UTC)", "name"), markup=False)
     for job in jobs:
         status = job.progress or {}
         done = status.get("generation")
         generation = "-" if done is None else f"{done}/{status.get('generations', '-')}"
-        best, created = _format_number(status.get("best_error")), f"{job.created:%Y-%m-%d %H:%M:%S}"
-        line = _LINE.format(job.id, job.state, generation, best, created, f"{job.name}{_format_verdict(job)}")
-        output.print(line, markup=False)
+        best = _format_number(status.get("best_error"))
+        output.print(_LINE.format(job.id, job.state, generation, best), markup=False)
+        name = f"{job.name}{_format_verdict(job)}"
+        output.print(_SECOND_LINE.format(f"{job.created:%Y-%m-%d %H:%M}", name), markup=False)
 
 
 def _format_verdict(job: JobView) -> str:

@@ -62,8 +62,7 @@ def fit(
         Data that rank the models: a separate record, or the fraction at the end of ``record``.
     library : str
         An entry of ``LIBRARIES``, such as ``phi-polynomial`` for hysteresis or ``polynomial`` for smooth
-        systems. ``auto`` fits several and takes the one with the least validation error, as the preset ``auto``
-        does.
+        systems. ``auto`` fits several libraries and takes the best one, as the preset ``auto`` does.
     degree, lags : int, optional
         Degree and lags of the library; None takes the defaults of the library.
     delays : sequence of int, optional

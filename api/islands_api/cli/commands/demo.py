@@ -33,6 +33,9 @@ SYSTEM = "bouc-wen-piezo"
 #: Variant of the system with the parameters of the authors.
 VARIANT = "authors"
 
+#: Title of the table of all models.
+_TITLE = "Free run, 100 s: models of the paper as printed in its Table 1 and computed, and models found"
+
 #: Parts of the record that select the model. The other parts are test data.
 SELECTING = ("estimation", "validation")
 
@@ -75,26 +78,22 @@ def demo(
     # All models start after the same warm-up.
     warm_up = result.best.ranked_model.assessment.warm_up
     published = [PUBLISHED[number] for number in ("12", "13")]
-    table = Table(
-        "model", "terms", "MAPE est. %", "MAPE val. %", "R2 est.", "R2 val.", title="Free run, 100 s"
-    )
+    table = Table("model", "terms", "MAPE est. %", "MAPE val. %", "R2 est.", "R2 val.", title=_TITLE)
     for number, entry in zip(("12", "13"), published, strict=True):
         size = str(entry.model.size)
         table.add_row(f"({number}), Table 1", size, *_format_cells(*entry.mape, *entry.r2))
         errors_by_part = [
             _compute_metrics(entry.model, record, warm_up) for record in (estimation, validation)
         ]
-        table.add_row(f"({number}), its printed parameters", size, *_format_row(errors_by_part))
-    rows = [("settings of the paper, best", reference.models[0])]
-    rows += [(f"found here, rank {fitted.rank}", fitted) for fitted in result.models]
+        table.add_row(f"({number}), computed", size, *_format_row(errors_by_part))
+    rows = [("paper's settings", reference.models[0])]
+    rows += [(f"found, rank {fitted.rank}", fitted) for fitted in result.models]
     for title, fitted in rows:
         errors_by_part = [fitted.metrics[part]["free_run"] for part in SELECTING]
         table.add_row(title, str(fitted.model.size), *_format_row(errors_by_part))
     output.print(table)
 
-    table = Table(
-        "test record", "recommended", "settings of the paper", "(12)", "(13)", title="Free run, MAPE %"
-    )
+    table = Table("test record", "recommended", "paper's settings", "(12)", "(13)", title="Free run, MAPE %")
     for part, record in records.items():
         if part not in SELECTING:
             searched = (result.best, reference.models[0])

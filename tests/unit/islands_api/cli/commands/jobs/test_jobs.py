@@ -32,9 +32,11 @@ def test_jobs_are_listed_newest_first(run: Run, service: Service, owner: str) ->
     second = ahead(service, owner, name="two")
     code, out, _ = run("list")
     assert code == 0
-    _, one, other = (line.split() for line in out.splitlines())
-    assert (one[:4], one[-1]) == ([second, "queued", "-", "-"], "two")
-    assert (other[:4], other[-2:]) == ([first, "running", "3/-", "-"], ["[/b]", "one"])
+    # Two lines for each job, which fit into 80 columns.
+    one, one_name, other, other_name = (line.split() for line in out.splitlines()[2:])
+    assert (one, one_name[-1]) == ([second, "queued", "-", "-"], "two")
+    assert (other, other_name[-2:]) == ([first, "running", "3/-", "-"], ["[/b]", "one"])
+    assert max(map(len, out.splitlines())) <= 80
     listed = [job["id"] for job in json.loads(run("list", "--json")[1])["items"]]
     assert listed == [second, first]
     assert [job["id"] for job in json.loads(run("list", "--state", "running", "--json")[1])["items"]] == [

@@ -206,9 +206,9 @@ def test_diagnosis_is_watched_listed_and_shown_as_text(run: Run, diagnosed: str)
     assert run("watch", diagnosed)[1] == words
     assert run("show", diagnosed)[1] == f"job {diagnosed}: succeeded\n{words}"
     assert run("result", diagnosed)[1] == words
-    line = run("list")[1].splitlines()[1]
-    assert line.startswith(diagnosed)
-    assert line.endswith("piezo (named: thermal-drift)")
+    first, second = run("list")[1].splitlines()[2:4]
+    assert first.startswith(diagnosed)
+    assert second.endswith("piezo (named: thermal-drift)")
 
 
 def test_downloaded_diagnosis_equals_that_of_the_command_line(run: Run, diagnosed: str) -> None:
