@@ -5,7 +5,7 @@
 A simulation with a known model error is compared with a part of each record. The simulation extended by the
 named effects is then run on test data: unused parts of the record or separate records. Surrogates have the
 noise of a record and either no model error or one injected effect. The records are read from
-$ISLANDS_DATA_DIR.
+$ISLANDS_MEASURED_DIR.
 """
 
 import argparse
@@ -30,7 +30,7 @@ from islands.io.simulator_spec.document import extended_document  # noqa: E402
 from islands.io.simulator_spec.factory import make_simulator  # noqa: E402
 
 NAIVE = Path(__file__).parents[1] / "tests" / "support" / "naive_damper.py"
-DATA = Path(os.environ.get("ISLANDS_DATA_DIR", Path(__file__).parents[2] / "shared/data"))
+DATA = Path(os.environ.get("ISLANDS_MEASURED_DIR", Path(__file__).parents[2] / "shared/data"))
 
 
 @dataclass(frozen=True)

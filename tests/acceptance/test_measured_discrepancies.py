@@ -20,7 +20,7 @@ def diagnose(name: str) -> Diagnosis:
     try:
         record = case.record()
     except FileNotFoundError as error:
-        pytest.skip(f"needs a measured record in {DATA} ({error.filename}): set ISLANDS_DATA_DIR")
+        pytest.skip(f"needs a measured record in {DATA} ({error.filename}): set ISLANDS_MEASURED_DIR")
     return islands.diagnose(record, case.simulation)
 
 

@@ -5,7 +5,7 @@
 The record of the authors and the consistent record are simulated. Their validation data are 20 s of a 1 Hz
 sine. The best models by validation error of at most 6 and 9 terms are simulated on records that take no part
 in any selection: a 5 Hz sine, a sine of 20 V, other noise. The measured record (150 V, 1 Hz) needs the folder
-ISLANDS_DATA_DIR: its first 60 % estimate, the next 20 % select, the rest test. Results are printed, not
+ISLANDS_MEASURED_DIR: its first 60 % estimate, the next 20 % select, the rest test. Results are printed, not
 asserted.
 """
 
@@ -68,7 +68,7 @@ def simulated_figures(variant: str, seed: int) -> Iterator[tuple[str, float]]:
 
 def measured_figures(seed: int) -> Iterator[tuple[str, float]]:
     """Identify the measured record and yield the named figures."""
-    path = Path(os.environ["ISLANDS_DATA_DIR"]) / "piezo_micromanipulator_150V_1Hz.csv"
+    path = Path(os.environ["ISLANDS_MEASURED_DIR"]) / "piezo_micromanipulator_150V_1Hz.csv"
     record = read_record(path, ["u_V"], "y_um")
     first, second = round(0.6 * record.samples), round(0.8 * record.samples)
     started = perf_counter()

@@ -10,12 +10,12 @@ DOCS = ROOT / "docs"
 BENCHMARKS = ROOT / "benchmarks"
 
 #: Folder of the measured records.
-RECORDS = Path(os.environ.get("ISLANDS_DATA_DIR", ROOT.parent / "shared" / "data"))
+RECORDS = Path(os.environ.get("ISLANDS_MEASURED_DIR", ROOT.parent / "shared" / "data"))
 
 
 def measured_record(name: str) -> Path:
     """Return the path of a measured record; skip the test if it is absent."""
     file = RECORDS / name
     if not file.exists():
-        pytest.skip(f"needs the measured record {name}: set ISLANDS_DATA_DIR to its folder")
+        pytest.skip(f"needs the measured record {name}: set ISLANDS_MEASURED_DIR to its folder")
     return file

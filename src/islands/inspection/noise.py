@@ -54,7 +54,7 @@ def measure_noise(channel: Channel, record: Dataset, quantisation: Fact) -> Fact
     name, unit = channel.name, channel.unit
     levels = [estimate_noise(channel.values, record, order) for order in _ORDERS]
     step = float(quantisation.value or 0.0)
-    if min(levels) <= step:
+    if step and min(levels) <= step:
         text = f"The noise of {name} is below its quantisation step of {describe_amount(step, unit)}."
         return Fact("noise", name, None, unit, None, None, text)
     extent = float(np.ptp(channel.known))

@@ -86,7 +86,17 @@ def write_model(model: Model, path: str | Path) -> None:
     ModelError
         A number of the model is not finite, or the file cannot be written.
     """
-    text = model_json(model)
+    write_model_text(model_json(model), path)
+
+
+def write_model_text(text: str, path: str | Path) -> None:
+    """Write the text of a model file.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be written.
+    """
     try:
         Path(path).write_text(text, encoding="utf-8")
     except OSError as error:

@@ -59,3 +59,8 @@ def test_interval_contains_the_level_of_most_records():
 def test_rounding_is_not_noise():
     u = np.sin(0.02 * np.arange(3000))
     assert "no visible noise" in measure_output_noise(Dataset(u, 5.0 + u, 1.0)).sentence
+
+
+def test_signal_of_two_levels_has_no_visible_noise():
+    u = np.where(np.arange(3000) < 100, 0.0, 1.0)
+    assert "no visible noise" in measure_output_noise(Dataset(u, u, 1.0)).sentence

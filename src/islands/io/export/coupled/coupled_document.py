@@ -7,7 +7,7 @@ from typing import Any
 
 from islands.errors import ModelError
 from islands.io.export.coupled.coupled_equations import coupled_equation, coupled_latex
-from islands.io.models import model_from_json, model_json
+from islands.io.models import model_from_json, model_json, write_model_text
 from islands.model.expression import Primitive
 from islands.model.primitives import PRIMITIVES
 from islands.simulation.coupled_model import CoupledModel
@@ -44,11 +44,7 @@ def write_coupled_model(model: CoupledModel, path: str | Path) -> None:
     ModelError
         A number of the model is not finite, or the file cannot be written.
     """
-    text = coupled_json(model)
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ModelError(f"cannot write the model file {path}: {error.strerror}") from error
+    write_model_text(coupled_json(model), path)
 
 
 def read_coupled_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> CoupledModel:
