@@ -65,8 +65,8 @@ def test_extended_simulation_is_shown_as_text(folder: Path) -> None:
 
 
 def test_json_format_of_an_extended_simulation_is_its_file(folder: Path) -> None:
-    printed = succeed("show", folder / "extended.json", "--format", "json")
-    assert printed == (folder / "extended.json").read_text()
+    for given in (folder / "extended.json", folder):
+        assert succeed("show", given, "--format", "json") == (folder / "extended.json").read_text()
 
 
 @pytest.mark.ci

@@ -12,6 +12,7 @@ import typer
 from rich.table import Table
 
 from islands.io.result_text.model_table import LEGEND, MARK
+from islands.io.simulator_spec.specification import EXTENDED_FILE
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
@@ -151,7 +152,7 @@ def download_diagnosis(client: Client, job: str, document: dict[str, Any], folde
         (folder / name).unlink(missing_ok=True)
     (folder / "report.html").write_bytes(client.report(job))
     if document["extended_model"] is not None:
-        (folder / "extended.json").write_bytes(client.extended(job))
+        (folder / EXTENDED_FILE).write_bytes(client.extended(job))
     _write_document(document, folder / "discrepancy.json")
 
 

@@ -8,7 +8,13 @@ import typer
 from islands.errors import SettingsError
 from islands.io.models import read_model
 from islands.io.result_models import find_model_file
-from islands.io.simulator_spec.specification import SIMULATORS, LocalExtendedSpec, is_extended, parse_spec
+from islands.io.simulator_spec.specification import (
+    SIMULATORS,
+    LocalExtendedSpec,
+    find_extended_file,
+    is_extended,
+    parse_spec,
+)
 from islands.model.model import Model
 from islands.systems.published_models import get_published_model
 
@@ -101,7 +107,8 @@ def tolerances(texts: list[str]) -> dict[str, float]:
 
 
 def extended(text: str) -> LocalExtendedSpec | None:
-    """Read an extended simulation; return None if the file is not one."""
+    """Read an extended simulation of a file or of the folder of a diagnosis; return None if there is none."""
+    text = find_extended_file(text)
     if text.startswith(PUBLISHED) or not is_extended(text):
         return None
     found = parse_spec(f"model:{text}")

@@ -123,6 +123,10 @@ def read_preprocessing(model_file: str | Path) -> Preprocessing | None:
 def _read_object(result: Path) -> dict[str, Any]:
     try:
         return dict(json.loads(result.read_text(encoding="utf-8")))
+    except FileNotFoundError as error:
+        raise ModelError(
+            f"{result.parent} has no result.json: give the folder of islands fit or identify, or a model file"
+        ) from error
     except (OSError, ValueError, TypeError) as error:
         raise _damaged(result, error) from error
 

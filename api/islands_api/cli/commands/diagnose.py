@@ -22,7 +22,7 @@ from islands.io.records.row_range import parse_rows
 from islands.io.result_text.text_layout import wrap
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import ColumnSpec, innermost, parse_spec
+from islands.io.simulator_spec.specification import EXTENDED_FILE, ColumnSpec, innermost, parse_spec
 from islands_api.cli import options
 from islands_api.cli.console import Display, compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
@@ -31,9 +31,6 @@ from islands_service.reports.diagnosis_report import diagnosis_report, summarise
 
 #: File of the result document.
 RESULT = "discrepancy.json"
-
-#: File of the extended simulation.
-EXTENDED = "extended.json"
 
 #: File of the report.
 REPORT = "report.html"
@@ -103,11 +100,11 @@ def write(
 ) -> None:
     """Write a diagnosis into a folder. The document is written last: if it exists, the folder is complete."""
     folder.mkdir(parents=True, exist_ok=True)
-    for path in (folder / EXTENDED, folder / RESULT):
+    for path in (folder / EXTENDED_FILE, folder / RESULT):
         path.unlink(missing_ok=True)
     (folder / REPORT).write_bytes(diagnosis_report(name, diagnosis, tested, formula))
     if diagnosis.gain is not None:
-        (folder / EXTENDED).write_text(extended_json(diagnosis.best, diagnosis.record))
+        (folder / EXTENDED_FILE).write_text(extended_json(diagnosis.best, diagnosis.record))
     document = diagnosis_document(diagnosis, wall_s, tested, formula)
     (folder / RESULT).write_text(as_json(document))
 

@@ -22,6 +22,9 @@ from islands.io.simulator_spec.spec_base import (
     SpecModel,
 )
 
+#: Name of the file of an extended simulation in the folder of a diagnosis.
+EXTENDED_FILE = "extended.json"
+
 EXTENDED_SCHEMA: Literal["islands.extended/1"] = "islands.extended/1"
 
 
@@ -263,6 +266,12 @@ def innermost(spec: SimulationSpec | LocalSpec) -> SimulationSpec | LocalSpec:
     while isinstance(spec, ExtendedSpec):
         spec = spec.core
     return spec
+
+
+def find_extended_file(path: str) -> str:
+    """Return the extended simulation in the folder of a diagnosis. Any other path is returned as it is."""
+    file = Path(path) / EXTENDED_FILE
+    return str(file) if file.is_file() else path
 
 
 def is_extended(path: str) -> bool:
