@@ -6,7 +6,7 @@ models are compared on the validation data.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import isfinite
 from types import MappingProxyType
 from typing import Any
 
@@ -14,15 +14,14 @@ from islands.data.dataset import Dataset
 from islands.errors import IslandsError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.progress import ProgressCallback
-from islands.evolution.search_result import SearchResult
+from islands.evolution.search_result import RankedModel, SearchResult
 from islands.facade.automatic.kind_trials import NO_DEAD_TIME, ROUNDING, KindTrials, percent, try_kinds
 from islands.facade.trials.trial_library import TrialLibrary
 from islands.inspection.rest import check_rest
+from islands.validation.recommendation import recommend
 
-#: Errors up to this factor of the least count as equal: the first kind of the table is then chosen.
-_EQUAL = 1.1
-
-#: The same for hysteresis if the output rests while the inputs rest, because its models keep that property.
+#: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
+#: models keep that property.
 _CLOSE = 1.25
 
 #: Fits the library of a kind with the dead times of the trials.
@@ -100,8 +99,9 @@ def choose_kind(
 ) -> tuple[Choice, Mapping[str, SearchResult]]:
     """Choose the kind of a record.
 
-    Errors that differ by less than 10 % count as equal; hysteresis is also chosen within 25 % of the least if
-    the output rests while the inputs rest.
+    The recommended models of the kinds are compared as `recommend` compares the models of a search: the
+    smallest without a significantly larger error counts, of equal sizes that of the first kind. Hysteresis is
+    chosen within 25 % of the least error if the output rests while the inputs rest.
 
     Parameters
     ----------
@@ -129,14 +129,15 @@ def choose_kind(
         return Choice(kind, tuple(delays or ()), (sentence, NO_DEAD_TIME), nothing, nothing), {}
     trials = try_kinds(record, libraries, delays, progress)
     results = _fit_promising(trials, libraries, fit_kind, progress)
-    errors = {kind: _measure_recommended(result, record) for kind, result in results.items()}
-    kind, reason = _select_kind(record, libraries, trials, errors)
+    compared = {kind: result.recommended for kind, result in results.items() if _is_bounded(result)}
+    errors = {kind: _measure(model, record) for kind, model in compared.items()}
+    kind, reason = _select_kind(record, libraries, trials, compared, errors)
     choice = Choice(
         kind,
         trials.delays,
         (f"{_describe(libraries[kind], kind)}, {reason}.", trials.sentence),
-        _drop_infinite(errors),
-        _drop_infinite(trials.errors),
+        MappingProxyType(errors),
+        MappingProxyType({kind: error for kind, error in trials.errors.items() if isfinite(error)}),
     )
     return choice, results
 
@@ -166,44 +167,47 @@ def _fit_promising(
     return results
 
 
-def _measure_recommended(result: SearchResult, record: Dataset) -> float:
-    """Return the free-run error of the recommended model as a fraction of the output range."""
-    rmse = result.recommended.assessment.metrics["validation"]["free_run"].rmse
-    return max(rmse / record.output_range, ROUNDING) if isfinite(rmse) else inf
+def _is_bounded(result: SearchResult) -> bool:
+    """Return whether the free run of the recommended model on the validation data does not diverge."""
+    return bool(result.recommended.assessment.outcomes["validation"]["free_run"])
+
+
+def _measure(model: RankedModel, record: Dataset) -> float:
+    """Return the free-run error of a model on the validation data as a fraction of the output range."""
+    return max(model.assessment.metrics["validation"]["free_run"].rmse / record.output_range, ROUNDING)
 
 
 def _select_kind(
     record: Dataset,
     libraries: Mapping[str, TrialLibrary],
     trials: KindTrials,
+    compared: Mapping[str, RankedModel],
     errors: Mapping[str, float],
 ) -> tuple[str, str]:
     """Return the kind and the reason."""
-    least = min(errors.values(), default=inf)
-    if not isfinite(least):
+    if not compared:
         first = trials.promising[0]
         if not isfinite(trials.errors[first]):
             return first, "because the record is too short for a comparison"
-        others = _list_others(trials.errors, first)
         return first, (
             f"because its free-run error on held-out parts of the estimation data is "
-            f"{percent(trials.errors[first])} of the output range{others}"
+            f"{percent(trials.errors[first])} of the output range{_list_others(trials.errors, first)}"
         )
-    kind = next(each for each in errors if errors[each] <= _EQUAL * least)
-    if not constraint(libraries[kind].constraints).sums:
-        close = [
-            each
-            for each in errors
-            if constraint(libraries[each].constraints).sums and errors[each] <= _CLOSE * least
-        ]
-        if close and check_rest(record).value:
-            return close[0], (
-                f"because the output rests while the inputs rest, and the free-run error of its recommended "
-                f"model on the validation data, {percent(errors[close[0]])} of the output range, is close to "
-                f"the least, {percent(least)}"
-            )
+    constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
+    least = min(errors.values())
+    close = [each for each in constrained if errors[each] <= _CLOSE * least]
+    if close and check_rest(record).value:
+        return close[0], (
+            f"because the output rests while the inputs rest, and the free-run error of its recommended "
+            f"model on the validation data is {percent(errors[close[0]])} of the output range"
+            f"{_list_others(errors, close[0])}"
+        )
+    models = list(compared.values())
+    best = recommend([each.model.size for each in models], [each.assessment for each in models], False)
+    kind = list(compared)[best.rank - 1]
+    smallest = "" if errors[kind] == least else ", the smallest without a significantly larger error,"
     return kind, (
-        f"because the free-run error of its recommended model on the validation data is "
+        f"because the free-run error of its recommended model{smallest} on the validation data is "
         f"{percent(errors[kind])} of the output range{_list_others(errors, kind)}"
     )
 
@@ -218,7 +222,3 @@ def _describe(library: TrialLibrary, kind: str) -> str:
         f"Preset auto chose {kind} (library {library.name} of degree {library.degree} with lags up to "
         f"{library.lags}, constraints {library.constraints})"
     )
-
-
-def _drop_infinite(errors: Mapping[str, float]) -> Mapping[str, float]:
-    return MappingProxyType({kind: error for kind, error in errors.items() if isfinite(error)})
