@@ -136,6 +136,14 @@ class Dataset:
         return rows
 
     @property
+    def longest_segment(self) -> "Dataset":
+        """The longest segment as a separate record; the first of several."""
+        if len(self.segments) == 1:
+            return self
+        begin, end = max(self.bounds, key=lambda bounds: bounds[1] - bounds[0])
+        return self[begin:end]
+
+    @property
     def output_range(self) -> float:
         """``max(y) - min(y)`` of the known samples (NaN if there is none); scale of MAPE, equation (7)."""
         present = self.y[~np.isnan(self.y)]

@@ -6,8 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.data.dataset import Dataset
+from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    Target,
+    calibrate,
+    evaluate_fit,
+)
 from islands.discrepancy.calibration.preparation import (
     count_fitted_samples,
     make_context,
@@ -130,7 +136,7 @@ def diagnose(
     ----------
     record : Dataset
         Measured record. Its first input drives the simulation; further inputs are channels that may couple
-        in.
+        in. Each of several recordings has its own initial states; all other parameters are common to them.
     simulator : Simulator
     tolerance : mapping, optional
         Relative standard deviations of the simulator's parameters about their nominal values. Parameters that
@@ -147,8 +153,8 @@ def diagnose(
     Raises
     ------
     RecordError
-        The record is too short, has several segments, gaps, a constant signal or a channel equal to the
-        input, or the simulation diverges on it.
+        The record or one of its recordings is too short, or has gaps, a constant signal or a channel equal to
+        the input, or the simulation diverges on it.
     SettingsError
         A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, two effects have the
         same name, or an effect is invalid.
@@ -158,7 +164,8 @@ def diagnose(
     context = make_context(record, simulator, fitted)
     rng = np.random.default_rng(seed)
     simulation = ExtendedSimulator(simulator, (), context)
-    target = Target(record.y, np.arange(record.samples) < fitted, None, prior_std)
+    estimation_part = np.arange(record.samples) < fitted
+    target = Target(record.y, estimation_part, None, prior_std, segments=record.segments)
     progress("calibrating the simulation")
     base = calibrate(simulation, target, simulation.nominal)
     simulator = select_intersample(base, target)
@@ -204,7 +211,9 @@ def _make_diagnosis(
     The base of ``outcome`` may be calibrated to whitened residuals; ``base`` is calibrated to unweighted
     ones.
     """
-    hypothesis, verdict, floor = outcome.hypothesis, outcome.verdict, outcome.noise_floor
+    verdict, floor, target = outcome.verdict, outcome.noise_floor, outcome.target
+    base = fit_initial_states(base, target, fitted)
+    hypothesis = replace(outcome.hypothesis, fit=fit_initial_states(outcome.hypothesis.fit, target, fitted))
     holdout = slice(fitted, record.samples)
     gain = None
     if verdict in (Verdict.NAMED, Verdict.REMAINDER):
@@ -217,13 +226,13 @@ def _make_diagnosis(
     if gain is not None:
         progress("screening alternative causes")
         findings, equivalents = describe_effects(
-            hypothesis, outcome.base, outcome.screened, outcome.target, effects, floor, parallel_map
+            hypothesis, outcome.base, outcome.screened, target, effects, floor, parallel_map
         )
     residual = (record.y - hypothesis.fit.output)[:fitted]
     context = hypothesis.fit.simulation.context
     noise = _detect_noise(record.y[:fitted], residual, context) if verdict != Verdict.UNKNOWN else ()
-    simulation = base.simulation
-    nominal = simulation.simulate(simulation.nominal)
+    as_given = evaluate_fit(base.simulation, target, base.simulation.nominal)
+    nominal = fit_initial_states(as_given, target, 0).output
     return Diagnosis(
         Verdict.NAMED if noise and verdict == Verdict.NOTHING else verdict,
         (*findings, *noise),

@@ -104,7 +104,7 @@ class Surrogates:
             return self.simulation.simulate(self.values)
         extended = self.simulation.with_effects([effect])
         extended_values = transfer_parameters(self.values, self.simulation, extended)
-        extended_values[extended.get_slice(effect)] = values
+        extended_values[extended.get_slice(effect)] = extended.expand(effect, values)
         return extended.simulate(extended_values)
 
     @property
@@ -114,13 +114,16 @@ class Surrogates:
         return {effect.name: effect for effect in effects}
 
     def draw_noise(self, seed: int) -> Signal:
-        """Draw the noise of a surrogate."""
-        samples = self.record.samples
-        # The stream differs from that of the diagnosis with the same seed. The first half is the filter's
-        # warm-up.
-        white = np.random.default_rng([seed, 1]).standard_normal(2 * samples)
-        filtered = scipy.signal.lfilter([1.0], np.concatenate([[1.0], -self.noise.coefficients]), white)
-        noise: Signal = np.sqrt(self.noise.variance) * filtered[samples:]
+        """Draw the noise of a surrogate; that of different recordings is independent."""
+        warm_up = self.record.samples
+        # The stream differs from that of the diagnosis with the same seed.
+        rng = np.random.default_rng([seed, 1])
+        poles = np.concatenate([[1.0], -self.noise.coefficients])
+        parts = [
+            scipy.signal.lfilter([1.0], poles, rng.standard_normal(warm_up + length))[warm_up:]
+            for length in self.record.segments
+        ]
+        noise: Signal = np.sqrt(self.noise.variance) * np.concatenate(parts)
         return noise
 
     def draw_record(self, case: SurrogateCase) -> Dataset:
@@ -151,7 +154,7 @@ def make_surrogates(diagnosis: Diagnosis, simulator: Simulator, tolerance: Mappi
         tolerance,
         simulation,
         transfer_parameters(best.values, best.simulation, simulation),
-        _limit_poles(fit_ar_noise(residual), diagnosis.record.samples),
+        _limit_poles(fit_ar_noise(residual, segments=diagnosis.record.segments), diagnosis.record.samples),
         float(np.sqrt(np.mean(residual**2))),
         diagnosis.estimation_samples,
     )

@@ -72,6 +72,8 @@ def explain_residual(
         input_units=(record.input_units[0], record.output_unit),
         output_name=RESIDUAL,
         output_unit=record.output_unit,
+        segments=record.segments,
+        recordings=record.recordings,
     )
     result = identify(dataset[: found.estimation_samples], preset="narx", seed=seed, engine=engine, **SEARCH)
     best, explained = None, MIN_EXPLAINED_FRACTION

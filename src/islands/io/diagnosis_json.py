@@ -59,9 +59,9 @@ def as_json(document: dict[str, Any]) -> str:
 
 def _get_calibrated_values(diagnosis: Diagnosis) -> dict[str, float]:
     fit = diagnosis.best
-    parameters = fit.simulation.simulator.parameters
-    # The values of the effects follow those of the simulator.
-    return {each.name: float(value) for each, value in zip(parameters, fit.values, strict=False)}
+    part = fit.simulation.simulator_slice
+    parameters = fit.simulation.parameters[part]
+    return {each.name: float(value) for each, value in zip(parameters, fit.values[part], strict=True)}
 
 
 def _describe_self_test(tested: SelfTest | None) -> dict[str, Any]:

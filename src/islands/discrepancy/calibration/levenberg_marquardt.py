@@ -1,13 +1,14 @@
 """Calibration of a simulation's parameters to a record by the Levenberg-Marquardt method."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.discrepancy.calibration.noise_model import NoiseModel, fit_ar_noise, white_noise
 from islands.discrepancy.interfaces.effect import Signal
+from islands.discrepancy.interfaces.segments import find_bounds
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 #: Maximum number of accepted steps.
@@ -41,6 +42,8 @@ class Target:
     effective_samples : float or None
         Effective sample size of the estimation part if the residual is model error; None if it is noise,
         white or coloured.
+    segments : tuple of int
+        Lengths of the recordings in samples; empty for a single one.
     """
 
     y: Signal
@@ -48,10 +51,21 @@ class Target:
     noise: NoiseModel | None
     prior_std: Mapping[str, float]
     effective_samples: float | None = None
+    segments: tuple[int, ...] = ()
+
+    @property
+    def fitted_segments(self) -> tuple[int, ...]:
+        """Number of samples of every recording that are used for estimation, without zeros."""
+        counts = (
+            int(np.count_nonzero(self.estimation_part[first:last]))
+            for first, last in find_bounds(self.segments, self.y.size)
+        )
+        return tuple(count for count in counts if count)
 
     def select(self, signal: Signal) -> Signal:
         """Return the whitened signal over the estimation part."""
-        return (signal if self.noise is None else self.noise.whiten(signal))[self.estimation_part]
+        whitened = signal if self.noise is None else self.noise.whiten(signal, self.segments)
+        return whitened[self.estimation_part]
 
     def residual(self, simulated: Signal) -> Signal:
         """Return the whitened residual over the estimation part."""
@@ -90,7 +104,11 @@ class CalibrationResult:
 
 
 def calibrate(
-    simulation: ExtendedSimulator, target: Target, start: Signal, max_iterations: int = MAX_ITERATIONS
+    simulation: ExtendedSimulator,
+    target: Target,
+    start: Signal,
+    max_iterations: int = MAX_ITERATIONS,
+    is_fixed: NDArray[np.bool_] | None = None,
 ) -> CalibrationResult:
     """Fit the parameters of a simulation to a record.
 
@@ -102,6 +120,8 @@ def calibrate(
         Starting point. It is clipped to the bounds; if the simulation diverges there, it is not improved.
     max_iterations : int
         Maximum number of accepted steps.
+    is_fixed : ndarray of bool, shape (parameters,), optional
+        Parameters that keep their values; by default none.
     """
     lower, upper = simulation.bounds
     inverse_std, nominal = prior_precision(simulation, target.prior_std)
@@ -116,7 +136,7 @@ def calibrate(
     for _ in range(max_iterations if values.size and np.isfinite(cost) else 0):
         if float(residual @ residual) <= rounding:
             break
-        jacobian = _compute_jacobian(simulation, target, values, output)
+        jacobian = _compute_jacobian(simulation, target, values, output, is_fixed)
         weight = residual.size / max(float(residual @ residual), np.finfo(float).tiny)
         hessian = weight * (jacobian.T @ jacobian) + np.diag((inverse_std * scales) ** 2)
         slope = weight * (jacobian.T @ residual) - scales * inverse_std**2 * (values - nominal)
@@ -149,7 +169,7 @@ def evaluate_fit(simulation: ExtendedSimulator, target: Target, values: Signal) 
     penalty = float(np.sum((inverse_std * (values - nominal)) ** 2))
     mean_square = float(np.mean(residual**2))
     noise = (
-        fit_ar_noise(residual)
+        fit_ar_noise(residual, segments=target.fitted_segments)
         if target.effective_samples is None
         else white_noise(mean_square, target.effective_samples)
     )
@@ -164,7 +184,7 @@ def estimate_covariance(fit: CalibrationResult, target: Target) -> NDArray[np.fl
     ndarray, shape (parameters, parameters)
     """
     simulation = fit.simulation
-    whitened = Target(target.y, target.estimation_part, fit.noise, target.prior_std)
+    whitened = replace(target, noise=fit.noise)
     scales = simulation.scales
     jacobian = _compute_jacobian(simulation, whitened, fit.values, fit.output)
     inverse_std, _ = prior_precision(simulation, target.prior_std)
@@ -193,9 +213,13 @@ def prior_precision(simulation: ExtendedSimulator, tolerance: Mapping[str, float
 
 
 def _compute_jacobian(
-    simulation: ExtendedSimulator, target: Target, values: Signal, output: Signal
+    simulation: ExtendedSimulator,
+    target: Target,
+    values: Signal,
+    output: Signal,
+    is_fixed: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
-    """Compute the derivatives of the whitened output with respect to each scaled value.
+    """Compute the derivatives of the whitened output with respect to each scaled value; zero if it is fixed.
 
     Returns
     -------
@@ -204,6 +228,9 @@ def _compute_jacobian(
     _, upper = simulation.bounds
     columns = np.empty((int(np.count_nonzero(target.estimation_part)), values.size))
     for index, scale in enumerate(simulation.scales):
+        if is_fixed is not None and is_fixed[index]:
+            columns[:, index] = 0.0
+            continue
         step = (
             DIFFERENCE_STEP if values[index] + DIFFERENCE_STEP * scale <= upper[index] else -DIFFERENCE_STEP
         )

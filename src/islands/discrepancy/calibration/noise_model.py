@@ -1,11 +1,13 @@
 """Autoregressive noise model, with its order selected by BIC."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from islands.discrepancy.interfaces.effect import Signal
+from islands.discrepancy.interfaces.segments import find_bounds, map_segments
 
 #: Maximum order of the autoregression.
 MAX_ORDER = 3
@@ -40,32 +42,39 @@ class NoiseModel:
             np.log(self.effective_samples)
         )
 
-    def whiten(self, signal: Signal) -> Signal:
-        """Filter a signal with the inverse of the noise model."""
+    def whiten(self, signal: Signal, segments: Sequence[int] = ()) -> Signal:
+        """Filter a signal with the inverse of the noise model; the filter starts at rest in every segment."""
         if self.order == 0:
             return signal
-        whitened: Signal = scipy.signal.lfilter(np.concatenate([[1.0], -self.coefficients]), [1.0], signal)
-        return whitened
+        inverse = np.concatenate([[1.0], -self.coefficients])
+        return map_segments(lambda part: scipy.signal.lfilter(inverse, [1.0], part), signal, segments)
 
 
-def fit_ar_noise(residual: Signal, max_order: int = MAX_ORDER) -> NoiseModel:
+def fit_ar_noise(residual: Signal, max_order: int = MAX_ORDER, segments: Sequence[int] = ()) -> NoiseModel:
     """Fit an autoregression by least squares and select its order by BIC.
 
     Parameters
     ----------
     residual : ndarray, shape (samples,)
-        Residual of a single recording without gaps. NaN of a diverged simulation gives white noise of
-        infinite variance.
+        Residual without gaps. NaN of a diverged simulation gives white noise of infinite variance.
     max_order : int
         Maximum order of the autoregression.
+    segments : sequence of int
+        Lengths of the recordings in samples; no equation reaches from one into the next.
     """
     best: NoiseModel | None = None
     n = residual.size
     if np.isnan(residual).any():  # the simulation has diverged
         return NoiseModel(np.zeros(0), float("inf"), n)
-    later = residual[max_order:]
     # All orders use the same equations, so that the inner products of all lags are computed once.
-    lagged = np.column_stack([residual[max_order - lag : n - lag] for lag in range(1, max_order + 1)])
+    bounds = [(first, last) for first, last in find_bounds(segments, n) if last - first > max_order]
+    later = np.concatenate([residual[first + max_order : last] for first, last in bounds])
+    lagged = np.column_stack(
+        [
+            np.concatenate([residual[first + max_order - lag : last - lag] for first, last in bounds])
+            for lag in range(1, max_order + 1)
+        ]
+    )
     gram, moment, energy = lagged.T @ lagged, lagged.T @ later, float(later @ later)
     for order in range(max_order + 1):
         coefficients: Signal = np.zeros(0)
@@ -86,14 +95,16 @@ def white_noise(mean_square: float, samples: float) -> NoiseModel:
     return NoiseModel(np.zeros(0), max(mean_square, np.finfo(float).tiny), samples)
 
 
-def estimate_effective_samples(residual: Signal) -> float:
+def estimate_effective_samples(residual: Signal, segments: Sequence[int] = ()) -> float:
     """Estimate the effective sample size of a residual: n over the sum of rho^2, and at least 10.
 
-    Bartlett's formula for the variance of the mean square of a stationary normal residual.
+    Bartlett's formula for the variance of the mean square of a stationary normal residual. Products of
+    samples of different recordings are left out.
     """
     n = residual.size
     centred = residual - residual.mean()
-    spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+    parts = [centred[first:last] for first, last in find_bounds(segments, n)]
+    spectrum = sum(np.abs(np.fft.rfft(part, 2 * n)) ** 2 for part in parts)
     correlation = np.fft.irfft(spectrum)[: n // 4]
     rho = correlation / max(float(correlation[0]), np.finfo(float).tiny)
     return max(10.0, n / (1.0 + 2.0 * float(np.sum(rho[1:] ** 2))))

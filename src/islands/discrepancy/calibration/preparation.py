@@ -17,8 +17,12 @@ from islands.errors import RecordError, SettingsError
 #: Fraction of the record, at its end, that is reserved for hold-out validation.
 HOLDOUT_FRACTION = 0.25
 
-#: Minimum number of samples of a record.
+#: Minimum number of samples of a record, in all recordings together.
 MIN_SAMPLES = 200
+
+#: Minimum number of samples of each of several recordings, and of each part of one that the hold-out part
+#: divides: its initial state is estimated from them.
+MIN_RECORDING_SAMPLES = 20
 
 
 def select_effects(
@@ -80,8 +84,17 @@ def validate_prior(tolerance: Mapping[str, float], simulator: Simulator) -> Mapp
 
 
 def estimation_part(record: Dataset) -> Dataset:
-    """Return the part of a record that is used for estimation, without the hold-out part at its end."""
-    return record[: int((1.0 - HOLDOUT_FRACTION) * record.samples)]
+    """Return the part of a record that is used for estimation, without the hold-out part at its end.
+
+    The hold-out part may consist of whole recordings. It begins with a recording if less than
+    `MIN_RECORDING_SAMPLES` would be divided from one.
+    """
+    fitted = int((1.0 - HOLDOUT_FRACTION) * record.samples)
+    for boundary, _ in record.bounds[1:]:
+        if abs(fitted - boundary) < MIN_RECORDING_SAMPLES:
+            fitted = boundary
+            break
+    return record[:fitted]
 
 
 def count_fitted_samples(record: Dataset) -> int:
@@ -90,16 +103,19 @@ def count_fitted_samples(record: Dataset) -> int:
     Raises
     ------
     RecordError
-        The record is too short, has several segments, gaps, a constant signal or a channel equal to the
-        input.
+        The record or one of its recordings is too short, or has gaps, a constant signal or a channel equal to
+        the input.
     """
     if record.samples < MIN_SAMPLES:
         raise RecordError(
             f"the record has {record.samples} samples, and a diagnosis needs at least {MIN_SAMPLES}: give a "
             "longer one"
         )
-    if len(record.segments) > 1:
-        raise RecordError("the record consists of several recordings: diagnose them one by one")
+    if len(record.segments) > 1 and (shortest := min(record.segments)) < MIN_RECORDING_SAMPLES:
+        raise RecordError(
+            f"recording {1 + record.segments.index(shortest)} has {shortest} samples, and a diagnosis of "
+            f"several recordings needs at least {MIN_RECORDING_SAMPLES} of each: leave it out"
+        )
     if np.isnan(record.y).any():
         raise RecordError("the measured output has gaps: repair them, or select rows without any")
     fitted = estimation_part(record).samples
@@ -138,6 +154,7 @@ def make_context(record: Dataset, simulator: Simulator, fitted: int) -> Simulati
         input_unit=units[0] or "1",
         output_unit=record.output_unit or "1",
         fit_end_time=fitted * record.dt,
+        segments=record.segments,
     )
     simulation = ExtendedSimulator(simulator, (), context)
     nominal = simulation.simulate(simulation.nominal)

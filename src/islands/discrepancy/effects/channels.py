@@ -14,9 +14,13 @@ def has_channel(context: SimulationContext, thermal: bool) -> bool:
 
 
 def channel(context: SimulationContext, thermal: bool) -> Signal:
-    """Return the first such channel; a temperature relative to its first value, as its zero is arbitrary."""
-    signal = context.channels[_name(context, thermal) or ""]
-    return signal - signal[0] if thermal else signal
+    """Return the first such channel; a temperature relative to its first value, as its zero is arbitrary.
+
+    The first value is that of the first recording.
+    """
+    name = _name(context, thermal) or ""
+    signal = context.channels[name]
+    return signal - (context.whole or context).channels[name][0] if thermal else signal
 
 
 def channel_unit(context: SimulationContext, thermal: bool) -> str:
@@ -30,10 +34,12 @@ def channel_range(context: SimulationContext, thermal: bool) -> float:
 
 
 def _name(context: SimulationContext, thermal: bool) -> str | None:
+    # A channel that varies in one recording may be constant in another one.
+    whole = context.whole or context
     return next(
         (
             name
-            for name, signal in context.channels.items()
+            for name, signal in whole.channels.items()
             if (context.units[name] in TEMPERATURES) == thermal and np.ptp(signal) > 0.0
         ),
         None,

@@ -11,7 +11,7 @@ import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
-from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.interfaces.simulator import Simulator, split_recordings
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
 from islands.model.model import Model
 from islands.model.primitives import MUL, PRIMITIVES, SUB
@@ -160,21 +160,25 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
     def starting_points(context: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
         fitted = round(context.fit_end_time / context.dt)
         own, added = simulator.parameters, parameters(context)[:-1]
-        nominal = np.array([each.nominal for each in own])
+        recordings = split_recordings(simulator, context)
 
-        def simulate(values: Signal, **shape: float) -> Signal:
-            return simulator.simulate(values, context.u, context, shape, ())[:fitted]
+        def simulate(change: Signal | float = 0.0, **shape: float) -> Signal:
+            outputs = []
+            for each, part in recordings:
+                nominal = np.array([parameter.nominal for parameter in each.parameters])
+                outputs.append(each.simulate(nominal + change, part.u, part, shape, ()))
+            return np.concatenate(outputs)[:fitted]
 
-        at_rest = simulate(nominal)
-        moved = nominal + _STEP * np.diag([each.scale for each in own])
-        known = [(simulate(values) - at_rest) / _STEP for values in moved]
+        at_rest = simulate()
+        moved = _STEP * np.diag([each.scale for each in own])
+        known = [(simulate(change) - at_rest) / _STEP for change in moved]
         u = context.u[:fitted]
         regression_slope = float(np.polyfit(u, at_rest, 1)[0])
         trials: list[tuple[float, tuple[float, ...]]] = []
         for factor in _SLOPES:
             slope = factor * regression_slope
             columns = known + [
-                (simulate(nominal, **{SLOPE: slope, each.name: _STEP * each.scale}) - at_rest) / _STEP
+                (simulate(**{SLOPE: slope, each.name: _STEP * each.scale}) - at_rest) / _STEP
                 for each in added
             ]
             design = np.column_stack(columns)

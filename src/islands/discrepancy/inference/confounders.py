@@ -14,6 +14,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResul
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.screening import transfer_parameters
 from islands.discrepancy.interfaces.effect import Effect, Signal
+from islands.discrepancy.interfaces.segments import map_segments
 
 #: Factors on the strength of the confounder in its simulations; each moves the slips to other instants.
 STRENGTH_FACTORS = tuple(np.linspace(0.9, 1.1, 9).tolist())
@@ -58,13 +59,15 @@ def find_confounder(fit: CalibrationResult, effect: Effect, target: Target) -> C
     remaining = (each for each in simulation.effects if each is not effect)
     replaced = simulation.with_effects(catalogue_order((*remaining, other)))
     values = transfer_parameters(fit.values, simulation, replaced)
-    excess_mean_square, expected = 0.0, np.zeros(np.count_nonzero(target.estimation_part) - 1)
+    segments = target.fitted_segments
+    excess_mean_square, expected = 0.0, np.zeros(sum(segments) - len(segments))
     for strength in STRENGTH_FACTORS:
         values[replaced.get_slice(other)] = strength * factor * fit.values[simulation.get_slice(effect)]
         excess = (replaced.simulate(values) - fit.output)[target.estimation_part]
         excess_mean_square += float(np.mean(excess**2)) / len(STRENGTH_FACTORS)
-        expected += _multiply_neighbours(excess) / len(STRENGTH_FACTORS)
-    measured = _multiply_neighbours((target.y - fit.output)[target.estimation_part])
+        expected += map_segments(_multiply_neighbours, excess, segments) / len(STRENGTH_FACTORS)
+    residual = (target.y - fit.output)[target.estimation_part]
+    measured = map_segments(_multiply_neighbours, residual, segments)
     ratio = _log_likelihood_ratio(measured - measured.mean(), expected - expected.mean())
     return Confounder(other, factor, ratio, excess_mean_square)
 
@@ -77,6 +80,7 @@ def _log_likelihood_ratio(measured: Signal, expected: Signal) -> float:
     """Return twice the log-likelihood ratio of the expected signal being present against absent.
 
     The standard deviation of the estimated amplitude is that over circular shifts of the measured signal.
+    Products with the samples of another recording are in the shifted signals only, and are few.
     """
     size = float(expected @ expected)
     if size == 0.0:

@@ -68,5 +68,5 @@ def _compute_distance(one: CalibrationResult, other: CalibrationResult, speed: i
         ).simulate(fit.values)
         for fit in (one, other)
     ]
-    difference = one.noise.whiten(outputs[0] - outputs[1])
+    difference = one.noise.whiten(outputs[0] - outputs[1], one.simulation.context.segments)
     return float(np.sqrt(np.sum(difference**2) / one.noise.variance))

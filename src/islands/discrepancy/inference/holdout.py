@@ -7,9 +7,11 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
 from islands.discrepancy.interfaces.effect import Signal
+from islands.discrepancy.interfaces.segments import find_bounds
 
 #: Number of blocks into which the estimation part and the hold-out part are each divided. Blocks are the
-#: units of the bootstrap and the cross-validation.
+#: units of the bootstrap and the cross-validation. They sum squared errors, so that one may contain the
+#: boundary of two recordings.
 BLOCKS = 36
 
 #: Number of folds of the cross-validation.
@@ -103,8 +105,8 @@ def cross_validate_gain(
 ) -> float:
     """Return a lower bound on the gain of an extension over blocks that were left out of the fits.
 
-    The unit is minus twice the log-likelihood. The first block is always fitted, since the initial state is
-    unknown otherwise.
+    The unit is minus twice the log-likelihood. The first samples of every recording, as many as a block has
+    but at most half of the recording, are always fitted, since the initial state is unknown otherwise.
 
     Parameters
     ----------
@@ -114,17 +116,22 @@ def cross_validate_gain(
         Number of samples used for estimation.
     """
     block = np.arange(target.y.size) * BLOCKS // fitted
-    fold = rng.permutation(np.arange(1, BLOCKS)) % FOLDS
+    is_kept = block == 0
+    for first, last in find_bounds(target.segments, fitted)[1:]:
+        is_kept[first : first + min(-(-fitted // BLOCKS), (last - first) // 2)] = True
+    numbers = np.unique(block[:fitted][~is_kept[:fitted]])
+    fold = rng.permutation(np.arange(1, numbers.size + 1)) % FOLDS
     gains = []
     for each in range(FOLDS):
-        left_out = np.arange(1, BLOCKS)[fold == each]
-        training = replace(
-            target, noise=after.noise, estimation_part=target.estimation_part & ~np.isin(block, left_out)
-        )
+        left_out = numbers[fold == each]
+        is_left_out = np.isin(block, left_out) & ~is_kept
+        training = replace(target, noise=after.noise, estimation_part=target.estimation_part & ~is_left_out)
         old = before if keep_values else calibrate(before.simulation, training, before.values)
         new = calibrate(after.simulation, training, after.values)
-        squares = [after.noise.whiten(target.y - fit.output) ** 2 for fit in (old, new)]
-        gains += [float(np.sum((squares[0] - squares[1])[block == number])) for number in left_out]
+        squares = [after.noise.whiten(target.y - fit.output, target.segments) ** 2 for fit in (old, new)]
+        gains += [
+            float(np.sum((squares[0] - squares[1])[(block == number) & is_left_out])) for number in left_out
+        ]
     weight = after.noise.effective_samples / np.count_nonzero(target.estimation_part)
     return _bound_gain(weight * np.array(gains) / after.noise.variance, rng)
 

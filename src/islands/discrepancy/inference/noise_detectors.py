@@ -4,10 +4,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.data.channel_names import simplify_unit
 from islands.discrepancy.calibration.noise_model import fit_ar_noise
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
+from islands.discrepancy.interfaces.segments import find_bounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,9 @@ _MIN_BURSTS = 2
 def _detect_held_samples(y: Signal, _residual: Signal, context: SimulationContext) -> NoiseFinding | None:
     if y.size >= _MIN_SAMPLES_PER_LEVEL * np.unique(y).size:
         return None
-    is_repeated = np.concatenate([[False], np.diff(y) == 0.0, [False]])
+    is_equal = np.diff(y) == 0.0
+    is_equal[[first - 1 for first, _ in find_bounds(context.segments, y.size)[1:]]] = False
+    is_repeated = np.concatenate([[False], is_equal, [False]])
     edges = np.flatnonzero(np.diff(is_repeated.astype(np.int8)))
     lengths = edges[1::2] - edges[::2] + 1
     bursts = lengths[lengths >= _MIN_BURST_LENGTH]
@@ -131,8 +135,22 @@ _OUTLIER_DISTANCE = 5.5
 _MIN_OUTLIERS = 3
 
 
+def _whiten(residual: Signal, context: SimulationContext) -> tuple[Signal, NDArray[np.bool_]]:
+    """Return the whitened residual, and a mask without the first samples of recordings after the first one.
+
+    The filter starts at rest, so that these samples are not innovations. Those of a single recording are too
+    few to matter.
+    """
+    noise = fit_ar_noise(residual, segments=context.segments)
+    is_innovation = np.ones(residual.size, dtype=bool)
+    for first, _ in find_bounds(context.segments, residual.size)[1:]:
+        is_innovation[first : first + noise.order] = False
+    return noise.whiten(residual, context.segments), is_innovation
+
+
 def _detect_outliers(_y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
-    whitened = fit_ar_noise(residual).whiten(residual)
+    whitened, is_innovation = _whiten(residual, context)
+    whitened = whitened[is_innovation]
     scale = float(np.median(np.abs(whitened - np.median(whitened)))) / _MAD
     if scale == 0.0:
         return None
@@ -167,9 +185,8 @@ _HETEROSCEDASTIC_STRENGTHS = np.concatenate([[0.0], np.geomspace(0.1, 30.0, 60)]
 def _detect_heteroscedastic_noise(
     y: Signal, residual: Signal, context: SimulationContext
 ) -> NoiseFinding | None:
-    noise = fit_ar_noise(residual)
-    whitened = noise.whiten(residual)
-    size = np.abs(y) / np.max(np.abs(y))
+    whitened, is_innovation = _whiten(residual, context)
+    whitened, size = whitened[is_innovation], np.abs(y[is_innovation]) / np.max(np.abs(y))
     n = whitened.size
     # A few outliers at large outputs have the same effect, so that squares are clipped at four deviations.
     scale = float(np.median(np.abs(whitened))) / _MAD
@@ -200,8 +217,8 @@ HETEROSCEDASTIC_NOISE = NoiseDetector(
 )
 
 
-def _detect_coloured_noise(_y: Signal, residual: Signal, _context: SimulationContext) -> NoiseFinding | None:
-    noise = fit_ar_noise(residual)
+def _detect_coloured_noise(_y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
+    noise = fit_ar_noise(residual, segments=context.segments)
     if noise.order == 0:
         return None
     white = residual.size * float(np.log(np.mean(residual**2)))

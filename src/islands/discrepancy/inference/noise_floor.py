@@ -1,9 +1,12 @@
 """Noise floor: the explainable part of a residual, and the noise variance from repeated periods."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 
 from islands.discrepancy.interfaces.effect import Signal
+from islands.discrepancy.interfaces.segments import find_bounds
 from islands.systems.hysteresis_operators import play_from
 
 #: Lags of the features, in samples.
@@ -34,11 +37,18 @@ MIN_PERIOD = 16
 PERIOD_TOLERANCE = 1e-3
 
 
-def explainable_variance(residual: Signal, u: Signal, simulated: Signal, rng: np.random.Generator) -> float:
+def explainable_variance(
+    residual: Signal,
+    u: Signal,
+    simulated: Signal,
+    rng: np.random.Generator,
+    segments: Sequence[int] = (),
+) -> float:
     """Return the part of the residual's mean square that cross-validated ridge regression predicts.
 
     The features are lags, rates, low-pass filters, plays and random cosines of the input and the simulated
-    output. Folds are contiguous blocks.
+    output. Features do not reach across the boundary of two recordings; folds, which are contiguous
+    blocks, may contain one.
 
     Parameters
     ----------
@@ -46,8 +56,10 @@ def explainable_variance(residual: Signal, u: Signal, simulated: Signal, rng: np
         Signals over the same samples, without gaps.
     rng : Generator
         Draws the random features.
+    segments : sequence of int
+        Lengths of the recordings in samples.
     """
-    raw = _make_features(u, simulated)
+    raw = _make_features(u, simulated, segments)
     raw = (raw - raw.mean(axis=0)) / (raw.std(axis=0) + 1e-12)
     left, singular_values, _ = np.linalg.svd(raw, full_matrices=False)
     axes = left[:, singular_values > 1e-6 * singular_values[0]] * np.sqrt(len(raw))
@@ -72,19 +84,33 @@ def explainable_variance(residual: Signal, u: Signal, simulated: Signal, rng: np
     return (total - best) / residual.size
 
 
-def _make_features(u: Signal, simulated: Signal) -> Signal:
-    columns = []
-    for signal in (u, simulated):
-        rate = np.gradient(signal)
-        columns += [signal, rate, np.tanh(rate / (0.1 * np.std(rate) + 1e-12))]
-        for lag in LAGS:
-            columns.append(np.concatenate([np.full(lag, signal[0]), signal[:-lag]]))
-        for time_constant in TIME_CONSTANTS:
-            a = np.exp(-1.0 / time_constant)
-            columns.append(scipy.signal.lfilter([1.0 - a], [1.0, -a], signal - signal[0]))
-        for width in PLAY_WIDTHS:
-            columns.append(play_from(signal, width * float(np.std(signal))))
-    return np.column_stack(columns)
+def _make_features(u: Signal, simulated: Signal, segments: Sequence[int]) -> Signal:
+    features = [_make_features_of_signal(signal, segments) for signal in (u, simulated)]
+    return np.column_stack(features)
+
+
+def _make_features_of_signal(signal: Signal, segments: Sequence[int]) -> Signal:
+    parts = [signal[first:last] for first, last in find_bounds(segments, signal.size)]
+    rates = [np.gradient(part) for part in parts]
+    rate_scale = 0.1 * float(np.std(np.concatenate(rates))) + 1e-12
+    widths = [width * float(np.std(signal)) for width in PLAY_WIDTHS]
+    return np.concatenate(
+        [
+            np.column_stack(_make_columns(part, rate, rate_scale, widths))
+            for part, rate in zip(parts, rates, strict=True)
+        ]
+    )
+
+
+def _make_columns(signal: Signal, rate: Signal, rate_scale: float, widths: Sequence[float]) -> list[Signal]:
+    """Return the features of one signal in one recording."""
+    decays = [np.exp(-1.0 / time_constant) for time_constant in TIME_CONSTANTS]
+    return [
+        *(signal, rate, np.tanh(rate / rate_scale)),
+        *(np.concatenate([np.full(lag, signal[0]), signal])[: signal.size] for lag in LAGS),
+        *(scipy.signal.lfilter([1.0 - a], [1.0, -a], signal - signal[0]) for a in decays),
+        *(play_from(signal, width) for width in widths),
+    ]
 
 
 def detect_period(u: Signal) -> int | None:
@@ -102,20 +128,29 @@ def detect_period(u: Signal) -> int | None:
     return None
 
 
-def noise_variance_from_periods(u: Signal, y: Signal) -> float | None:
+def noise_variance_from_periods(u: Signal, y: Signal, segments: Sequence[int] = ()) -> float | None:
     """Return the variance of the output noise from repeated periods; None if there are fewer than three.
 
-    The first period is left out, since transients decay in it. The mean difference of two periods is drift
-    and does not count as noise.
+    Periods are looked for in each recording; recordings without three of them do not count. The first period
+    is left out, since transients decay in it. The mean difference of two periods is drift and does not count
+    as noise.
 
     Parameters
     ----------
     u, y : ndarray, shape (samples,)
+    segments : sequence of int
+        Lengths of the recordings in samples.
     """
+    found = [_subtract_periods(u[first:last], y[first:last]) for first, last in find_bounds(segments, y.size)]
+    differences = [each.ravel() for each in found if each is not None]
+    return float(np.mean(np.concatenate(differences) ** 2)) / 2.0 if differences else None
+
+
+def _subtract_periods(u: Signal, y: Signal) -> Signal | None:
+    """Return the differences of successive periods of the output, or None if there are fewer than three."""
     period = detect_period(u)
     if period is None or y.size < 3 * period:
         return None
     periods = y[y.size % period :].reshape(-1, period)[1:]
     differences = np.diff(periods, axis=0)
-    differences = differences - differences.mean(axis=1, keepdims=True)
-    return float(np.mean(differences**2)) / 2.0
+    return np.array(differences - differences.mean(axis=1, keepdims=True))

@@ -1,12 +1,13 @@
 """Residual analysis: dependence of a residual on the input, its rate and acceleration, and the output."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.discrepancy.calibration.noise_model import fit_ar_noise
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
+from islands.discrepancy.interfaces.segments import map_segments
 
 #: Number of random circular shifts that give the null distribution of a map.
 SHIFTS = 200
@@ -22,7 +23,8 @@ def find_residual_structure(
 
     The whitened residual is averaged over cells of the input, its rate, direction and acceleration, and the
     output. The null distribution comes from circular shifts of the residual, which keep its autocorrelation
-    and remove its dependence on the maps.
+    and remove its dependence on the maps. A shift moves the end of a recording into another one, which
+    changes the autocorrelation of few samples.
 
     Parameters
     ----------
@@ -30,13 +32,14 @@ def find_residual_structure(
         Signals over the estimation part.
     """
     n = residual.size
-    whitened = fit_ar_noise(residual).whiten(residual)
+    segments = context.segments
+    whitened = fit_ar_noise(residual, segments=segments).whiten(residual, segments)
     whitened = whitened - whitened.mean()
     if not whitened.any():
         return {}
     shifts = rng.integers(n // 20, n - n // 20, SHIFTS)
     distances = {}
-    for name, cells in _make_maps(context.u[:n], simulated, context.dt).items():
+    for name, cells in _make_maps(context.u[:n], simulated, context.dt, segments).items():
         null = np.log([_explained_squares(np.roll(whitened, shift), cells) for shift in shifts])
         distance = (float(np.log(_explained_squares(whitened, cells))) - float(null.mean())) / float(
             null.std()
@@ -52,10 +55,10 @@ def _explained_squares(signal: Signal, cells: NDArray[np.int64]) -> float:
     return float(np.sum(sums**2 / np.maximum(counts, 1)))
 
 
-def _make_maps(u: Signal, y: Signal, dt: float) -> Mapping[str, NDArray[np.int64]]:
+def _make_maps(u: Signal, y: Signal, dt: float, segments: Sequence[int]) -> Mapping[str, NDArray[np.int64]]:
     """Return the cell index of every sample, by name of the map."""
-    rate = np.gradient(u, dt)
-    acceleration = np.gradient(rate, dt)
+    rate = map_segments(lambda part: np.gradient(part, dt), u, segments)
+    acceleration = map_segments(lambda part: np.gradient(part, dt), rate, segments)
     direction = (rate > 0.0).astype(np.int64)
     return {
         "input": _assign_cells(u, 24),

@@ -62,8 +62,10 @@ class ScreenedEffect:
 
 def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
     """Return the BIC penalty of an effect: log n for each of its degrees of freedom."""
-    values = len(effect.parameters(base.simulation.context)) + effect.extra_degrees_of_freedom
-    return values * float(np.log(base.noise.effective_samples))
+    parameters = effect.parameters(base.simulation.context)
+    further_recordings = max(len(base.simulation.parts) - 1, 0)
+    values = len(parameters) + further_recordings * sum(each.initial for each in parameters)
+    return (values + effect.extra_degrees_of_freedom) * float(np.log(base.noise.effective_samples))
 
 
 def screen_effects(
@@ -128,8 +130,7 @@ def make_task_key(task: CalibrationTask) -> Hashable:
 def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSimulator) -> Signal:
     """Return the values of a simulation for one with other effects; new effects have their nominal values."""
     transferred = new.nominal
-    count = len(old.simulator.parameters)
-    transferred[:count] = values[:count]
+    transferred[new.simulator_slice] = values[old.simulator_slice]
     for effect in new.effects:
         if effect in old.effects:
             transferred[new.get_slice(effect)] = values[old.get_slice(effect)]
@@ -154,7 +155,11 @@ class _Projection:
             shifted[index] += DIFFERENCE_STEP * scale
             prior = np.zeros(values.size)
             prior[index] = inverse_std[index] * scale
-            columns.append(self._stack((simulation.simulate(shifted) - base.output) / DIFFERENCE_STEP, prior))
+            response = (simulation.simulate(shifted) - base.output) / DIFFERENCE_STEP
+            # The estimation part does not depend on the initial states of recordings in the hold-out part; an
+            # orthogonal basis of columns that are zero would contain arbitrary directions.
+            if not simulation.is_copy[index] or response[target.estimation_part].any():
+                columns.append(self._stack(response, prior))
         self._basis = np.linalg.qr(np.column_stack(columns))[0] if columns else None
         # The deviation of calibrated values from their prior is part of the residual to be explained.
         self.residual = self._project(self._stack(target.y - base.output, inverse_std * (nominal - values)))
@@ -178,17 +183,15 @@ def _get_starting_points(
     effect: Effect, simulation: ExtendedSimulator, residual: Signal
 ) -> Sequence[tuple[float, ...]]:
     """Return the starting points of an effect after checking them."""
-    part = simulation.get_slice(effect)
+    count = len(effect.parameters(simulation.context))
     try:
         points = effect.starting_points(simulation.context, residual)
     except Exception as error:
         raise invalid_effect_error(
             effect, f"its starting points fail: {type(error).__name__}: {error}"
         ) from error
-    if any(len(point) != part.stop - part.start for point in points):
-        raise invalid_effect_error(
-            effect, f"each of its starting points needs {part.stop - part.start} values"
-        )
+    if any(len(point) != count for point in points):
+        raise invalid_effect_error(effect, f"each of its starting points needs {count} values")
     return points
 
 
@@ -212,7 +215,7 @@ def _find_starts(
     starts = []
     for point in _get_starting_points(effect, simulation, target.y - base.output):
         values = without_effect.copy()
-        values[part] = point
+        values[part] = simulation.expand(effect, point)
         response = projection(simulation.simulate(values) - base.output)
         with np.errstate(over="ignore", invalid="ignore"):  # a point that diverges is no start
             size = float(response @ response)

@@ -117,7 +117,9 @@ def search_with_model_error(
         # Model error correlates neighbouring samples: the second pass counts them with the best effects
         # included.
         residual = target.residual(hypothesis.fit.output)
-        target = replace(target, effective_samples=estimate_effective_samples(residual))
+        target = replace(
+            target, effective_samples=estimate_effective_samples(residual, target.fitted_segments)
+        )
         base = evaluate_fit(base.simulation, target, base.values)
         screened = screen_effects(base, target, effects, parallel_map)
         if not any(explained_fraction(base, each.fit, 0.0) > MIN_SINGLE_FRACTION for each in screened):
@@ -140,10 +142,10 @@ def assess_evidence(outcome: SearchOutcome, fitted: int, rng: np.random.Generato
     hypothesis = validate_out_of_sample(outcome.hypothesis, base, target, fitted, rng)
     context, output = hypothesis.fit.simulation.context, hypothesis.fit.output[:fitted]
     residual = target.y[:fitted] - output
-    explainable = explainable_variance(residual, context.u[:fitted], output, rng)
+    explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
     structure = find_residual_structure(residual, output, context, rng)
     mean_square = float(np.mean(residual**2))
-    measured_floor = noise_variance_from_periods(context.u[:fitted], target.y[:fitted])
+    measured_floor = noise_variance_from_periods(context.u[:fitted], target.y[:fitted], context.segments)
     floor = max(mean_square - explainable, 0.0) if measured_floor is None else measured_floor
     has_remainder = bool(structure) or explainable > MIN_REMAINDER_FRACTION * mean_square
     # Under model error the noise floor is unknown: the fraction refers to the whole misfit.

@@ -136,10 +136,13 @@ def choose_reference_fit(
     """Return the fit that a hypothesis is compared with: the calibrated simulation without effects.
 
     Calibration absorbs a wrong gain or parameter. A hypothesis that has only such effects is therefore
-    compared with the simulation at its nominal values.
+    compared with the simulation at its nominal values. Initial states of recordings after the first have no
+    nominal values and are those of the calibration.
     """
     if all(effect.family == "scale" for effect in hypothesis.effects):
-        return evaluate_fit(base.simulation, target, base.simulation.nominal)
+        simulation = base.simulation
+        nominal = np.where(simulation.is_copy, base.values, simulation.nominal)
+        return evaluate_fit(simulation, target, nominal)
     return base
 
 
@@ -244,10 +247,15 @@ def _scale_values(
 
 
 def _get_values(fit: CalibrationResult, effect: Effect, deviations: Signal) -> Mapping[str, Value]:
-    """Return the values of an effect with their confidence intervals, given all standard deviations."""
+    """Return the values of an effect with their confidence intervals, given all standard deviations.
+
+    Initial states of recordings after the first are left out.
+    """
     part = fit.simulation.get_slice(effect)
     values = {}
     for index in range(part.start, part.stop):
+        if fit.simulation.is_copy[index]:
+            continue
         parameter, value = fit.simulation.parameters[index], float(fit.values[index])
         half_width = 1.96 * float(deviations[index])
         values[parameter.name] = Value(value, parameter.unit, (value - half_width, value + half_width))

@@ -1,13 +1,14 @@
 """Input of a simulation, scales of its record, and parameters."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.channel_names import simplify_unit
+from islands.discrepancy.interfaces.segments import find_bounds, map_segments
 
 Signal = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ class SimulationContext:
     u : ndarray, shape (samples,)
         Input.
     dt : float
-        Sampling time in seconds. The first sample is at time zero.
+        Sampling time in seconds.
     channels : mapping
         Other measured signals by name, each (samples,).
     units : mapping
@@ -78,6 +79,14 @@ class SimulationContext:
         Reference duration in seconds for strengths over the whole record; None for the duration of the input.
     force_coordinate : ForceCoordinate
         Coordinate that forces act on. By default it is the input, and forces are added to the output.
+    segments : tuple of int
+        Lengths of the recordings that the signals consist of, in samples; empty for a single one. A
+        simulator receives the context of one recording.
+    start_time : float
+        Time of the first sample. A record starts at zero, and time runs on from one recording to the next
+        without a pause, since a drift, a jump or a change of the system outlasts a recording.
+    whole : SimulationContext or None
+        Context of all recordings, if this is the context of one of several.
     """
 
     u: Signal
@@ -92,10 +101,13 @@ class SimulationContext:
     intersample_values: Signal | None = None
     reference_duration: float | None = None
     force_coordinate: ForceCoordinate = None  # type: ignore[assignment]
+    segments: tuple[int, ...] = ()
+    start_time: float = 0.0
+    whole: "SimulationContext | None" = None
 
     def __post_init__(self) -> None:
         if self.force_coordinate is None:
-            rate = float(np.std(np.diff(self.u))) / self.dt or 1.0
+            rate = float(np.std(self.take_differences(self.u))) / self.dt or 1.0
             coordinate = ForceCoordinate(
                 self.input_unit, self.input_peak, rate, self.output_unit, self.output_peak
             )
@@ -103,8 +115,36 @@ class SimulationContext:
 
     @property
     def time(self) -> Signal:
-        """Seconds since the first sample, shape (samples,)."""
-        return self.dt * np.arange(self.u.size, dtype=np.float64)
+        """Seconds since the first sample of the record, shape (samples,)."""
+        return self.start_time + self.dt * np.arange(self.u.size, dtype=np.float64)
+
+    @property
+    def bounds(self) -> tuple[tuple[int, int], ...]:
+        """First sample of every recording and the sample after its last."""
+        return find_bounds(self.segments, self.u.size)
+
+    def split(self) -> "tuple[SimulationContext, ...]":
+        """Return the context of each recording; scales, units and durations are those of the whole record."""
+        if len(self.bounds) <= 1:
+            return (self,)
+        between = self.intersample_values
+        return tuple(
+            replace(
+                self,
+                u=self.u[first:last],
+                channels={name: signal[first:last] for name, signal in self.channels.items()},
+                intersample_values=None if between is None else between[:, first:last],
+                reference_duration=self.duration,
+                segments=(),
+                start_time=self.start_time + self.dt * first,
+                whole=self,
+            )
+            for first, last in self.bounds
+        )
+
+    def take_differences(self, signal: Signal) -> Signal:
+        """Return the differences of successive samples within the recordings."""
+        return map_segments(np.diff, signal, self.segments)
 
     def get_intersample_values(self, x: Signal) -> Signal:
         """Return ``intersample_values``, or those of linear interpolation of the input ``x`` if None."""

@@ -1,7 +1,7 @@
 """Interface of the simulators that are compared with a record."""
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
@@ -70,3 +70,28 @@ class Simulator(Protocol):
         ndarray, shape (samples,)
             Output before the output maps.
         """
+
+
+@runtime_checkable
+class RecordBoundSimulator(Protocol):
+    """Simulator that contains samples of the record, such as measured initial outputs."""
+
+    def for_samples(self, first: int, last: int) -> Simulator:
+        """Return the simulator of a recording that begins at sample ``first`` and ends before ``last``."""
+
+
+def take_recording(simulator: Simulator, first: int, last: int) -> Simulator:
+    """Return the simulator of one of several recordings; most simulators are the same for all of them."""
+    return simulator.for_samples(first, last) if isinstance(simulator, RecordBoundSimulator) else simulator
+
+
+def split_recordings(
+    simulator: Simulator, context: SimulationContext
+) -> tuple[tuple[Simulator, SimulationContext], ...]:
+    """Return the simulator and the context of each recording."""
+    if len(context.bounds) == 1:
+        return ((simulator, context),)
+    return tuple(
+        (take_recording(simulator, *bounds), part)
+        for bounds, part in zip(context.bounds, context.split(), strict=True)
+    )

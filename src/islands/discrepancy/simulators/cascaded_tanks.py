@@ -125,10 +125,12 @@ def make_cascaded_tanks(
 ) -> CascadedTanksSimulator:
     """Make a simulator; estimate the parameters that are not given from the estimation part of a record.
 
+    Of several recordings, the longest one is used.
+
     Each point of a grid satisfies the balance of mean flows. The point whose free run has the smallest error
     is the initial value of the calibration.
     """
-    record = record[:estimation_samples]
+    record = record[:estimation_samples].longest_segment
     u, y = np.ascontiguousarray(record.u[:, 0]), record.y
     units = (record.input_units[0] or "1", record.output_unit or "1")
     level, pumped = max(float(np.mean(y)), 1e-6), max(abs(float(np.mean(u))), 1e-6)

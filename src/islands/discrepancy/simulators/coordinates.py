@@ -7,7 +7,7 @@ from islands.discrepancy.interfaces.context import ForceCoordinate, Signal, Simu
 
 def input_coordinate(context: SimulationContext, output: Signal) -> ForceCoordinate:
     """Return the input as the coordinate, for simulators without inertia: forces are added to the output."""
-    rate = float(np.std(np.diff(context.u))) / context.dt or 1.0
+    rate = float(np.std(context.take_differences(context.u))) / context.dt or 1.0
     return ForceCoordinate(
         context.input_unit, context.input_peak, rate, context.output_unit, peak_amplitude(output)
     )
@@ -15,7 +15,7 @@ def input_coordinate(context: SimulationContext, output: Signal) -> ForceCoordin
 
 def output_coordinate(context: SimulationContext, output: Signal) -> ForceCoordinate:
     """Return the output as the coordinate, for simulators with inertia: forces are added to the input."""
-    rate = float(np.std(np.diff(output))) / context.dt or 1.0
+    rate = float(np.std(context.take_differences(output))) / context.dt or 1.0
     return ForceCoordinate(
         context.output_unit,
         peak_amplitude(output),

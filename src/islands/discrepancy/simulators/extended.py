@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
-from islands.discrepancy.interfaces.simulator import Forces, Simulator
+from islands.discrepancy.interfaces.simulator import Forces, Simulator, split_recordings
 from islands.errors import SettingsError
 
 #: Cached outputs before the output maps: finite differences need the same one several times.
@@ -25,6 +25,9 @@ _DIVERGENCE_FACTOR = 1e6
 class ExtendedSimulator:
     """Simulator with effects. One vector has the values of the simulator, then those of each effect.
 
+    Several recordings are simulated one by one, each from its own initial states. The values of the simulator
+    or of an effect are followed by the initial states of the second and all further recordings.
+
     Attributes
     ----------
     simulator : Simulator
@@ -33,27 +36,62 @@ class ExtendedSimulator:
     context : SimulationContext
     parameters : tuple of Parameter
         Parameters of the simulator, then those of each effect.
+    recordings : ndarray of int, shape (parameters,)
+        Index of the recording that an initial state belongs to; zero for all other parameters.
+    parts : tuple of ExtendedSimulator
+        Simulator of each recording; empty for a single one.
     """
 
     simulator: Simulator
     effects: tuple[Effect, ...]
     context: SimulationContext
     parameters: tuple[Parameter, ...] = field(init=False)
+    recordings: NDArray[np.int64] = field(init=False)
+    parts: "tuple[ExtendedSimulator, ...]" = field(init=False)
+    _places: tuple[NDArray[np.int64], ...] = field(init=False)
     _slices: tuple[slice, ...] = field(init=False)
     _before_output: NDArray[np.bool_] = field(init=False)
     _cache: dict[bytes, Signal] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        parameters = list(self.simulator.parameters)
-        slices, before_output = [], [True] * len(parameters)
-        for effect in self.effects:
-            added = effect.parameters(self.context)
-            slices.append(slice(len(parameters), len(parameters) + len(added)))
-            parameters += added
-            before_output += [effect.site != Site.OUTPUT] * len(added)
-        object.__setattr__(self, "parameters", tuple(parameters))
-        object.__setattr__(self, "_slices", tuple(slices))
-        object.__setattr__(self, "_before_output", np.array(before_output, dtype=bool))
+        split = split_recordings(self.simulator, self.context)
+        parameters: list[Parameter] = []
+        recordings: list[int] = []
+        before_output: list[bool] = []
+        slices: list[slice] = []
+        places: list[list[int]] = [[] for _ in split]
+        for effect in (None, *self.effects):
+            own = self.simulator.parameters if effect is None else effect.parameters(self.context)
+            first = len(parameters)
+            parameters += own
+            recordings += [0] * len(own)
+            for part in places:
+                part.extend(range(first, first + len(own)))
+            for recording, (simulator, _) in enumerate(split[1:], start=1):
+                # The nominal initial state may depend on the recording.
+                theirs = simulator.parameters if effect is None else own
+                for index, parameter in enumerate(theirs):
+                    if parameter.initial:
+                        places[recording][index - len(own)] = len(parameters)
+                        name = f"{parameter.name} (recording {recording + 1})"
+                        parameters.append(replace(parameter, name=name))
+                        recordings.append(recording)
+            slices.append(slice(first, len(parameters)))
+            is_before = effect is None or effect.site != Site.OUTPUT
+            before_output += [is_before] * (len(parameters) - first)
+        parts = [
+            ExtendedSimulator(simulator, self.effects, context)
+            for simulator, context in (split if len(split) > 1 else ())
+        ]
+        for name, value in (
+            ("parameters", tuple(parameters)),
+            ("recordings", np.array(recordings, dtype=np.int64)),
+            ("parts", tuple(parts)),
+            ("_places", tuple(np.array(each, dtype=np.int64) for each in places)),
+            ("_slices", tuple(slices)),
+            ("_before_output", np.array(before_output, dtype=bool)),
+        ):
+            object.__setattr__(self, name, value)
 
     @property
     def nominal(self) -> Signal:
@@ -73,9 +111,31 @@ class ExtendedSimulator:
         """Typical changes of the values."""
         return np.array([parameter.scale for parameter in self.parameters])
 
+    @property
+    def is_copy(self) -> NDArray[np.bool_]:
+        """Whether a parameter is an initial state of a recording after the first one, shape (parameters,)."""
+        return np.array(self.recordings > 0)
+
+    @property
+    def simulator_slice(self) -> slice:
+        """Slice of the values that belongs to the simulator."""
+        return self._slices[0]
+
     def get_slice(self, effect: Effect) -> slice:
         """Return the slice of the values that belongs to an effect."""
-        return self._slices[self.effects.index(effect)]
+        return self._slices[1 + self.effects.index(effect)]
+
+    def expand(self, effect: Effect, point: Sequence[float]) -> Signal:
+        """Return the values of an effect, given one for each of its parameters.
+
+        Its initial states are the same in all recordings.
+        """
+        part = self.get_slice(effect)
+        values = np.empty(part.stop - part.start)
+        for places in self._places:
+            own = places[(places >= part.start) & (places < part.stop)] - part.start
+            values[own] = point
+        return values
 
     def with_effects(self, effects: Sequence[Effect]) -> "ExtendedSimulator":
         """Return the same simulator with other effects."""
@@ -97,13 +157,21 @@ class ExtendedSimulator:
         ndarray, shape (samples,)
             NaN in every sample if the simulation diverges.
         """
+        if self.parts:
+            joined = np.concatenate(
+                [
+                    part.simulate(values[places], effect_parameters, forces)
+                    for part, places in zip(self.parts, self._places, strict=True)
+                ]
+            )
+            return np.full_like(joined, np.nan) if np.isnan(joined).any() else joined
         with np.errstate(over="ignore", invalid="ignore"):
             y = (
                 self._simulate_core(values, effect_parameters, forces)
                 if effect_parameters or forces
                 else self._simulate_cached(values)
             )
-            for effect, part in zip(self.effects, self._slices, strict=True):
+            for effect, part in zip(self.effects, self._slices[1:], strict=True):
                 if effect.site == Site.OUTPUT:
                     y = apply_map(effect, y, values[part], self.context)
             diverged = not float(np.max(np.abs(y))) < _DIVERGENCE_FACTOR * self.context.output_peak
@@ -127,7 +195,7 @@ class ExtendedSimulator:
         x, forces = self.context.u, list(further)
         parameters = dict(effect_parameters)
         simulator_values = values[: len(self.simulator.parameters)].copy()
-        for effect, part in zip(self.effects, self._slices, strict=True):
+        for effect, part in zip(self.effects, self._slices[1:], strict=True):
             match effect.site:
                 case Site.INPUT:
                     x = apply_map(effect, x, values[part], self.context)

@@ -9,7 +9,7 @@ import scipy
 
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.simulator import Forces, Simulator
+from islands.discrepancy.interfaces.simulator import Forces, Simulator, take_recording
 
 
 class SimulatorWrapper:
@@ -87,6 +87,10 @@ class ResampledSimulator(SimulatorWrapper):
     intersample: InterSample = InterSample.FOH
     oversampling: int = 1
     _cache: dict[bytes, tuple[Signal, Signal]] = field(init=False, default_factory=dict)
+
+    def for_samples(self, first: int, last: int) -> "ResampledSimulator":
+        """Return the resampled simulator of one recording, with its own cache of resampled inputs."""
+        return replace(self, simulator=take_recording(self.simulator, first, last))
 
     def simulate(
         self,

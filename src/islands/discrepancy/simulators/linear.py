@@ -89,13 +89,15 @@ class LinearSimulator:
 def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
     """Estimate a linear model by the method of Steiglitz and McBride (1965).
 
-    The iteration with the least squared simulation error is returned; a static gain if no model is stable.
+    The iteration with the least squared simulation error is returned; a static gain if no model is stable. Of
+    several recordings, the longest one is used.
 
     Raises
     ------
     RecordError
         The record has fewer than ten samples per estimated parameter, the delay not counted.
     """
+    record = record.longest_segment
     u, y = record.u[:, 0], record.y
     if record.samples < 10 * (2 * order + 2) + delay:
         raise RecordError(

@@ -33,8 +33,8 @@ class NarxSimulator:
     ----------
     model : Model
     name : str
-    start : ndarray, shape (maximum lag,)
-        Measured outputs from which the free run starts.
+    start : ndarray, shape (maximum lag,) or longer
+        Measured output; the free run starts from its first samples.
     """
 
     model: Model
@@ -90,6 +90,10 @@ class NarxSimulator:
                 initial=True,
             ),
         )
+
+    def for_samples(self, first: int, last: int) -> "NarxSimulator":
+        """Return the free run from the first measured outputs of one recording."""
+        return replace(self, start=self.start[first:last])
 
     def with_values(self, values: Signal) -> Model:
         """Return the model with the given values of its calibrated parameters."""

@@ -1,7 +1,7 @@
 """Recorded output of an external simulation: a column of the record."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,6 +44,10 @@ class RecordedOutput:
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """Return the input as the coordinate."""
         return input_coordinate(context, output)
+
+    def for_samples(self, first: int, last: int) -> "RecordedOutput":
+        """Return the output of one recording."""
+        return replace(self, simulated=np.asarray(self.simulated)[first:last])
 
     def simulate(
         self,

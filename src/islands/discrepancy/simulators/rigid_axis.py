@@ -14,6 +14,7 @@ from islands.discrepancy.effects.time_variation import gain_over_time
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
 from islands.discrepancy.interfaces.force import pack_force_laws
+from islands.discrepancy.interfaces.segments import map_segments
 from islands.discrepancy.interfaces.simulator import Forces
 from islands.discrepancy.simulators.coordinates import output_coordinate
 from islands.errors import RecordError
@@ -101,6 +102,10 @@ class RigidAxisSimulator:
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """Return the output as the coordinate."""
         return replace(output_coordinate(context, output), friction_smoothing=_RELATIVE_VS)
+
+    def for_samples(self, first: int, last: int) -> "RigidAxisSimulator":
+        """Return the simulator of one recording; a shooting interval begins with it."""
+        return replace(self, measured=self.measured[first:last], rate=self.rate[first:last])
 
     def simulate(
         self,
@@ -192,14 +197,22 @@ def make_rigid_axis(
     Raises
     ------
     RecordError
-        The record is shorter than four shooting intervals of the smallest size.
+        The record is shorter than four shooting intervals of the smallest size, or a recording than one.
     """
     if record.samples < 4 * MIN_SHOT_SAMPLES:
         raise RecordError(f"an axis needs {4 * MIN_SHOT_SAMPLES} samples, the record has {record.samples}")
+    if (shortest := min(record.segments)) < MIN_SHOT_SAMPLES:
+        raise RecordError(f"an axis needs {MIN_SHOT_SAMPLES} samples of each recording, one has {shortest}")
     y, dt = record.y, record.dt
-    rate, acceleration = (
-        scipy.signal.savgol_filter(y, SMOOTHING_WINDOW, 3, deriv=order, delta=dt) for order in (1, 2)
-    )
+
+    def smooth(signal: Signal, order: int = 0) -> Signal:
+        return map_segments(
+            lambda part: scipy.signal.savgol_filter(part, SMOOTHING_WINDOW, 3, deriv=order, delta=dt),
+            signal,
+            record.segments,
+        )
+
+    rate, acceleration = smooth(y, 1), smooth(y, 2)
     typical_rate = float(np.std(rate)) or 1.0
     columns = np.column_stack([acceleration, rate, np.tanh(rate / (0.02 * typical_rate))])[
         :estimation_samples
@@ -207,7 +220,7 @@ def make_rigid_axis(
     names = ("m", "c", "F")
     free = [place for place, name in enumerate(names) if name not in given]
     known = np.array([given.get(name, 0.0) for name in names])
-    force = scipy.signal.savgol_filter(record.u[:, 0], SMOOTHING_WINDOW, 3)[:estimation_samples]
+    force = smooth(record.u[:, 0])[:estimation_samples]
     known[free] = scipy.optimize.lsq_linear(
         columns[:, free], force - columns @ known, bounds=(1e-12, np.inf)
     ).x

@@ -7,7 +7,7 @@ import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.simulator import Forces, Simulator
+from islands.discrepancy.interfaces.simulator import Forces, Simulator, take_recording
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import SimulatorWrapper
 
@@ -58,6 +58,10 @@ class SavedExtension(SimulatorWrapper):
     def built_in_effects(self) -> frozenset[str]:
         """Built-in effects of the simulator, and the added effects."""
         return self.simulator.built_in_effects | {effect.name for effect in self.added}
+
+    def for_samples(self, first: int, last: int) -> "SavedExtension":
+        """Return the extension of the simulator of one recording."""
+        return replace(self, simulator=take_recording(self.simulator, first, last))
 
     def simulate(
         self,

@@ -101,8 +101,11 @@ class SecondOrderSimulator:
 def make_second_order(
     given: Mapping[str, float], record: Dataset, estimation_samples: int
 ) -> SecondOrderSimulator:
-    """Make a simulator; estimate the parameters that are not given from the estimation part of a record."""
-    record = record[:estimation_samples]
+    """Make a simulator; estimate the parameters that are not given from the estimation part of a record.
+
+    Of several recordings, the longest one is used.
+    """
+    record = record[:estimation_samples].longest_segment
     found = estimate_second_order(record.u[:, 0], record.y, record.dt, given)
     units = (record.input_units[0] or "1", record.output_unit or "1")
     return SecondOrderSimulator(found, units, float(np.std(record.y)))

@@ -4,12 +4,15 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.effects import model_form
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator
 from islands.discrepancy.simulators.narx import NarxSimulator
@@ -46,7 +49,7 @@ def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]
         if effect.site == Site.PARAMETER:
             index = names.index(effect.name.partition(":")[2])
             values[index] *= 1.0 + values[simulation.get_slice(effect)][0]
-    parts = [(effect, simulation.get_slice(effect)) for effect in simulation.effects]
+    parts = [(effect, _get_own_slice(simulation, effect)) for effect in simulation.effects]
     shape = {
         parameter.name: float(value)
         for effect, part in parts
@@ -62,6 +65,12 @@ def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]
     return _make_extended_spec(
         simulation.simulator, values[: len(names)], found, simulation.context, *signals, shape
     ).model_dump(mode="json", by_alias=True)
+
+
+def _get_own_slice(simulation: ExtendedSimulator, effect: Effect) -> slice:
+    """Return the slice of an effect without its last values, the initial states of further recordings."""
+    part = simulation.get_slice(effect)
+    return slice(part.start, part.stop - int(np.count_nonzero(simulation.is_copy[part])))
 
 
 def describe_extension(

@@ -236,7 +236,7 @@ def make_model_simulator(model: Model, name: str, record: Dataset) -> Simulator:
     """
     if model.theta is None:
         raise ModelError(f"{name} has no parameters: estimate them first")
-    simulator = NarxSimulator(model, name, record.y[: model.maximum_lag])
+    simulator = NarxSimulator(model, name, record.y)
     # Further columns of the record are channels, which the model does not read.
     match_record(model, record.first_inputs(1), name, advance=False)
     return simulator

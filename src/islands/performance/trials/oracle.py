@@ -1,6 +1,7 @@
 """Oracle: a fit that knows the names of the injected faults. It bounds the achievable improvement."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,7 +37,8 @@ def compute_gain_share(
         None if the oracle improves the fit by less than 1 %, or if a fault has no effect in the catalogue.
     """
     target = Target(
-        found.record.y, np.arange(found.record.samples) < found.estimation_samples, None, tolerance
+        *(found.record.y, np.arange(found.record.samples) < found.estimation_samples, None, tolerance),
+        segments=found.record.segments,
     )
     simulation = found.base.simulation
     effects = select_effects(simulation.simulator, simulation.context, tolerance)
@@ -56,7 +58,7 @@ def compute_gain_share(
     if oracle.noise.order:
         oracle = calibrate(
             oracle.simulation,
-            Target(target.y, target.estimation_part, oracle.noise, tolerance),
+            replace(target, noise=oracle.noise),
             oracle.values,
         )
     after, best = _rmse(found, found.best), _rmse(found, oracle)
@@ -72,15 +74,15 @@ def _fit_with_effect(fit: CalibrationResult, effect: Effect, target: Target) -> 
     """Add an effect to a simulation and fit it from the most promising starting points."""
     old, context = fit.simulation, fit.simulation.context
     extended = old.with_effects(catalogue_order((*old.effects, effect)))
-    part, simulator_size = extended.get_slice(effect), len(old.simulator.parameters)
+    part = extended.get_slice(effect)
     residual = target.residual(fit.output)
     starts = []
     for point in effect.starting_points(context, target.y - fit.output):
         start = extended.nominal
-        start[:simulator_size] = fit.values[:simulator_size]
+        start[extended.simulator_slice] = fit.values[old.simulator_slice]
         for each in old.effects:
             start[extended.get_slice(each)] = fit.values[old.get_slice(each)]
-        start[part] = point
+        start[part] = extended.expand(effect, point)
         response = target.select(extended.simulate(start) - fit.output)
         energy = float(response @ response)
         if not 0.0 < energy < np.inf:

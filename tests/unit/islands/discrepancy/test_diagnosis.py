@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset, join
+from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.preparation import HOLDOUT_FRACTION, MIN_SAMPLES
 from islands.discrepancy.diagnosis import Diagnosis, diagnose
 from islands.discrepancy.inference.verdict import Verdict
@@ -123,7 +123,6 @@ UNUSABLE = {
         "channel T_K is the input itself: leave it out",
     ),
     "gaps": (lambda record: replace(record, y=np.where(record.time > 3, record.y, np.nan)), "has gaps"),
-    "several recordings": (lambda record: join((record, record)), "diagnose them one by one"),
 }
 
 

@@ -1,10 +1,14 @@
-"""Autoregressive noise model: order, coefficients and whitening."""
+"""Autoregressive noise model: order, coefficients and whitening, also of several recordings."""
 
 import numpy as np
 import pytest
 import scipy
 
-from islands.discrepancy.calibration.noise_model import fit_ar_noise
+from islands.discrepancy.calibration.noise_model import (
+    NoiseModel,
+    estimate_effective_samples,
+    fit_ar_noise,
+)
 
 
 @pytest.mark.parametrize("poles", [(), (0.9,), (0.6, 0.3), (0.95, -0.4)])
@@ -22,3 +26,44 @@ def test_order_and_coefficients_of_an_autoregression_are_recovered(poles: tuple[
 def test_whitening_does_not_change_white_noise() -> None:
     white = np.random.default_rng(2).standard_normal(1000)
     assert np.array_equal(fit_ar_noise(white).whiten(white), white)
+
+
+#: Lengths of recordings whose residuals have different means, so that a boundary is a large step.
+LENGTHS = (300, 200, 100)
+
+
+def draw_recordings() -> list[np.ndarray]:
+    rng = np.random.default_rng(3)
+    return [
+        scipy.signal.lfilter([1.0], [1.0, -0.7], rng.standard_normal(length)) + 20.0 * number
+        for number, length in enumerate(LENGTHS)
+    ]
+
+
+def test_whitening_of_a_recording_does_not_depend_on_the_others() -> None:
+    noise = NoiseModel(np.array([0.9, -0.2]), 1.0, 600.0)
+    parts = draw_recordings()
+    whitened = noise.whiten(np.concatenate(parts), LENGTHS)
+    assert whitened.tolist() == np.concatenate([noise.whiten(part) for part in parts]).tolist()
+
+
+def test_noise_does_not_depend_on_the_order_of_recordings() -> None:
+    parts = draw_recordings()
+    forward, backward = np.concatenate(parts), np.concatenate(parts[::-1])
+    one, other = fit_ar_noise(forward, segments=LENGTHS), fit_ar_noise(backward, segments=LENGTHS[::-1])
+    assert other.coefficients == pytest.approx(one.coefficients, rel=1e-9)
+    assert other.variance == pytest.approx(one.variance, rel=1e-9)
+    assert estimate_effective_samples(forward, LENGTHS) == pytest.approx(
+        estimate_effective_samples(backward, LENGTHS[::-1]), rel=1e-9
+    )
+
+
+def test_autoregression_is_the_least_squares_fit_within_the_recordings() -> None:
+    parts = draw_recordings()
+    equations = np.concatenate(
+        [np.column_stack([part[2:-1], part[1:-2], part[:-3], part[3:]]) for part in parts]
+    )
+    noise = fit_ar_noise(np.concatenate(parts), segments=LENGTHS)
+    expected = np.linalg.lstsq(equations[:, : noise.order], equations[:, 3], rcond=None)[0]
+    assert noise.order > 0
+    assert noise.coefficients == pytest.approx(expected, rel=1e-9)
