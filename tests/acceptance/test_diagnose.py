@@ -85,6 +85,22 @@ def offset_record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return base
 
 
+@pytest.mark.ci
+def test_several_files_are_diagnosed_together(offset_record: Path) -> None:
+    paths = offset_record / "record.csv", offset_record / "other.csv"
+    write_offset(paths[1])
+    with undrawn_figures():
+        succeed(
+            *("diagnose", *paths, "--input", "u_V", "--output", "y_um", "--rows", "0:300"),
+            *("--simulation", "column:theirs_um", "--out", offset_record / "both"),
+        )
+    document = json.loads((offset_record / "both/discrepancy.json").read_text())
+    assert document["record"]["segments"] == [300, 300]
+    assert [effect["name"] for effect in document["effects"]] == ["offset"]
+    assert document["effects"][0]["parameters"]["c"]["value"] == pytest.approx(0.3, abs=0.03)
+    assert "record.csv, other.csv" in (offset_record / "both/report.html").read_text()
+
+
 def run_self_test(base: Path, out: str, *options: object) -> tuple[str, dict]:
     """Diagnose with a self-test; return the printed text and the document."""
     with undrawn_figures():

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.interfaces.context import Signal
+from islands.discrepancy.interfaces.segments import map_segments
+from islands.figures.diverging_lines import break_line
 from islands.figures.downsampling import VERTICES, downsample
 from islands.figures.style import (
     FRAME,
@@ -85,13 +87,18 @@ def draw_loops(diagnosis: Diagnosis) -> Figure:
     record = diagnosis.record
     figure = blank(3.4, "Loops")
     left, right = figure.subplots(1, 2)
-    u, loops = record.u[:, 0], last_loops(record)
-    left.plot(*downsample(u[loops], record.y[loops]), color=MEASURED, lw=MEASURED_WIDTH, label="measured")
+    loops = last_loops(record)
+    shown = record[loops]
+    u = break_line(shown, shown.u[:, 0])
+    measured = downsample(u, break_line(shown, shown.y))
+    left.plot(*measured, color=MEASURED, lw=MEASURED_WIDTH, label="measured")
     for name, colour, output in _outputs(diagnosis):
-        left.plot(*downsample(u[loops], output[loops]), color=colour, lw=SIMULATED_WIDTH, label=name)
+        line = downsample(u, break_line(shown, output[loops]))
+        left.plot(*line, color=colour, lw=SIMULATED_WIDTH, label=name)
     left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, columnspacing=1.0)
     for name, colour, residual in _residuals(diagnosis):
-        right.plot(*downsample(u[loops], residual[loops]), color=colour, lw=SIMULATED_WIDTH, label=name)
+        line = downsample(u, break_line(shown, residual[loops]))
+        right.plot(*line, color=colour, lw=SIMULATED_WIDTH, label=name)
     right.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
     left.set(xlabel=_input_label(diagnosis), ylabel=label(record.output_name, record.output_unit))
     right.set(xlabel=_input_label(diagnosis), ylabel=label("residual", record.output_unit))
@@ -109,7 +116,7 @@ def draw_residual(diagnosis: Diagnosis) -> Figure:
     """
     record = diagnosis.record
     u = record.u[:, 0]
-    rate = np.gradient(u, record.dt)
+    rate = map_segments(lambda part: np.gradient(part, record.dt), u, record.segments)
     figure = blank(7.0, "Residual structure: mean and standard deviation in cells of equal sample count")
     axes = figure.subplots(3, 2)
     axes[0, 1].sharey(axes[0, 0])
@@ -184,18 +191,21 @@ def _residuals(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:
 def _draw_over_time_panels(
     above: Axes, below: Axes, diagnosis: Diagnosis, part: slice, weight: float = 1.0
 ) -> None:
-    record = diagnosis.record
-    time = record.time[part]
+    """Draw a part of the record; lines are interrupted between recordings, and thin lines separate these."""
+    record, shown = diagnosis.record, diagnosis.record[part]
+    time, broken_time = shown.time, break_line(shown, shown.time)
     vertices = VERTICES if weight == 1.0 else _OVERVIEW_VERTICES
-    measured = downsample(time, record.y[part], vertices)
+    measured = downsample(broken_time, break_line(shown, shown.y), vertices)
     above.plot(*measured, color=MEASURED, lw=weight * MEASURED_WIDTH, label="measured")
     for panel, lines in ((above, _outputs(diagnosis)), (below, _residuals(diagnosis))):
         for name, colour, line in lines:
-            drawn = downsample(time, line[part], vertices)
+            drawn = downsample(broken_time, break_line(shown, line[part]), vertices)
             panel.plot(*drawn, color=colour, lw=weight * SIMULATED_WIDTH, label=name)
         first = max(float(record.time[diagnosis.estimation_samples]), float(time[0]))
         if first < time[-1]:
             panel.axvspan(first, float(time[-1]), facecolor=SHADE, edgecolor="none", zorder=0.5)
+        for _, end in shown.bounds[:-1]:
+            panel.axvline(time[end] - record.dt / 2, color=FRAME, lw=0.6)
         panel.set_xlim(float(time[0]), float(time[-1]))
         panel.yaxis.set_major_locator(MaxNLocator(5, steps=STEPS))
     above.tick_params(labelbottom=False)
@@ -241,11 +251,20 @@ def _sort_into_cells(signal: Signal) -> tuple[Signal, NDArray[np.int64], NDArray
 
 
 def _draw_spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
-    """Draw amplitude spectral densities of the residuals (Welch, windows of a quarter of the record)."""
+    """Draw amplitude spectral densities of the residuals.
+
+    They are Welch's, with windows of a quarter of the longest recording; shorter recordings are left out.
+    """
     record = diagnosis.record
+    window = max(16, max(record.segments) // _WINDOWS)
+    bounds = [(begin, end) for begin, end in record.bounds if end - begin >= window] or record.bounds
     for _, colour, residual in _residuals(diagnosis):
-        frequency, density = scipy.signal.welch(
-            residual, 1.0 / record.dt, nperseg=max(16, record.samples // _WINDOWS)
+        found = [
+            scipy.signal.welch(residual[slice(*each)], 1.0 / record.dt, nperseg=window) for each in bounds
+        ]
+        frequency = found[0][0]
+        density = np.average(
+            [each for _, each in found], axis=0, weights=[end - begin for begin, end in bounds]
         )
         axes.plot(frequency[1:], np.sqrt(density[1:]), color=colour, lw=1.0)
     axes.set(xscale="log", yscale="log", xlabel="frequency (Hz)")
@@ -263,8 +282,11 @@ def _draw_spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
 def _draw_autocorrelation(axes: Axes, diagnosis: Diagnosis) -> None:
     for name, colour, residual in _residuals(diagnosis):
         centred = residual - residual.mean()
-        lags = np.arange(1, min(_LAGS, residual.size - 1) + 1)
-        correlation = [float(centred[lag:] @ centred[:-lag] / (centred @ centred)) for lag in lags]
+        parts = [centred[begin:end] for begin, end in diagnosis.record.bounds]
+        lags = np.arange(1, min(_LAGS, max(diagnosis.record.segments) - 1) + 1)
+        correlation = [
+            sum(float(part[lag:] @ part[:-lag]) for part in parts) / float(centred @ centred) for lag in lags
+        ]
         axes.plot(lags, correlation, color=colour, lw=1.2, label=name)
     bound = 1.96 / np.sqrt(diagnosis.record.samples)
     axes.axhspan(-bound, bound, color=SHADE, zorder=0.5)

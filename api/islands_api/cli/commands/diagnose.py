@@ -16,9 +16,7 @@ from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.facade.explain_residual import explain_residual
 from islands.io.diagnosis_json import as_json, diagnosis_document
-from islands.io.records import read_dataset
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.row_range import parse_rows
 from islands.io.result_text.text_layout import wrap
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
@@ -27,6 +25,7 @@ from islands_api.cli import options
 from islands_api.cli.console import Display, compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.record_options import with_reading_options
+from islands_api.cli.recordings import Recordings
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
 #: File of the result document.
@@ -38,7 +37,7 @@ REPORT = "report.html"
 
 @with_reading_options
 def diagnose(
-    record: options.Record,
+    records: options.Records,
     inputs: options.Inputs,
     output_column: options.Output,
     out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
@@ -59,7 +58,7 @@ def diagnose(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
 ) -> None:
-    """Find the errors of a simulation on a record, name their causes, and measure the gain of correction."""
+    """Find the errors of a simulation on recordings, name their causes, measure the gain of correction."""
     check_folder(out, force, RESULT)
     compile_kernels()
     with progress("diagnose") as show:
@@ -68,7 +67,7 @@ def diagnose(
         inner = innermost(spec)
         column = inner.column if isinstance(inner, ColumnSpec) else None
         data, columns = _read_record(
-            record, options.columns(inputs), channels or [], column, output_column, dt, rows, reading
+            records, options.columns(inputs), channels or [], column, output_column, dt, rows, reading
         )
         simulator = make_simulator(spec, data, columns)
         tolerances = options.tolerances(tolerance or [])
@@ -82,7 +81,7 @@ def diagnose(
                 _run_self_test(diagnosis, simulator, tolerances, seed, parallel, show) if tested else None
             )
         show("figures", 0.9)
-        write(diagnosis, out, record.name, wall, limits, formula)
+        write(diagnosis, out, ", ".join(path.name for path in records), wall, limits, formula)
     for paragraph in summarise(diagnosis, formula).splitlines():
         output.print("\n".join(wrap(paragraph, "    ")), markup=False)
     if limits is not None:
@@ -143,7 +142,7 @@ def _format_duration(seconds: float) -> str:
 
 
 def _read_record(
-    record: Path,
+    records: list[Path],
     inputs: list[str],
     channels: list[str],
     column: str | None,
@@ -152,9 +151,9 @@ def _read_record(
     rows: str | None,
     reading: ReadingOptions,
 ) -> tuple[Dataset, Mapping[str, Any]]:
-    """Read the record, and separately the column of a simulation that was recorded in it."""
+    """Read the recordings, and separately the column of a simulation that was recorded in them."""
     extra = [] if column is None else [column]
     names = [options.single_input(inputs), *channels, *extra]
-    whole = read_dataset(record, names, output_column, dt, parse_rows(rows), options=reading)
+    whole = Recordings(records, names, output_column, dt, reading).read(rows)
     kept = 1 + len(channels)
     return whole.first_inputs(kept), {} if column is None else {column: whole.u[:, kept]}

@@ -1,5 +1,6 @@
 """Figures of a diagnosis: panels, lines and sizes."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -58,6 +59,41 @@ def test_residual_figure_has_a_panel_per_signal() -> None:
         coloured = {line.get_color() for line in panel.lines}
         assert {"#e69f00", "#0072b2"} <= coloured
         assert all(np.isfinite(line.get_xydata()).all() for line in panel.lines)
+
+
+def divide(samples: int, boundary: int):
+    """Return a diagnosis whose record consists of two recordings; the input of the second one is shifted."""
+    found = diagnosis(samples=samples)
+    u = np.array(found.record.u)
+    u[boundary:] += 20.0
+    return replace(found, record=replace(found.record, u=u, segments=(boundary, samples - boundary)))
+
+
+def test_lines_are_interrupted_between_recordings() -> None:
+    divided = divide(900, 600)
+    for name, panels in (("over-time", 2), ("loops", 2)):
+        axes = DISCREPANCY_FIGURES[name](divided).axes
+        assert len(axes) == panels
+        for line in [line for panel in axes for line in panel.lines if len(line.get_xdata()) > 2]:
+            assert np.flatnonzero(np.isnan(line.get_xdata() + line.get_ydata())).size == 1
+    # One boundary in each panel over time.
+    shown = DISCREPANCY_FIGURES["over-time"](divided).axes
+    assert [line.get_xdata()[0] for panel in shown for line in panel.lines if len(line.get_xdata()) == 2] == [
+        pytest.approx(599.5 * DT)
+    ] * 2
+
+
+def test_residual_structure_does_not_reach_across_recordings() -> None:
+    divided = draw_residual(divide(900, 600)).axes
+    single = residual_figure().axes
+    # The step of the input between the recordings is no rate.
+    largest = [
+        max(np.max(np.abs(line.get_xdata())) for line in each[2].lines[:2]) for each in (divided, single)
+    ]
+    assert largest[0] == pytest.approx(largest[1], rel=0.05)
+    # Windows of a quarter of the longest recording resolve less than those of a quarter of the record.
+    assert len(divided[4].lines[0].get_xdata()) == 75
+    assert len(single[4].lines[0].get_xdata()) == 112
 
 
 def test_dry_friction_separates_the_directions_only_before_extension() -> None:
