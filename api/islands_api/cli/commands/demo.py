@@ -34,7 +34,7 @@ SYSTEM = "bouc-wen-piezo"
 VARIANT = "authors"
 
 #: Title of the table of all models.
-_TITLE = "Free run, 100 s: models of the paper as printed in its Table 1 and computed, and models found"
+_TITLE = "Free run, 100 s: the paper's models as printed and computed, and those found"
 
 #: Parts of the record that select the model. The other parts are test data.
 SELECTING = ("estimation", "validation")

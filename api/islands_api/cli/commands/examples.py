@@ -38,4 +38,4 @@ def copy(
         record = EXAMPLE_RECORDS[name].make()
         write_record(record, path)
         columns = f"--input {record.input_names[0]} --output {record.output_name}"
-        output.print(f"{path}: {EXAMPLE_RECORDS[name].description}; {columns}", markup=False)
+        output.print(f"{path}: {EXAMPLE_RECORDS[name].description}\n  {columns}", markup=False)
