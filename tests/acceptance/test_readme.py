@@ -2,6 +2,8 @@
 
 import re
 import shlex
+import subprocess
+import sys
 from contextlib import chdir
 from pathlib import Path
 
@@ -42,3 +44,6 @@ def test_every_command_runs_and_the_shown_equation_is_that_of_the_result(tmp_pat
             succeed(*words)
         assert shown[0] in Path("motor/summary.txt").read_text(encoding="utf-8")
         assert read_model(Path("motor/models/01.json")).input_names == ("drive_V",)
+        (program,) = re.findall(r"^```python\n(.*?)^```", README.read_text(encoding="utf-8"), re.M | re.S)
+        Path("program.py").write_text(program, encoding="utf-8")
+        subprocess.run([sys.executable, "program.py"], check=True, timeout=120)

@@ -11,7 +11,9 @@ from typing import Any
 import typer
 from rich.table import Table
 
+from islands.io.models import model_from_json
 from islands.io.result_text.model_table import LEGEND, MARK
+from islands.io.result_text.text_layout import term_table, wrap
 from islands.io.simulator_spec.specification import EXTENDED_FILE
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
@@ -79,8 +81,10 @@ def _format_verdict(job: JobView) -> str:
     return f" ({': '.join([job.summary['verdict'], *filter(None, [', '.join(job.summary['effects'])])])})"
 
 
-def show_models(models: Sequence[ModelView]) -> None:
-    """Show the models of a job: a table of errors and physical properties, and the equations."""
+def show_models(client: Client, job: JobView, models: Sequence[ModelView]) -> None:
+    """Show the models of a job: the recommended one, and a table of errors and physical properties."""
+    for line in _describe_recommended(client, job, models):
+        output.print(line, markup=False)
     # Only models of hysteresis have Property 1; the drift of others is no defect.
     hysteresis = any(model.physics["property_1"] for model in models)
     claims = ("drift %", "Property 1") if hysteresis else ()
@@ -98,8 +102,18 @@ def show_models(models: Sequence[ModelView]) -> None:
         )
     output.print(table)
     output.print(LEGEND, markup=False)
-    for model in models:
-        output.print(f"{model.rank:2d}  {model.equation}", markup=False)
+
+
+def _describe_recommended(client: Client, job: JobView, models: Sequence[ModelView]) -> Iterator[str]:
+    """Yield the lines that ``islands fit`` prints about the recommended model."""
+    rank = next((model.rank for model in models if model.recommended), 1)
+    terms = term_table(model_from_json(client.export(job.id, rank, "json")))
+    # Results of earlier versions have no sentences. The second one is the equation in one line.
+    words = str((job.summary or {}).get("words", "")).splitlines()
+    choice, sentences = "".join(words[:1]), words[2:]
+    yield from [*wrap(choice), "", *terms, ""]
+    for sentence in sentences:
+        yield from wrap(sentence.strip())
 
 
 @contextmanager
@@ -188,7 +202,7 @@ RESULTS: Mapping[str, DownloadFolder] = MappingProxyType(
             "result.json",
             "result.json, models/, figures/",
             download,
-            lambda _client, _job, document: show_models(parse_models(document)),
+            lambda client, job, document: show_models(client, client.job(job), parse_models(document)),
         ),
         "verdict": DownloadFolder(
             "discrepancy.json",

@@ -293,7 +293,7 @@ def _follow(url: str, key: str | None, job: JobView, as_json: bool) -> None:
         elif job.state == JobState.SUCCEEDED and job.kind == DISCREPANCY:
             views.show_diagnosis(job)
         elif job.state == JobState.SUCCEEDED:
-            views.show_models(client.models(job))
+            views.show_models(client, job, client.models(job))
     if job.state != JobState.SUCCEEDED:
         detail = (job.problem or {}).get("detail", "resume it to continue")
         raise JobFailedError(f"job {job.id} {job.state}: {detail}")

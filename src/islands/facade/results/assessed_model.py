@@ -174,8 +174,8 @@ class AssessedModel(AnalysedModel, ABC):
         Parameters
         ----------
         kind : str
-            A key of ``islands.figures.registry.FIGURES``: ``free-run``, ``loop``, ``hold``, ``residuals``,
-            ...
+            A key of ``islands.figures.registry.FIGURES``: ``free-run`` (or ``free_run``, as in ``metrics``),
+            ``loop``, ``hold``, ``residuals``, ...
         record : Dataset or data frame, optional
             Record that is drawn; by default the validation data. A frame has the columns of the model.
         ax : Axes, optional
@@ -198,6 +198,7 @@ class AssessedModel(AnalysedModel, ABC):
         # matplotlib takes half a second to import, which every process of a cluster would pay.
         from islands.figures.registry import draw_record_figure  # noqa: PLC0415
 
+        kind = kind.replace("_", "-")
         if record is None and ax is None:
             return self._draw(kind)
         if record is None:
