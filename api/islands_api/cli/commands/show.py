@@ -8,13 +8,21 @@ import typer
 from islands.io.export import EXPORTS, FILE_EXPORTS, export, write_export
 from islands.io.export.closed_form import closed_form
 from islands.io.export.extension import EXTENDED_EXPORTS
+from islands.io.result_text.text_layout import term_table
 from islands_api.cli import options
 from islands_api.cli.coupled_run import read_coupled
 
 
 def show(
     model: options.ModelFile,
-    kind: Annotated[str, typer.Option("--format", help=", ".join([*EXPORTS, *FILE_EXPORTS]))] = "plain",
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            "--format",
+            help=f"{', '.join([*EXPORTS, *FILE_EXPORTS])}. By default one term in each line, with its "
+            "standard error and the columns of the record.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="File to write; required for fmu and fmu2, which are not text."),
@@ -28,6 +36,10 @@ def show(
     as one program or block.
     """
     coupled, extended = read_coupled(model), options.extended(model)
+    if kind is None and out is None and coupled is None and extended is None:
+        typer.echo("\n".join(term_table(options.model(model))))
+        return
+    kind = kind or "plain"
     if extended is not None and kind in EXTENDED_EXPORTS:
         text = EXTENDED_EXPORTS[kind](extended)
     else:

@@ -199,5 +199,5 @@ def _print_band(data: Dataset, band: PredictionBand) -> None:
     known = predicted & ~np.isnan(data.y)
     if known.any():
         inside = (band.lower <= data.y) & (data.y <= band.upper)
-        text += f", contains {100 * inside[known].mean():.1f} % of the measured samples"
+        text += f",\n  contains {100 * inside[known].mean():.1f} % of the measured samples"
     output.print(text, markup=False)

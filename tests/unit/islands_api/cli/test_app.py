@@ -284,6 +284,13 @@ def test_error_message_with_brackets_is_printed_verbatim(run, arguments, message
     assert "Traceback" not in err
 
 
+def test_model_is_shown_with_its_columns_in_80_columns(run):
+    lines = run("show", "published:12")[1].splitlines()
+    assert lines[0].startswith("y_um(k) =")
+    assert len(lines) == 7
+    assert max(map(len, lines)) <= 80
+
+
 @pytest.mark.parametrize(
     ("error", "code", "message"),
     [
@@ -296,7 +303,7 @@ def test_deliberate_error_is_printed_as_a_message(run, monkeypatch, error, code,
     def stop(*_):
         raise error
 
-    monkeypatch.setattr("islands_api.cli.commands.show.export", stop)
+    monkeypatch.setattr("islands_api.cli.commands.show.term_table", stop)
     found, _, err = run("show", "published:12")
     assert found == code
     assert err.strip() == message
@@ -306,7 +313,7 @@ def test_programming_error_is_not_hidden(run, monkeypatch):
     def stop(*_):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("islands_api.cli.commands.show.export", stop)
+    monkeypatch.setattr("islands_api.cli.commands.show.term_table", stop)
     with pytest.raises(ZeroDivisionError):
         run("show", "published:12")
 
@@ -315,7 +322,7 @@ def test_interrupt_exits_with_code_130(run, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("islands_api.cli.commands.show.export", stop)
+    monkeypatch.setattr("islands_api.cli.commands.show.term_table", stop)
     code, _, err = run("show", "published:12")
     assert code == 130
     assert "Traceback" not in err
