@@ -70,6 +70,12 @@ def test_a_discrepancy_job_is_listed_cancelled_and_resumed_like_any_job(service,
     )
 
 
+def test_recordings_that_share_samples_are_refused(service, order):
+    recordings = [{"dataset": order["dataset"], "rows": "50:"}]
+    refused = submit_diagnosis(service, **order, recordings=recordings)
+    assert "share samples" in problem_of(refused, 422, "invalid-settings")
+
+
 def test_an_idempotency_key_identifies_one_job_of_one_kind(service, order):
     key = {"Idempotency-Key": "k1"}
     first = submit_diagnosis(service, key, **order)

@@ -30,7 +30,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "DIR continues.",
         "fit": "Fit small models to recordings of a system by subset selection and least squares, and assess "
         "them.",
-        "diagnose": "Find the errors of a simulation on a record, name their causes, and measure the gain of "
+        "diagnose": "Find the errors of a simulation on recordings, name their causes, measure the gain of "
         "correction.",
         "simulate": "Simulate a model on a record. A free run needs only the first samples of the output.",
         "show": "Show or write a model as an equation, a program, a block for a simulator, or JSON.",

@@ -13,6 +13,7 @@ import httpx
 
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
+from islands_api.client.recording_parts import make_part
 from islands_api.client.response_parsing import read_as, read_mapping
 from islands_api.schemas import (
     DatasetPage,
@@ -134,19 +135,15 @@ def submit(
         "seed": seed,
         "dt": dt,
         "rows": rows,
-        "recordings": [_make_part(each) for each in recordings] or None,
+        "recordings": [make_part(each) for each in recordings] or None,
         "validation": validation
         if isinstance(validation, float | int) or validation is None
-        else _make_part(validation),
+        else make_part(validation),
         "name": name or None,
         "priority": priority or None,
         "settings": settings or None,
     }
     return make_submission("/v1/jobs", given, idempotency_key)
-
-
-def _make_part(given: DatasetRef | Mapping[str, Any]) -> Mapping[str, Any]:
-    return {"dataset": get_id(given)} if isinstance(given, str | DatasetView) else given
 
 
 def job(which: JobRef) -> RequestSpec[JobView]:

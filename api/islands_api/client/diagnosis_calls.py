@@ -6,6 +6,7 @@ from typing import Any
 from islands.errors import SettingsError
 from islands.io.simulator_spec.specification import parse_spec
 from islands_api.client.calls import DatasetRef, RequestSpec, as_list, get_id, make_submission
+from islands_api.client.recording_parts import make_part
 from islands_api.schemas import JobView
 
 
@@ -20,11 +21,12 @@ def diagnose(
     seed: int = 0,
     dt: float | None = None,
     rows: str | None = None,
+    recordings: Sequence[DatasetRef | Mapping[str, Any]] = (),
     name: str = "",
     priority: int = 0,
     idempotency_key: str | None = None,
 ) -> RequestSpec[JobView]:
-    """Submit a job that diagnoses the errors of a simulation on a record.
+    """Submit a job that diagnoses the errors of a simulation on a record, or on several recordings.
 
     Parameters
     ----------
@@ -41,6 +43,8 @@ def diagnose(
         Sampling time in seconds, if the record has no time column.
     rows : str, optional
         ``START:STOP``, the samples to use.
+    recordings : sequence of data set or mapping
+        Further recordings of the same system: data sets, or ``{"dataset": ID, "rows": "START:STOP"}``.
 
     Raises
     ------
@@ -60,6 +64,7 @@ def diagnose(
         "seed": seed,
         "dt": dt,
         "rows": rows,
+        "recordings": [make_part(each) for each in recordings] or None,
         "name": name or None,
         "priority": priority or None,
     }

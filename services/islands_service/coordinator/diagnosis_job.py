@@ -60,16 +60,17 @@ def run_diagnosis_job(
             log.warning("report failed", job=lease.job.id, reason=str(error))
 
     spec = parse_discrepancy(lease.job.spec)
-    stored = store.datasets.get(lease.job.owner, spec.dataset)
+    datasets = {part.dataset: store.datasets.get(lease.job.owner, part.dataset) for part in spec.parts}
     report("reading the record")
-    record, columns = read_record_and_columns(spec, stored, blobs)
+    record, columns = read_record_and_columns(spec, datasets, blobs)
     simulator = make_simulator(spec.simulation, record, columns)
     found = diagnose(record, simulator, spec.tolerance, spec.seed, report, map_cases or ray_map())
     report("a formula for the unexplained residual")
     formula = explain_residual(found, spec.seed)
     wall_s = monotonic() - started
     report("writing the report")
-    artefacts = {REPORT: blobs.write(diagnosis_report(stored.name, found, proposal=formula))}
+    names = ", ".join(datasets[part.dataset].name for part in spec.parts)
+    artefacts = {REPORT: blobs.write(diagnosis_report(names, found, proposal=formula))}
     if found.gain is not None:
         artefacts[EXTENDED] = blobs.write(extended_json(found.best, found.record).encode())
     document = diagnosis_document(found, wall_s, proposal=formula)

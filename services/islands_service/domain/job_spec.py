@@ -43,6 +43,7 @@ Rows = Annotated[
 ]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Seconds = Annotated[FiniteFloat, Field(gt=0.0)]
+Fraction = Annotated[FiniteFloat, Field(gt=0.0, lt=1.0)]
 Seed = Annotated[int, Field(ge=0, lt=2**63, description="The same seed gives the same result, bit for bit.")]
 DatasetId = Annotated[
     str, Field(pattern=r"^[0-9A-Za-z_-]{1,48}$", examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])
@@ -118,6 +119,10 @@ class Part(BaseModel):
     rows: Rows | None = None
 
 
+#: Recordings after the first one.
+_FURTHER = "Further recordings of the same system with the same columns."
+Recordings = Annotated[tuple[Part, ...], Field(max_length=MAX_RECORDINGS - 1, description=_FURTHER)]
+
 #: Description of the field ``dt``.
 _DT = "Sampling time in seconds, if the record does not contain it."
 
@@ -134,11 +139,8 @@ class Identification(BaseModel):
     output: Name = Field(description="Column that is the output.", examples=["y_um"])
     dt: Seconds | None = Field(default=None, description=_DT)
     rows: Rows | None = Field(default=None, description="Samples that estimate; all by default.")
-    recordings: Annotated[tuple[Part, ...], Field(max_length=MAX_RECORDINGS - 1)] = Field(
-        default=(),
-        description="Further recordings of the same system with the same columns.",
-    )
-    validation: Annotated[FiniteFloat, Field(gt=0.0, lt=1.0)] | Part = Field(
+    recordings: Recordings = ()
+    validation: Fraction | Part = Field(
         default=0.25,
         description="The fraction at the end of every recording that selects the models, or a data set.",
     )
@@ -189,13 +191,12 @@ class Discrepancy(BaseModel):
     )
     dt: Seconds | None = Field(default=None, description=_DT)
     rows: Rows | None = Field(default=None, description="Samples to analyse; all by default.")
+    recordings: Recordings = ()
     simulation: SimulationSpec = Field(description="Simulation to compare with the record.")
-    tolerance: Annotated[dict[Name, Annotated[FiniteFloat, Field(gt=0.0, lt=1.0)]], Field(max_length=100)] = (
-        Field(
-            default_factory=dict,
-            description="Relative standard deviations of the known parameters, by name.",
-            examples=[{"dp": 0.01}],
-        )
+    tolerance: Annotated[dict[Name, Fraction], Field(max_length=100)] = Field(
+        default_factory=dict,
+        description="Relative standard deviations of the known parameters, by name.",
+        examples=[{"dp": 0.01}],
     )
     seed: Seed = 0
 
@@ -208,6 +209,11 @@ class Discrepancy(BaseModel):
     def inputs(self) -> tuple[str, ...]:
         """Columns to read in addition to the output; the first one drives the simulation."""
         return (self.input, *self.channels, *self.recorded_columns)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Recordings to analyse."""
+        return (Part(dataset=self.dataset, rows=self.rows), *self.recordings)
 
 
 def parse_identification(document: Mapping[str, Any]) -> Identification:

@@ -43,15 +43,19 @@ def read_record_and_validation(
     BlobNotFoundError
         The data folder has lost a file.
     """
+    record = join(tuple(_read_part(spec, part, datasets, blobs) for part in spec.estimation))
+    if isinstance(spec.validation, Part):
+        return record, _read_part(spec, spec.validation, datasets, blobs)
+    return record, spec.validation
 
-    def read(part: Part) -> Dataset:
-        stored = datasets[part.dataset]
-        with link_blob(blobs.path(stored.blob), stored.name) as path:
-            rows, options = parse_rows(part.rows), _reading_options(stored)
-            return read_dataset(path, spec.inputs, spec.output, spec.dt, rows, options=options)
 
-    record = join(tuple(read(part) for part in spec.estimation))
-    return record, read(spec.validation) if isinstance(spec.validation, Part) else spec.validation
+def _read_part(
+    spec: Identification | Discrepancy, part: Part, datasets: dict[str, StoredDataset], blobs: Blobs
+) -> Dataset:
+    stored = datasets[part.dataset]
+    with link_blob(blobs.path(stored.blob), stored.name) as path:
+        rows, options = parse_rows(part.rows), _reading_options(stored)
+        return read_dataset(path, spec.inputs, spec.output, spec.dt, rows, options=options)
 
 
 def _reading_options(stored: StoredDataset) -> ReadingOptions:
@@ -59,9 +63,9 @@ def _reading_options(stored: StoredDataset) -> ReadingOptions:
 
 
 def read_record_and_columns(
-    spec: Discrepancy, stored: StoredDataset, blobs: Blobs
+    spec: Discrepancy, datasets: dict[str, StoredDataset], blobs: Blobs
 ) -> tuple[Dataset, dict[str, NDArray[np.float64]]]:
-    """Read the record of a discrepancy job, and the column of a recorded simulation, if there is one.
+    """Read the recordings of a discrepancy job, and the column of a recorded simulation, if there is one.
 
     Raises
     ------
@@ -70,8 +74,6 @@ def read_record_and_columns(
     BlobNotFoundError
         The data folder has lost a file.
     """
-    with link_blob(blobs.path(stored.blob), stored.name) as path:
-        rows, options = parse_rows(spec.rows), _reading_options(stored)
-        whole = read_dataset(path, spec.inputs, spec.output, spec.dt, rows, options=options)
+    whole = join(tuple(_read_part(spec, part, datasets, blobs) for part in spec.parts))
     kept = 1 + len(spec.channels)
     return whole.first_inputs(kept), dict(zip(spec.recorded_columns, whole.u[:, kept:].T, strict=True))

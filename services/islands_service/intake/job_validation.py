@@ -108,7 +108,7 @@ def _check_sampling(datasets: list[StoredDataset]) -> None:
 
 
 def _check_discrepancy(spec: Discrepancy) -> list[Part]:
-    """Check the simulation and the columns of a discrepancy job; return the data that it reads."""
+    """Check the simulation and the columns of a discrepancy job; return the recordings that it reads."""
     _check_simulation(spec)
     if spec.input in spec.channels:
         raise RecordError(f"channel {spec.input} is the input itself: leave it out")
@@ -118,7 +118,7 @@ def _check_discrepancy(spec: Discrepancy) -> list[Part]:
                 f"column {name} is given as the simulation and also as an input, a channel or the "
                 "output: choose another column for one of them"
             )
-    return [Part(dataset=spec.dataset, rows=spec.rows)]
+    return list(spec.parts)
 
 
 def _check_simulation(spec: Discrepancy) -> None:

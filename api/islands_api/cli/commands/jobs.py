@@ -16,6 +16,7 @@ from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, Seed, with_search_options
 from islands_api.client import Client, JobFailedError
 from islands_api.client.diagnosis_calls import parse_simulation
+from islands_api.client.recording_parts import make_part
 from islands_api.schemas import JobView
 from islands_service.domain.job import DISCREPANCY, JobState
 
@@ -100,9 +101,7 @@ def submit(
             seed=search.seed,
             dt=dt,
             rows=rows,
-            recordings=[
-                {"dataset": other.id, **({} if rows is None else {"rows": rows})} for other in others
-            ],
+            recordings=[make_part(other, rows) for other in others],
             validation=validation_data,
             name=_make_name(name, records),
             priority=priority,
@@ -118,7 +117,7 @@ def submit(
 @jobs.command()
 @with_reading_options
 def diagnose(
-    record: Annotated[Path, typer.Argument(help="The record: CSV, NPZ, MAT or Parquet.")],
+    records: options.Records,
     inputs: options.Inputs,
     output_column: options.Output,
     simulated: options.Simulated,
@@ -136,15 +135,16 @@ def diagnose(
     watch: Watch = False,
     as_json: Json = False,
 ) -> None:
-    """Upload a record and submit a job that diagnoses the errors of a simulation on it."""
+    """Upload recordings and submit a job that diagnoses the errors of a simulation on them."""
     driving, tolerances = options.single_input(options.columns(inputs)), options.tolerances(tolerance or [])
     channel_names = options.columns(channels or [])
     simulation = parse_simulation(simulated)
     read = [driving, *channel_names, *([simulation["column"]] if "column" in simulation else [])]
     with _client(url, key) as client:
         whole = output_column if rows is None else None
+        dataset, *others = (client.upload(record, read, whole, dt, reading.changes()) for record in records)
         job = client.diagnose(
-            client.upload(record, read, whole, dt, reading.changes()),
+            dataset,
             driving,
             output_column,
             simulation,
@@ -153,7 +153,8 @@ def diagnose(
             seed=seed,
             dt=dt,
             rows=rows,
-            name=_make_name(name, [record]),
+            recordings=[make_part(other, rows) for other in others],
+            name=_make_name(name, records),
             priority=priority,
             idempotency_key=idempotency_key,
         )

@@ -126,6 +126,16 @@ def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs
     assert phases(store, job)[-1] == "writing the report"
 
 
+@pytest.mark.ci
+def test_recordings_are_diagnosed_together(store: Store, blobs: Blobs, submit: Submit) -> None:
+    first = submit()
+    store.jobs.cancel(ALICE, first.id)
+    submit(rows="0:150", recordings=[{"dataset": first.spec["dataset"], "rows": "150:"}])
+    document = run_job(claim(store), store, blobs).document or {}
+    assert document["record"]["segments"] == [150, 250]
+    assert [effect["name"] for effect in document["effects"]] == ["offset"]
+
+
 @pytest.mark.parametrize(
     ("changes", "kind", "words"),
     [

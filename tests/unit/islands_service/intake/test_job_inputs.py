@@ -2,19 +2,43 @@
 
 from pathlib import Path
 
-from islands_service.domain.job_spec import Identification
-from islands_service.intake.job_inputs import read_record_and_validation
+import numpy as np
+
+from islands_service.domain.job_spec import Discrepancy, Identification
+from islands_service.intake.job_inputs import read_record_and_columns, read_record_and_validation
 from islands_service.store.blobs import Blobs
 from islands_service.store.datasets import StoredDataset
 from support.service import csv, spec
 
 
-def test_recordings_of_a_job_are_joined(tmp_path: Path) -> None:
-    blobs = Blobs(tmp_path)
-    datasets = {
+def store_datasets(blobs: Blobs) -> dict[str, StoredDataset]:
+    return {
         name: StoredDataset("me", name, f"{name}.csv", ".csv", blobs.write(csv(samples)), 7, {}, 0.0)
         for name, samples in (("a", 120), ("b", 90))
     }
+
+
+def test_recordings_of_a_diagnosis_are_joined_with_their_recorded_simulations(tmp_path: Path) -> None:
+    blobs = Blobs(tmp_path)
+    order = Discrepancy.model_validate(
+        {
+            "dataset": "a",
+            "input": "u_V",
+            "output": "y_um",
+            "dt": 0.01,
+            "recordings": [{"dataset": "b", "rows": "5:"}],
+            "simulation": {"kind": "column", "column": "t_s"},
+        }
+    )
+    record, columns = read_record_and_columns(order, store_datasets(blobs), blobs)
+    assert record.rows_by_recording == {"a.csv": slice(0, 120), "b.csv": slice(120, 205)}
+    assert record.input_names == ("u_V",)
+    assert np.flatnonzero(np.diff(columns["t_s"]) < 0.0).tolist() == [119]
+
+
+def test_recordings_of_a_job_are_joined(tmp_path: Path) -> None:
+    blobs = Blobs(tmp_path)
+    datasets = store_datasets(blobs)
     recordings = [{"dataset": "b"}, {"dataset": "b", "rows": "10:70"}]
     order = Identification.model_validate(spec("a", rows="0:100", recordings=recordings, validation=0.5))
     record, validation = read_record_and_validation(order, datasets, blobs)
