@@ -13,7 +13,7 @@ from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError
+from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError, Submission
 from islands_service.reports.figure_worker import read_search_result
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -89,6 +89,23 @@ def test_interrupted_job_ends_with_the_same_models_and_history(
     outcome = run_job(lease, store, blobs)
     assert get_models(outcome) == undisturbed[0]
     assert store.results.history(job.id) == undisturbed[1]
+
+
+@pytest.mark.ci
+def test_job_that_continues_keeps_the_choice_of_the_preset_auto(
+    store: Store, blobs: Blobs, job: Job, undisturbed: Found, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    store.jobs.cancel(ALICE, job.id)
+    changed = store.jobs.submit(Submission(ALICE, {**job.spec, "preset": "auto"}))[0]
+    with pytest.raises(JobCancelled):
+        run_job(lease := claim(store), store, blobs, Interruption(store, changed, 2))
+    store.leases.release(lease)
+    monkeypatch.delattr(work, "choose_preset")
+    outcome = run_job(claim(store), store, blobs)
+    assert outcome.document is not None
+    assert outcome.document["settings"]["choice"]["kind"] == "hysteresis"
+    assert get_models(outcome) == undisturbed[0]
 
 
 @pytest.mark.ci
