@@ -1,16 +1,31 @@
 """Analyses of a residual: none of them reaches from one recording into the next."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 import scipy
 
+from islands.data.dataset import join
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, evaluate_fit
+from islands.discrepancy.calibration.noise_model import fit_ar_noise
+from islands.discrepancy.calibration.preparation import make_context as make_record_context
+from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.inference.holdout import cross_validate_gain
+from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.noise_detectors import DETECTORS, NoiseFinding
 from islands.discrepancy.inference.noise_floor import explainable_variance, noise_variance_from_periods
+from islands.discrepancy.inference.residual_structure import find_residual_structure
+from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
+from islands.discrepancy.inference.verdict import choose_reference_fit
 from islands.discrepancy.interfaces.context import SimulationContext
 from islands.discrepancy.simulators.coordinates import input_coordinate, output_coordinate
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.linear import LinearSimulator
+from islands.io.simulator_spec.factory import make_simulator
+from support.simulated_records import made
 
 LENGTHS = (400, 300, 300)
 
@@ -89,3 +104,90 @@ def test_past_of_another_recording_does_not_explain_a_residual() -> None:
     across = explainable_variance(residual, u, u, np.random.default_rng(0))
     within = explainable_variance(residual, u, u, np.random.default_rng(0), LENGTHS)
     assert within < across
+
+
+def test_steps_between_recordings_are_no_rate() -> None:
+    rng = np.random.default_rng(6)
+    lengths = (30,) * 40
+    levels = 10.0 * np.cumsum(rng.choice([-1.0, 1.0], len(lengths)))
+    u = np.repeat(levels, 30) + 0.01 * rng.standard_normal(1200)
+    # The error at either end of a recording follows the step to its neighbour.
+    residual = rng.standard_normal(1200)
+    steps = np.sign(np.diff(levels))
+    residual[29:-1:30] += 3.0 * steps
+    residual[30::30] += 3.0 * steps
+    noise = rng.standard_normal(1200)
+    structure = find_residual_structure(residual, noise, make_context(u, (1200,)), np.random.default_rng(0))
+    assert "rate" in structure
+    assert not find_residual_structure(residual, noise, make_context(u, lengths), np.random.default_rng(0))
+
+
+def make_fit(segments: tuple[int, ...]) -> tuple[CalibrationResult, Target]:
+    """Return the fit of a linear model with an initial state for each recording, and its target."""
+    parts = draw_inputs(7)
+    u = np.concatenate(parts)
+    context = make_context(u, segments)
+    simulator = LinearSimulator(np.array([0.1, 0.0]), np.array([0.9]), 0.0, 0, "um")
+    target = Target(np.roll(u, 3), np.arange(SAMPLES) < 750, None, {}, segments=segments)
+    simulation = ExtendedSimulator(simulator, (), context)
+    return evaluate_fit(simulation, target, simulation.nominal + 0.05), target
+
+
+def test_noise_of_a_fit_is_that_within_its_recordings() -> None:
+    fit, target = make_fit(LENGTHS)
+    residual = (target.y - fit.output)[:750]
+    expected = fit_ar_noise(residual, segments=(400, 300, 50))
+    assert fit.noise.coefficients.tolist() == expected.coefficients.tolist()
+    assert fit.noise.variance != fit_ar_noise(residual).variance
+
+
+def test_penalty_counts_the_initial_states_of_every_recording() -> None:
+    (several, _), (single, _) = make_fit(LENGTHS), make_fit(())
+    log = np.log(750.0)
+    assert bic_penalty(CATALOGUE["second-hysteresis"], single) == pytest.approx(4 * log)
+    assert bic_penalty(CATALOGUE["second-hysteresis"], several) == pytest.approx(6 * log)
+    assert bic_penalty(CATALOGUE["coulomb-friction"], several) == pytest.approx(log)
+
+
+def test_reference_at_nominal_values_keeps_the_initial_states_of_recordings() -> None:
+    fit, target = make_fit(LENGTHS)
+    gain = (CATALOGUE["sensor-gain"],)
+    reference = choose_reference_fit(Hypothesis(fit, 0.0, gain), fit, target)
+    names = [parameter.name for parameter in fit.simulation.parameters]
+    changed = reference.values != fit.simulation.nominal
+    assert [name for name, kept in zip(names, changed, strict=True) if kept] == [
+        "state 1 (recording 2)",
+        "state 1 (recording 3)",
+    ]
+
+
+def test_missing_terms_do_not_depend_on_the_order_of_recordings() -> None:
+    case = made()["model"]
+    parts = [replace(case.record[part], start=0.0) for part in (slice(0, 350), slice(350, 600))]
+    rng = np.random.default_rng(8)
+    noise = [rng.standard_normal(part.samples) for part in parts]
+    found = []
+    for order in (1, -1):
+        record = join(tuple(parts[::order]))
+        simulator = make_simulator(case.spec, record)
+        (effect,) = simulator.state_effects
+        context = make_record_context(record, simulator, record.samples)
+        found.append(effect.starting_points(context, np.concatenate(noise[::order])))
+    assert np.array(found[0]) == pytest.approx(np.array(found[1]), rel=1e-6)
+
+
+def test_first_samples_of_recordings_are_never_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    fit, target = make_fit(LENGTHS)
+    parts: list[np.ndarray] = []
+
+    def record_part(_simulation: object, training: Target, _values: object) -> CalibrationResult:
+        parts.append(training.estimation_part)
+        return fit
+
+    monkeypatch.setattr("islands.discrepancy.inference.holdout.calibrate", record_part)
+    cross_validate_gain(fit, True, fit, target, 750, np.random.default_rng(0))
+    fitted = np.array(parts)
+    for first in (0, 400, 700):
+        assert fitted[:, first : first + 20].all()
+    # Every other sample is left out of one of the three fits.
+    assert np.count_nonzero(~fitted[:, :750]) == 750 - (21 + 21 + 21)
