@@ -68,17 +68,21 @@ def validate_prior(tolerance: Mapping[str, float], simulator: Simulator) -> Mapp
     Raises
     ------
     SettingsError
-        A tolerance is not between 0 and 1, or the simulator has no parameter of that name.
+        A tolerance is not between 0 and 1, or the simulator has no such parameter, or its value is 0.
     """
-    names = [parameter.name for parameter in simulator.parameters]
+    nominal = {parameter.name: parameter.nominal for parameter in simulator.parameters}
     for name, value in tolerance.items():
-        if name not in names:
+        if name not in nominal:
             raise SettingsError(
-                f"{simulator.name} has no parameter {name!r}: it has {', '.join(names) or 'none'}"
+                f"{simulator.name} has no parameter {name!r}: it has {', '.join(nominal) or 'none'}"
             )
         if not 0.0 < value < 1.0:
             raise SettingsError(
                 f"the tolerance of {name} is a fraction of its value, such as 0.02; got {value:g}"
+            )
+        if nominal[name] == 0.0:
+            raise SettingsError(
+                f"the tolerance of {name} is a fraction of its value, which is 0: leave the tolerance out"
             )
     return dict(tolerance)
 

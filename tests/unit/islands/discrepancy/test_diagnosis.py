@@ -10,6 +10,7 @@ from islands.discrepancy.calibration.preparation import HOLDOUT_FRACTION, MIN_SA
 from islands.discrepancy.diagnosis import Diagnosis, diagnose
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
+from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError, SettingsError
 from islands.io.diagnosis_json import as_json, diagnosis_document
@@ -144,6 +145,14 @@ def test_unusable_record_is_rejected(record: Dataset, case: str) -> None:
 def test_invalid_tolerance_is_rejected(record: Dataset, tolerance: dict, message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         diagnose(record, BoucWenPiezoSimulator(), tolerance)
+
+
+def test_tolerance_of_a_parameter_that_is_zero_is_rejected(record: Dataset) -> None:
+    def function(u: np.ndarray, dt: float, offset: float = 0.0) -> np.ndarray:
+        return u + offset * dt
+
+    with pytest.raises(SettingsError, match="offset is a fraction of its value, which is 0"):
+        diagnose(record, PythonFunctionSimulator(function, "function"), {"offset": 0.1})
 
 
 def test_diverging_simulation_is_rejected(record: Dataset) -> None:
