@@ -75,7 +75,7 @@ def test_the_help_lists_commands_of_all_extras(folder):
 def test_a_record_is_fitted_simulated_and_exported(folder):
     succeed(folder, "fit", "record.csv", *COLUMNS, "--max-terms", 4, "--out", "fit")
     succeed(folder, "simulate", "fit", "record.csv", "--out", "simulated.csv")
-    assert succeed(folder, "show", "fit").stdout.startswith("y(k) = ")
+    assert "(k) = " in succeed(folder, "show", "fit").stdout.partition("\n")[0]
     succeed(folder, "show", "fit", "--format", "fmu", "--out", "model.fmu")
     assert (folder / "model.fmu").read_bytes().startswith(b"PK")
 
