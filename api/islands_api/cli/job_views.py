@@ -106,6 +106,9 @@ def show_models(client: Client, job: JobView, models: Sequence[ModelView]) -> No
 
 def _describe_recommended(client: Client, job: JobView, models: Sequence[ModelView]) -> Iterator[str]:
     """Yield the lines that ``islands fit`` prints about the recommended model."""
+    if not models:
+        return
+    # Results of earlier versions recommend no model.
     rank = next((model.rank for model in models if model.recommended), 1)
     terms = term_table(model_from_json(client.export(job.id, rank, "json")))
     # Results of earlier versions have no sentences. The second one is the equation in one line.
