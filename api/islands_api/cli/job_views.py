@@ -43,7 +43,8 @@ def show_job(job: JobView, as_json: bool) -> None:
         show_diagnosis(job)
     elif job.summary is not None:
         # Results of earlier versions have no sentences.
-        output.print(job.summary.get("words", job.summary["equation"]), markup=False, soft_wrap=True)
+        for sentence in job.summary.get("words", job.summary["equation"]).splitlines():
+            output.print("\n".join(wrap(sentence.strip())), markup=False)
     if job.problem is not None:
         output.print(job.problem["detail"], markup=False)
 

@@ -69,8 +69,10 @@ def test_succeeded_job_shows_the_sentences_about_its_model(run: Run, done: str, 
     assert found.summary is not None
     out = run("show", done)[1]
     assert out.splitlines()[0] == f"job {done}: succeeded"
-    assert found.summary["words"]
-    assert all(line in out for line in found.summary["words"])
+    shown = " ".join(out.split())
+    for sentence in found.summary["words"].splitlines():
+        assert " ".join(sentence.split()) in shown
+    assert max(map(len, out.splitlines())) <= 80
 
 
 # Watch.
