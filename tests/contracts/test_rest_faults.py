@@ -192,7 +192,7 @@ def test_a_defect_while_drawing_is_logged_and_not_retried_at_once(figure_service
     assert said[0] == said[1]
     assert said[0].endswith("cannot be drawn: the log of the service gives the reason")
     (entry,) = [each for each in figure_service.logs if each["event"] == "drawing failed"]
-    assert entry["reason"].endswith("KeyError: 'search'")
+    assert entry["reason"].endswith("KeyError: 'shooting'")
 
 
 @pytest.mark.nightly

@@ -262,7 +262,7 @@ def test_a_figure_of_a_deleted_record_is_rejected(service):
     dataset = service.client.get(f"/v1/jobs/{job}").json()["spec"]["dataset"]
     problem_of(service.client.get(f"/v1/jobs/{job}/figures/islands.svg"), 404, "not-found")
     assert service.client.delete(f"/v1/datasets/{dataset}").status_code == 204
-    for path in ("figures/record.svg", "models/1/figures/loop.svg", "models/1/simulation", "report"):
+    for path in ("figures/record.svg", "models/1/figures/hold.svg", "models/1/simulation", "report"):
         detail = problem_of(service.client.get(f"/v1/jobs/{job}/{path}"), 404, "no-such-dataset")
         assert dataset in detail
 

@@ -79,7 +79,7 @@ def test_stopped_run_stores_the_best_and_resumes_to_the_same_result(
         running.kill()
     assert running.returncode == 0, complained
     assert "MAPE val. %" in said
-    assert f"go on with --resume {out}" in complained
+    assert f"continue with --resume {out}" in complained
     assert "Traceback" not in complained
     result = stored(out)
     assert result["search"]["ended_by"] == "stopped"

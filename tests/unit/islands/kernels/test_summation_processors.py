@@ -24,7 +24,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.estimation.structure_selection.froe import froe
 from islands.estimation.least_squares import factorise
-from islands.kernels import simulate as kernel
+from islands.kernels.simulation import simulate as kernel
 from islands.kernels.population import Groups, PopulationContext, empty_results, evaluate
 from islands.model.expression import Lagged
 from islands.model.model import Model
