@@ -166,7 +166,7 @@ def download(client: Client, job: str, document: dict[str, Any], folder: Path) -
 def download_diagnosis(client: Client, job: str, document: dict[str, Any], folder: Path) -> None:
     """Write the result of a discrepancy job into a folder, as ``islands diagnose`` does."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name in ("extended.json", "discrepancy.json"):
+    for name in (EXTENDED_FILE, "discrepancy.json"):
         (folder / name).unlink(missing_ok=True)
     (folder / "report.html").write_bytes(client.report(job))
     if document["extended_model"] is not None:

@@ -27,7 +27,6 @@ from islands.estimation.structure_selection.deviations import (
     no_offsets,
     subtract_offsets,
 )
-from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.swap_search import swap_search
 from islands.evolution.progress import ProgressCallback, ignore_progress
@@ -117,7 +116,7 @@ def fit_library(
     split = select_feedthrough(split, settings.feedthrough, rated)
     interval = count_means(shooting, samples)
     swaps = rated.make_settings(settings.max_terms, interval)
-    structures, certificates, warm_up = _select(split, swaps, settings.certificate, progress)
+    structures, certificates, warm_up = _select(split, rated, swaps, settings.certificate, progress)
     models, outcomes = _estimate(structures, split, settings, swaps, warm_up, progress)
     best_of_size: dict[int, RankedModel] = {}
     for ranked in rank_models(models):
@@ -184,7 +183,7 @@ def _estimate(
 
 
 def _select(
-    split: Split, settings: Settings, nodes: int, progress: ProgressCallback
+    split: Split, library: TrialLibrary, settings: Settings, nodes: int, progress: ProgressCallback
 ) -> tuple[list[tuple[Structure, Offsets]], tuple[Certificate, ...], int]:
     """Return structures, each with the offsets of its signals, the certificates, and the largest lag."""
     # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
@@ -198,14 +197,7 @@ def _select(
     warm_up = 0
     for offsets in dict.fromkeys(tried):
         deviations = Split(*(subtract_offsets(part, offsets) for part in (record, split.validation)))
-        pool = screen_candidates(
-            settings.library,
-            settings.library_degree,
-            settings.library_lags,
-            deviations.estimation,
-            constraints,
-            settings.library_delays,
-        )
+        pool = library.screen(deviations.estimation)
         warm_up = max(item.maximum_lag for item in pool)
         progress(f"inner products of {len(pool)} candidates", 0.0)
         problem = make_selection_problem(pool, deviations.estimation, constraints)

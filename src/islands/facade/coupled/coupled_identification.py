@@ -23,9 +23,8 @@ from islands.facade.identify import SearchCallback, identify
 from islands.facade.results.result import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.rate_selection import select_rate
-from islands.facade.trials.trial_library import TrialLibrary, make_trial_library
+from islands.facade.trials.trial_library import TrialLibrary, make_trial_library, take_library
 from islands.io.data_frames import as_record
-from islands.model.candidate_library import get_library
 from islands.simulation.coupled_model import CoupledModel
 
 if TYPE_CHECKING:
@@ -100,14 +99,8 @@ def fit_coupled(
     """
     chosen: dict[str, Any] = {"library": "polynomial", **options}
     _check_constraints(chosen.get("constraints"), chosen)
-    entry = get_library(chosen["library"])
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
-    trial = TrialLibrary(
-        chosen["library"],
-        entry.degree if degree is None else degree,
-        entry.lags if lags is None else lags,
-        constraints or entry.constraints,
-    )
+    trial = take_library(chosen["library"], degree, lags, constraints)
     find = partial(fit, seed=seed)
     data = _read_data(record, inputs, outputs, dt, validation)
     return _couple(data, chosen, trial, trial.lags + 3, refine_together, progress, "progress", find)

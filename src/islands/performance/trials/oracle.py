@@ -9,6 +9,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResul
 from islands.discrepancy.calibration.preparation import select_effects
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.effects import catalogue_order, model_form
+from islands.discrepancy.inference.screening import transfer_parameters
 from islands.discrepancy.interfaces.effect import Effect
 
 #: Number of starting points of each effect that are fitted, the most promising ones.
@@ -36,10 +37,8 @@ def compute_gain_share(
     float or None
         None if the oracle improves the fit by less than 1 %, or if a fault has no effect in the catalogue.
     """
-    target = Target(
-        *(found.record.y, np.arange(found.record.samples) < found.estimation_samples, None, tolerance),
-        segments=found.record.segments,
-    )
+    estimation_part = np.arange(found.record.samples) < found.estimation_samples
+    target = Target(found.record.y, estimation_part, None, tolerance, segments=found.record.segments)
     simulation = found.base.simulation
     effects = select_effects(simulation.simulator, simulation.context, tolerance)
     oracle = found.base
@@ -78,10 +77,7 @@ def _fit_with_effect(fit: CalibrationResult, effect: Effect, target: Target) -> 
     residual = target.residual(fit.output)
     starts = []
     for point in effect.starting_points(context, target.y - fit.output):
-        start = extended.nominal
-        start[extended.simulator_slice] = fit.values[old.simulator_slice]
-        for each in old.effects:
-            start[extended.get_slice(each)] = fit.values[old.get_slice(each)]
+        start = transfer_parameters(fit.values, old, extended)
         start[part] = extended.expand(effect, point)
         response = target.select(extended.simulate(start) - fit.output)
         energy = float(response @ response)
