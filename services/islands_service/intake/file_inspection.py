@@ -8,7 +8,7 @@ import json
 import resource
 import sys
 from asyncio.subprocess import PIPE
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -118,16 +118,19 @@ def main() -> None:
     _limit(message["memory"], message["seconds"])
     # Import after the limits are set, so that the imported code is subject to them.
     from islands.io.records import read_dataset  # noqa: PLC0415
-    from islands.io.records.preview import preview  # noqa: PLC0415
+    from islands.io.records.preview import preview_table  # noqa: PLC0415
+    from islands.io.records.reader import open_record  # noqa: PLC0415
     from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
     from islands.io.records.row_range import parse_rows  # noqa: PLC0415
 
     request = InspectionRequest(**message["asked"])
     try:
         options = ReadingOptions(**request.reading)
-        found = preview(message["path"], options)
+        table, name = open_record(message["path"], options), Path(message["path"]).name
+        _check_columns([column for column in table.names if column], name)
+        found = preview_table(table, name, options)
         # Check this first: a message about missing columns lists the existing ones.
-        _check_readable(found, message["path"])
+        _check_readable(found, name)
         if request.inputs and request.output is not None:
             rows = parse_rows(request.rows)
             read_dataset(message["path"], request.inputs, request.output, request.dt, rows, options=options)
@@ -168,22 +171,25 @@ def _measure(
     return {"rows": rows, "choice": document["choice"], "facts": document["facts"]}
 
 
-def _check_readable(found: "Preview", path: str) -> None:
-    """Reject a file that no job could read, or that has too many columns to display."""
-    if len(found.columns) > _MAX_COLUMNS:
+def _check_columns(names: Sequence[str], file: str) -> None:
+    """Reject a file with too many columns to display, before any of them is read."""
+    if len(names) > _MAX_COLUMNS:
         raise RecordError(
-            f"{Path(path).name} has {len(found.columns)} columns, and {_MAX_COLUMNS} is the most: leave out "
-            "what is not needed"
+            f"{file} has {len(names)} columns, and {_MAX_COLUMNS} is the most: leave out what is not needed"
         )
-    for column in found.columns:
-        if len(column.name) > _MAX_NAME:
+    for name in names:
+        if len(name) > _MAX_NAME:
             raise RecordError(
-                f"{Path(path).name} has a column {column.name[:_SHOWN]}... whose name has {len(column.name)} "
-                f"characters, and {_MAX_NAME} is the most: give it a shorter one"
+                f"{file} has a column {name[:_SHOWN]}... whose name has {len(name)} characters, and "
+                f"{_MAX_NAME} is the most: give it a shorter one"
             )
+
+
+def _check_readable(found: "Preview", file: str) -> None:
+    """Reject a file that no job could read."""
     if not found.samples:
         problems = [column.problem for column in found.columns if column.problem]
-        raise RecordError(problems[0] if problems else f"{Path(path).name} has no columns: export it again")
+        raise RecordError(problems[0] if problems else f"{file} has no columns: export it again")
 
 
 def _check_usable(problems: Mapping[str, str], request: InspectionRequest) -> None:

@@ -85,7 +85,11 @@ def preview(path: str | Path, options: ReadingOptions = DEFAULT_READING) -> Prev
     RecordError
         The file does not exist or cannot be read. Problems of single columns do not raise.
     """
-    table, file = open_record(path, options), Path(path).name
+    return preview_table(open_record(path, options), Path(path).name, options)
+
+
+def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_READING) -> Preview:
+    """Describe every column of an open table like `preview`; ``file`` is its name in messages."""
     columns, unread = _read_columns(table)
     groups = _group_by_length(columns)
     main = groups[0][0] if groups else None

@@ -1,6 +1,8 @@
 """Limits on declared sizes: a file's declared sizes are checked before memory is allocated for them."""
 
 import zipfile
+from collections.abc import Sized
+from io import BufferedReader, FileIO
 from pathlib import Path
 
 from islands.errors import RecordError
@@ -12,9 +14,61 @@ MOST_SAMPLES = 2**27
 #: Largest compression ratio of deflate: https://zlib.net/zlib_tech.html.
 DENSEST = 1032
 
+#: Largest number of columns of a table and of members of an archive. A small file can declare any number.
+MOST_COLUMNS = 10_000
+
+#: Largest number of cells of a sheet of a workbook, with empty ones.
+MOST_CELLS = 2**26
+
+#: Largest number of bytes of the directory of a zip archive: `MOST_COLUMNS` members with long names.
+MOST_DIRECTORY = 2**21
 
 #: Largest number of bytes of an unpacked file. Longer records are not used for identification.
 MOST_UNPACKED = 2**30
+
+
+class RecordArchive(zipfile.ZipFile):
+    """A zip archive of bounded directory, so that a hostile one is refused before its members are listed.
+
+    Members cannot be read beyond their declared sizes.
+
+    Raises
+    ------
+    RecordError
+        The archive has more than `MOST_COLUMNS` members, or a directory of more than `MOST_DIRECTORY` bytes.
+    zipfile.BadZipFile, OSError, ValueError, struct.error
+        The archive is damaged.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._source = _DirectorySource(path)
+        try:
+            super().__init__(self._source)
+            self._source.restricted = False
+            check_column_count(self.filelist, path.name)
+        except BaseException:
+            self._source.close()
+            raise
+
+    def close(self) -> None:
+        """Close the archive and its file."""
+        super().close()
+        self._source.close()
+
+
+class _DirectorySource(BufferedReader):
+    """File that refuses one long read: `zipfile` reads the directory of an archive by one call."""
+
+    restricted = True
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(FileIO(path))
+        self._file_name = path.name
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if self.restricted and size is not None and size > MOST_DIRECTORY:
+            raise _too_many_columns(self._file_name)
+        return super().read(size)
 
 
 def check_archive(path: Path) -> None:
@@ -25,10 +79,27 @@ def check_archive(path: Path) -> None:
     RecordError
         The archive unpacks to more than `MOST_UNPACKED` bytes, or declares an impossible size.
     """
-    with zipfile.ZipFile(path) as archive:
-        members = archive.infolist()
-    check_unpacked(sum(member.file_size for member in members), path.name)
-    check_stored(sum(member.file_size for member in members), path.stat().st_size, True, "(all)", path.name)
+    with RecordArchive(path) as archive:
+        declared = sum(member.file_size for member in archive.filelist)
+    check_unpacked(declared, path.name)
+    check_stored(declared, path.stat().st_size, True, "(all)", path.name)
+
+
+def check_column_count(columns: Sized, file: str) -> None:
+    """Refuse a file with more than `MOST_COLUMNS` columns, variables or members.
+
+    Raises
+    ------
+    RecordError
+    """
+    if len(columns) > MOST_COLUMNS:
+        raise _too_many_columns(file)
+
+
+def _too_many_columns(file: str) -> RecordError:
+    return RecordError(
+        f"{file} has more than {MOST_COLUMNS} columns or members: save only the columns of the record"
+    )
 
 
 def check_unpacked(size: int, file: str) -> None:

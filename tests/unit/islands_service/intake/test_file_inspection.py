@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+import zipfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -60,6 +61,14 @@ def endless(tmp_path):
     path = tmp_path / "a.csv"
     os.mkfifo(path)
     return path
+
+
+def test_a_file_with_too_many_columns_is_refused_before_one_is_read(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        for index in range(1001):
+            archive.writestr(f"{index}.npy", b"not an array")
+    with pytest.raises(RecordError, match="has 1001 columns, and 1000 is the most"):
+        inspect(tmp_path / "a.npz")
 
 
 def test_record_is_described(record):

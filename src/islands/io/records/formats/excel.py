@@ -13,7 +13,10 @@ from islands.errors import RecordError
 from islands.io.records.formats.text.table_start import has_samples
 from islands.io.records.formats.text.text_table import DelimitedText, split_table
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.size_limits import check_archive
+from islands.io.records.size_limits import MOST_CELLS, MOST_COLUMNS, check_archive, check_column_count
+
+#: Rows of a sheet of Excel.
+_MOST_ROWS = 2**20
 
 #: Exceptions of openpyxl and the standard library for damaged workbooks.
 _DAMAGED = (
@@ -52,8 +55,9 @@ def read_workbook(path: Path, options: ReadingOptions = DEFAULT_READING) -> Deli
         book = load_workbook(path, read_only=True, data_only=True, keep_links=False)
         try:
             names = [sheet.title for sheet in book.worksheets]
+            check_column_count(names, file)
             chosen = _choose_sheets(names, options.sheet, file)
-            name, lines = _find_table((name, book[name]) for name in chosen)
+            name, lines = _find_table(((name, book[name]) for name in chosen), file)
         finally:
             book.close()
     except (*_DAMAGED, InvalidFileException) as error:
@@ -80,24 +84,33 @@ def _choose_sheets(names: Sequence[str], sheet: str | None, file: str) -> Sequen
     return [sheet]
 
 
-def _find_table(sheets: Iterator[tuple[str, Any]]) -> tuple[str, list[str]]:
+def _find_table(sheets: Iterator[tuple[str, Any]], file: str) -> tuple[str, list[str]]:
     """Return the name and the lines of the first sheet with a table; the lines are empty if none has one."""
     name = ""
     for name, sheet in sheets:
         sheet.reset_dimensions()  # the stated size may be wrong
-        lines = _list_lines(sheet)
+        lines = _list_lines(sheet, file)
         if has_samples(lines):
             return name, lines
     return name, []
 
 
-def _list_lines(sheet: Any) -> list[str]:
-    """Return the rows of a sheet as lines with tabulators between the cells."""
+def _list_lines(sheet: Any, file: str) -> list[str]:
+    """Return the rows of a sheet as lines with tabulators between the cells.
+
+    Cells and rows that a file leaves out are counted too: one cell can be in any row and column.
+    """
     lines = []
     width = 0
-    rows = [[_as_text(value) for value in row] for row in sheet.iter_rows(values_only=True)]
-    for row in rows:
+    rows: list[list[str]] = []
+    for row in sheet.iter_rows(values_only=True):
+        rows.append([_as_text(value) for value in row])
         width = max(width, len(row))
+        if width > MOST_COLUMNS or len(rows) * max(width, 1) > MOST_CELLS or len(rows) > _MOST_ROWS:
+            raise RecordError(
+                f"{file} has a sheet of more than {len(rows) - 1} rows and {width} columns, too many for a "
+                "record: save only its cells as CSV"
+            )
     for row in rows:
         stream = StringIO()
         csv.writer(stream, delimiter="\t", lineterminator="\n").writerow([*row, *[""] * (width - len(row))])

@@ -1,8 +1,8 @@
 """HDF5 files (.h5, .hdf5): the datasets of one group. References to other files are never followed."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,9 @@ from islands.io.records.column_names import append_unit
 from islands.io.records.formats.columnar import ColumnarFile
 from islands.io.records.formats.groups import choose_group
 from islands.io.records.formats.mat.v73 import check_dataset_size
-from islands.io.records.formats.mat.workspace import DAMAGED, MOST_VARIABLES, Variable, make_columns
+from islands.io.records.formats.mat.workspace import DAMAGED, Variable, make_columns
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.size_limits import MOST_COLUMNS
 from islands.io.records.validation import MIN_SAMPLES
 
 _MAX_DEPTH = 32
@@ -43,11 +44,18 @@ def read_hdf5(path: Path, options: ReadingOptions = DEFAULT_READING) -> Columnar
         if not h5py.is_hdf5(path):
             raise RecordError(f"{path.name} is not an HDF5 file: write it again")
         with h5py.File(path, "r", locking=False) as file:
-            groups = dict(_iterate_tables(file, "/", 0))
+            groups = dict(_iterate_tables(file, "/", 0, [0]))
         tables = {name: _is_table(variables) for name, variables in groups.items()}
         group, others = choose_group(tables, options.sheet, path.name)
+        # A dataset of records is stored by rows: reading one of its columns reads all of them.
+        read_records = lru_cache(1)(partial(_read_records, path, group))
         variables = [
-            Variable(append_unit(key, member[2]), member[0], member[1], partial(_read, path, group, key))
+            Variable(
+                append_unit(key, member[2]),
+                member[0],
+                member[1],
+                partial(_read, path, group, key, read_records),
+            )
             for key, member in groups[group].items()
         ]
     except DAMAGED as error:
@@ -56,13 +64,19 @@ def read_hdf5(path: Path, options: ReadingOptions = DEFAULT_READING) -> Columnar
 
 
 def _iterate_tables(
-    group: Any, name: str, depth: int
+    group: Any, name: str, depth: int, seen: list[int]
 ) -> Iterator[tuple[str, Mapping[str, tuple[str, tuple[int, ...], str]]]]:
-    """Yield groups and datasets of records by path, with kind, shape and unit of each column."""
+    """Yield groups and datasets of records by path, with kind, shape and unit of each column.
+
+    ``seen`` counts the members of the whole file: by hard links, a small file has any number of paths.
+    """
     import h5py  # noqa: PLC0415
 
-    if depth > _MAX_DEPTH or len(group) > MOST_VARIABLES:
-        raise ValueError(f"groups are nested more than {_MAX_DEPTH} deep or contain too many members")
+    seen[0] += len(group)
+    if depth > _MAX_DEPTH or seen[0] > MOST_COLUMNS:
+        raise ValueError(
+            f"groups are nested more than {_MAX_DEPTH} deep or contain more than {MOST_COLUMNS} members"
+        )
     columns: dict[str, tuple[str, tuple[int, ...], str]] = {}
     inner = []
     for key in group:
@@ -71,11 +85,9 @@ def _iterate_tables(
         place = key if name == "/" else f"{name}/{key}"
         if isinstance(member, h5py.Group):
             inner.append((member, place))
-        elif isinstance(member, h5py.Dataset) and member.dtype.names:
-            fields = {
-                each: (_kind(member, member.dtype[each]), member.shape, "") for each in member.dtype.names
-            }
-            yield place, fields
+        elif isinstance(member, h5py.Dataset) and (dtype := member.dtype).names:
+            shape, kind = member.shape, _kind(member, np.dtype(float))
+            yield place, {each: (kind or _name_kind(dtype[each]), shape, "") for each in dtype.names}
         elif isinstance(member, h5py.Dataset):
             columns[key] = (_kind(member, member.dtype), member.shape or (), _unit(member))
         elif member is None:
@@ -83,12 +95,16 @@ def _iterate_tables(
     if columns:
         yield name, columns
     for member, place in inner:
-        yield from _iterate_tables(member, place, depth + 1)
+        yield from _iterate_tables(member, place, depth + 1, seen)
 
 
 def _kind(dataset: Any, dtype: np.dtype[Any]) -> str:
     if dataset.is_virtual or dataset.external:
         return "link"
+    return _name_kind(dtype)
+
+
+def _name_kind(dtype: np.dtype[Any]) -> str:
     return "" if dtype.kind in "fiub" else str(dtype)
 
 
@@ -108,11 +124,25 @@ def _is_table(columns: Mapping[str, tuple[str, tuple[int, ...], str]]) -> bool:
     return len(shapes) > 1 or any(len(shape) == 2 and min(shape) > 1 for shape in shapes)
 
 
-def _read(path: Path, group: str, key: str) -> NDArray[Any]:
+def _read(path: Path, group: str, key: str, read_records: Callable[[], NDArray[Any] | None]) -> NDArray[Any]:
+    import h5py  # noqa: PLC0415
+
+    records = read_records()
+    if records is not None:
+        return records[key]
+    with h5py.File(path, "r", locking=False) as file:
+        dataset = file[group][key]
+        check_dataset_size(dataset, key, path)
+        return np.asarray(dataset[()])
+
+
+def _read_records(path: Path, name: str) -> NDArray[Any] | None:
+    """Read a dataset of records; return None for a group."""
     import h5py  # noqa: PLC0415
 
     with h5py.File(path, "r", locking=False) as file:
-        parent = file[group]
-        dataset = parent if isinstance(parent, h5py.Dataset) else parent[key]
-        check_dataset_size(dataset, key, path)
-        return np.asarray(dataset[key] if dataset is parent else dataset[()])
+        dataset = file[name]
+        if not isinstance(dataset, h5py.Dataset):
+            return None
+        check_dataset_size(dataset, name, path)
+        return np.asarray(dataset[()])

@@ -1,7 +1,8 @@
 """MDF files of test benches and loggers (.mf4, .mdf), read by asammdf (extra `mdf`)."""
 
+import weakref
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from islands.io.records.formats.columnar import ColumnarFile
 from islands.io.records.formats.groups import choose_group
 from islands.io.records.formats.mat.workspace import DAMAGED
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.size_limits import check_samples, check_stored
+from islands.io.records.size_limits import check_column_count, check_samples, check_stored
 from islands.io.records.validation import MIN_SAMPLES
 
 #: Name of the column with the times of a group.
@@ -31,7 +32,9 @@ def read_mdf(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarF
         The file is not an MDF file or is damaged, has no such group, or asammdf is not installed.
     """
     options.check_array_file(path.name, sheets=True)
-    with _open(path) as file:
+    with ExitStack() as stack, _translated_errors(path.name):
+        # Opening reads the description of all channels, so that the file is opened once for all of them.
+        file = stack.enter_context(_open(path))
         numbers = _name_groups(file)
         tables = {
             name: len(file.groups[number].channels) > 1
@@ -41,28 +44,33 @@ def read_mdf(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarF
         group, others = choose_group(tables, options.sheet, path.name)
         number = numbers[group]
         master = file.masters_db.get(number)
-        loads = {} if master is None else {_TIME: partial(_read_times, path, number)}
+        loads = {} if master is None else {_TIME: partial(_read_times, file, path, number)}
+        check_column_count(file.groups[number].channels, path.name)
         for place, channel in enumerate(file.groups[number].channels):
             name = _name_channel(channel)
             if place != master and name not in loads:
-                loads[name] = partial(_read_channel, path, number, place, name)
-    return ColumnarFile(path.name, tuple(loads), lambda name: loads[name](), (), {}, others)
+                loads[name] = partial(_read_channel, file, path, number, place, name)
+        table = ColumnarFile(path.name, tuple(loads), lambda name: loads[name](), (), {}, others)
+        weakref.finalize(table, stack.pop_all().close)
+    return table
+
+
+def _open(path: Path) -> Any:
+    from asammdf import MDF  # noqa: PLC0415
+
+    return MDF(path)
 
 
 @contextmanager
-def _open(path: Path) -> Iterator[Any]:
+def _translated_errors(file: str) -> Iterator[None]:
     try:
-        from asammdf import MDF  # noqa: PLC0415
         from asammdf.blocks.utils import MdfException  # noqa: PLC0415
     except ImportError as error:
-        raise RecordError(
-            f"{path.name}: install islands[mdf] to read MDF, or export the record as CSV"
-        ) from error
+        raise RecordError(f"{file}: install islands[mdf] to read MDF, or export the record as CSV") from error
     try:
-        with MDF(path) as file:
-            yield file
+        yield
     except (*DAMAGED, MdfException) as error:
-        raise RecordError(f"{path.name} is damaged or not an MDF file ({error}): write it again") from error
+        raise RecordError(f"{file} is damaged or not an MDF file ({error}): write it again") from error
 
 
 def _name_groups(file: Any) -> dict[str, int]:
@@ -80,14 +88,14 @@ def _name_channel(channel: Any) -> str:
     return append_unit(str(channel.name), str(unit or ""))
 
 
-def _read_times(path: Path, number: int) -> NDArray[Any]:
-    with _open(path) as file:
+def _read_times(file: Any, path: Path, number: int) -> NDArray[Any]:
+    with _translated_errors(path.name):
         _check_size(file, path, number, _TIME)
         return np.asarray(file.get_master(number))
 
 
-def _read_channel(path: Path, number: int, place: int, name: str) -> NDArray[Any]:
-    with _open(path) as file:
+def _read_channel(file: Any, path: Path, number: int, place: int, name: str) -> NDArray[Any]:
+    with _translated_errors(path.name):
         _check_size(file, path, number, name)
         return np.asarray(file.get(group=number, index=place).samples)
 

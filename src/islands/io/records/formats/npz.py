@@ -2,6 +2,7 @@
 
 import math
 import struct
+import weakref
 import zipfile
 import zlib
 from functools import partial
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from islands.errors import RecordError
 from islands.io.records.formats.columnar import ColumnarFile
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.size_limits import check_samples, check_stored
+from islands.io.records.size_limits import RecordArchive, check_samples, check_stored, check_unpacked
 
 #: Exceptions that NumPy and the standard library raise for damaged archives and for Python objects in valid
 #: ones.
@@ -40,22 +41,26 @@ def read_archive(path: Path, options: ReadingOptions = DEFAULT_READING) -> Colum
     if not zipfile.is_zipfile(path):
         raise RecordError(f"{path.name} is not a NumPy archive: write it with numpy.savez(path, u=u, y=y)")
     try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.namelist()
+        archive = RecordArchive(path)
     except UNREADABLE as error:
         raise RecordError(f"{path.name} is damaged ({error}): write it again with numpy.savez") from error
-    names = tuple(member.removesuffix(".npy") for member in members)
-    return ColumnarFile(path.name, names, partial(_load_array, path), names)
+    # Members that are not compressed need as many bytes in the file as they declare.
+    packed = [member for member in archive.filelist if member.compress_type != zipfile.ZIP_STORED]
+    check_unpacked(sum(member.file_size for member in packed), path.name)
+    names = tuple(member.removesuffix(".npy") for member in archive.namelist())
+    table = ColumnarFile(path.name, names, partial(_load_array, archive, path), names)
+    # Opening an archive reads its whole directory, so that it is opened once for all columns.
+    weakref.finalize(table, archive.close)
+    return table
 
 
-def _load_array(path: Path, name: str) -> NDArray[Any]:
+def _load_array(archive: zipfile.ZipFile, path: Path, name: str) -> NDArray[Any]:
     try:
-        with zipfile.ZipFile(path) as archive:
-            member = _find_member(archive, name)
-            with archive.open(member) as stream:
-                _check_declared_size(stream, member, name, path)
-                stream.seek(0)
-                return np.asarray(npy.read_array(stream, allow_pickle=False))
+        member = _find_member(archive, name)
+        with archive.open(member) as stream:
+            _check_declared_size(stream, member, name, path)
+            stream.seek(0)
+            return np.asarray(npy.read_array(stream, allow_pickle=False))
     except UNREADABLE as error:
         raise RecordError(
             f"{path.name}: column {name} cannot be read ({error}): if it holds Python objects, which may run "

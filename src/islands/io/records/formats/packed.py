@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from islands.errors import RecordError
-from islands.io.records.size_limits import check_unpacked
+from islands.io.records.size_limits import RecordArchive, check_unpacked
 from islands.io.records.table import Table
 
 #: Suffixes of compressed files.
@@ -67,7 +67,7 @@ def _unpack(path: Path, folder: Path, known: Collection[str]) -> Path:
             with gzip.open(path) as source:
                 _copy(source, target, path.name)
             return target
-        with zipfile.ZipFile(path) as archive:
+        with RecordArchive(path) as archive:
             member = _choose_member(archive, path.name, known)
             check_unpacked(member.file_size, path.name)
             target = folder / PurePosixPath(member.filename).name

@@ -1,7 +1,8 @@
 """Parquet files (.parquet), read by pyarrow (extra `parquet`)."""
 
+import weakref
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from islands.errors import RecordError
 from islands.io.records.column_names import seconds_per_unit
 from islands.io.records.formats.columnar import ColumnarFile
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.size_limits import check_samples
+from islands.io.records.size_limits import check_column_count, check_samples
 
 #: Rows decoded at a time. Memory use then depends on the stored pages, not on the row count that the file
 #: declares.
@@ -39,48 +40,51 @@ def read_parquet(path: Path, options: ReadingOptions = DEFAULT_READING) -> Colum
     file = path.name
     if path.stat().st_size == 0:
         raise RecordError(f"{file} is empty: write it again")
-    with _open(path) as parquet:
+    with ExitStack() as stack, _translated_errors(file):
+        # Opening reads the description of all columns, so that the file is opened once for all of them. It is
+        # not memory-mapped: truncating a mapped file would kill the process with SIGBUS.
+        from pyarrow.parquet import ParquetFile  # noqa: PLC0415
+
+        parquet = stack.enter_context(ParquetFile(path, memory_map=False, pre_buffer=False))
+        check_column_count(range(parquet.metadata.num_columns), file)
         names, rows = tuple(parquet.schema_arrow.names), parquet.metadata.num_rows
-    return ColumnarFile(file, names, partial(_read_column, path, rows))
+        table = ColumnarFile(file, names, partial(_read_column, parquet, file, rows))
+        weakref.finalize(table, stack.pop_all().close)
+    return table
 
 
 @contextmanager
-def _open(path: Path) -> Iterator[Any]:
+def _translated_errors(file: str) -> Iterator[None]:
     try:
         import pyarrow  # noqa: PLC0415
-        from pyarrow.parquet import ParquetFile  # noqa: PLC0415
     except ImportError as error:
         raise RecordError(
-            f"{path.name}: reading Parquet needs pyarrow, which is not installed: "
+            f"{file}: reading Parquet needs pyarrow, which is not installed: "
             "pip install 'islands[parquet]', or export the record to .csv"
         ) from error
     try:
-        # Not memory-mapped: truncating a mapped file would kill the process with SIGBUS.
-        with ParquetFile(path, memory_map=False, pre_buffer=False) as parquet:
-            yield parquet
+        yield
     except (pyarrow.ArrowException, OSError) as error:
-        raise RecordError(
-            f"{path.name} is damaged or not a Parquet file ({error}): write it again"
-        ) from error
+        raise RecordError(f"{file} is damaged or not a Parquet file ({error}): write it again") from error
 
 
-def _read_column(path: Path, rows: int, name: str) -> NDArray[np.float64]:
+def _read_column(parquet: Any, file: str, rows: int, name: str) -> NDArray[np.float64]:
     import pyarrow  # noqa: PLC0415
 
-    check_samples(rows, name, path.name)
-    with _open(path) as parquet:
+    check_samples(rows, name, file)
+    with _translated_errors(file):
         batches = parquet.iter_batches(_BATCH, columns=[name], use_threads=False)
         chunks = [batch.column(batch.schema.names.index(name)) for batch in batches]
         stored = sum(map(len, chunks))
         if stored != rows:
             raise RecordError(
-                f"{path.name} declares {rows} rows and stores {stored}: it is damaged, write it again"
+                f"{file} declares {rows} rows and stores {stored}: it is damaged, write it again"
             )
         schema = parquet.schema_arrow
         kind = schema.field(schema.names.index(name)).type
         if pyarrow.types.is_dictionary(kind):
             chunks, kind = [chunk.dictionary_decode() for chunk in chunks], kind.value_type
-        return _to_numbers(pyarrow.chunked_array(chunks, kind), name, path.name)
+        return _to_numbers(pyarrow.chunked_array(chunks, kind), name, file)
 
 
 def _to_numbers(column: Any, name: str, file: str) -> NDArray[np.float64]:

@@ -29,7 +29,8 @@ def read_matlab(path: Path, options: ReadingOptions = DEFAULT_READING) -> Column
     Raises
     ------
     RecordError
-        The file is not a MAT-file, is damaged, or has more variables than `workspace.MOST_VARIABLES`.
+        The file is not a MAT-file, is damaged, or has more than `islands.io.records.size_limits.MOST_COLUMNS`
+        variables.
     """
     options.check_array_file(path.name)
     file = path.name

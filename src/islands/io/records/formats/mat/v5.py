@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.io.records.formats.mat.workspace import DAMAGED, Variable
-from islands.io.records.size_limits import DENSEST, MOST_SAMPLES
+from islands.io.records.size_limits import DENSEST, MOST_COLUMNS, MOST_SAMPLES
 
 _HEADER = 128  # bytes before the first element
 _HEAD = 1024  # first bytes of an element, which contain class, dimensions and name of a variable
@@ -105,6 +105,8 @@ def _flatten(name: str, matrix: _Matrix, load: Callable[[], _Span], depth: int) 
     parts = _read_header(load()).parts
     width = int(_next(parts).numbers("i4")[0])
     table = _next(parts).text()
+    if len(table) > width * MOST_COLUMNS:
+        raise ValueError(f"a structure has more than {MOST_COLUMNS} fields")
     fields = [table[start : start + width].partition("\0")[0] for start in range(0, len(table), width)]
     for field, (_, span) in zip(fields, parts, strict=True):
         yield from _flatten(f"{name}.{field}", _read_header(span), partial(_identity, span), depth + 1)

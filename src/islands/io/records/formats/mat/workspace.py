@@ -13,15 +13,11 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.io.records.formats.columnar import ColumnarFile
-from islands.io.records.size_limits import check_samples
+from islands.io.records.size_limits import MOST_COLUMNS, check_column_count, check_samples
 from islands.io.records.validation import MIN_SAMPLES
 
 #: Largest number of channels in a matrix. The other dimension must be at least `MIN_SAMPLES`.
 MOST_CHANNELS = 16
-
-#: Largest number of variables of a file. A small file can declare any number, and links in HDF5 can form
-#: cycles.
-MOST_VARIABLES = 10_000
 
 #: Exceptions that readers, NumPy and h5py raise for damaged files.
 DAMAGED = (LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError, struct.error, zlib.error)
@@ -80,7 +76,7 @@ def make_columns(variables: Iterable[Variable], file: str) -> ColumnarFile:
     Raises
     ------
     RecordError
-        The file is damaged, or has more than `MOST_VARIABLES` variables.
+        The file is damaged, or has more than `MOST_COLUMNS` variables.
     """
     variables = _list_variables(variables, file)
     taken = {variable.name for variable in variables}
@@ -103,13 +99,10 @@ def make_columns(variables: Iterable[Variable], file: str) -> ColumnarFile:
 
 def _list_variables(variables: Iterable[Variable], file: str) -> list[Variable]:
     try:
-        listed = list(islice(variables, MOST_VARIABLES + 1))
+        listed = list(islice(variables, MOST_COLUMNS + 1))
     except DAMAGED as error:
         raise RecordError(f"{file} is damaged or truncated ({error}): save it again") from error
-    if len(listed) > MOST_VARIABLES:
-        raise RecordError(
-            f"{file} has more than {MOST_VARIABLES} variables: save only the variables of the record"
-        )
+    check_column_count(listed, file)
     return listed
 
 

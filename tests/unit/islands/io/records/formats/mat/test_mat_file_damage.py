@@ -187,10 +187,10 @@ def test_the_nesting_of_structures_is_limited(write, refusal):
 
 
 def test_a_file_with_too_many_variables_is_refused(write, monkeypatch, refusal):
-    monkeypatch.setattr("islands.io.records.formats.mat.workspace.MOST_VARIABLES", 50)
+    monkeypatch.setattr("islands.io.records.size_limits.MOST_COLUMNS", 50)
     many = [numbers(f"v{index}", U) for index in range(48)]
     assert len(read_columns(write(*many[:47]))) == 50
-    assert "bad.mat has more than 50 variables" in refusal(write(*many))
+    assert "bad.mat has more than 50 columns" in refusal(write(*many))
 
 
 # Wrong sizes
