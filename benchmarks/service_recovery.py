@@ -2,7 +2,7 @@
 
     python benchmarks/service_recovery.py [MEASURE ...] [--repeat 5] [--json FILE]
 
-Measures: start, cancel, api, coordinator, hung, island, ray, node; all of them by default.
+Measures: start, cancel, api, coordinator, hung, island, frozen, ray, node; all of them by default.
 Results are printed, not asserted; the targets are those of the service's design.
 """
 
@@ -171,6 +171,29 @@ def island(repeat: int) -> Iterator[Figure]:
     yield Figure("island killed, cost of it (identical result)", "s", 1.0, tuple(costs))
 
 
+def frozen(repeat: int) -> Iterator[Figure]:
+    """Measure the delay of a job by an island's process that is frozen: at most three epochs and 5 s."""
+    for length in (1, 250):
+        costs, epochs = [], []
+        with service() as running:
+            for _ in range(repeat):
+                job = running.submit(ENDLESS, settings={"migrate_every": length})
+                # A report may be older than some epochs of a few generations.
+                several = 3 * max(length, AHEAD)
+                generation, began = running.under_way(job, 2 * length), time.monotonic()
+                alone = until(lambda: running.generation(job) >= generation + several, began)  # noqa: B023
+                os.kill(running.one("island"), signal.SIGSTOP)
+                generation, began = running.generation(job), time.monotonic()
+                until(lambda: running.generation(job) >= generation + several, began)  # noqa: B023
+                costs.append(time.monotonic() - began - alone)
+                epochs.append(alone * length / several)
+                running.ask("POST", f"/v1/jobs/{job}/cancel")
+                running.ended(job)
+        epoch = sum(epochs) / repeat
+        name = f"island frozen, epochs of {epoch:.2f} s, cost of it"
+        yield Figure(name, "s", round(3.0 * epoch + 5.0, 1), tuple(costs))
+
+
 def ray(repeat: int) -> Iterator[Figure]:
     """Measure the time until a job continues after Ray's processes were killed."""
     for role in ("head", "gcs", "raylet"):
@@ -283,6 +306,7 @@ MEASURES = {
     "coordinator": coordinator,
     "hung": hung,
     "island": island,
+    "frozen": frozen,
     "ray": ray,
     "node": node,
 }

@@ -1,6 +1,8 @@
 """Killed actors: the result equals that of an undisturbed run, bit for bit."""
 
 import os
+import signal
+import time
 from contextlib import suppress
 from dataclasses import replace
 from threading import Event, Thread
@@ -63,6 +65,23 @@ def test_three_killed_actors_do_not_change_the_result(posed, undisturbed, engine
             # The engine is suspended: the loss occurs before the next step.
     assert found == undisturbed
     assert messages.count("an actor was lost: its islands continue from their last epoch") == 3
+
+
+@pytest.mark.ci
+def test_frozen_actor_is_replaced_and_does_not_change_the_result(posed, undisturbed, engine, messages):
+    """The three islands share two actors: a frozen one has a queue, and the other waits for its emigrants."""
+    found, frozen = [], 0
+    for epoch in engine.run(posed, empty_archipelago(3, SEED), never):
+        found.append(exactly(epoch.archipelago))
+        if len(found) == 3:
+            frozen = min(eventually(actors))
+            os.kill(frozen, signal.SIGSTOP)
+            began = time.monotonic()
+    assert found == undisturbed
+    # Less than a minute also on a busy machine: without a deadline, it would last until Ray gives up.
+    assert time.monotonic() - began < 60.0
+    assert any("did not answer" in message for message in messages)
+    eventually(lambda: not alive([frozen]))
 
 
 @pytest.mark.nightly

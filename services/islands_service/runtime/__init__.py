@@ -18,3 +18,5 @@ os.environ.setdefault("RAY_gcs_rpc_server_reconnect_timeout_s", "5")
 os.environ.setdefault("RAY_DEDUP_LOGS_SKIP_REGEX", ".")
 # Ray's default of 15 leaves islands three per cent of a core that other programs use as well.
 os.environ.setdefault("RAY_worker_niceness", "0")
+# A frozen process keeps its CPU until Ray kills it, by default after five seconds.
+os.environ.setdefault("RAY_kill_worker_timeout_milliseconds", "500")

@@ -107,6 +107,19 @@ class IslandActorPool:
                 slot = sorted(regular)[island % len(regular)]
         return self._members[slot][0]
 
+    def replace(self, actor: ActorHandle, reason: str) -> None:
+        """Kill an actor that does not answer; the next `maintain` starts another one in its slot.
+
+        Parameters
+        ----------
+        reason : str
+            Beginning of the message to the user: what happened to the actor.
+        """
+        for slot, (member, _) in list(self._members.items()):
+            if member == actor:
+                del self._members[slot]
+                self._handle_loss(slot, actor, reason)
+
     def reset_losses(self) -> None:
         """Reset the count of losses, since an epoch was completed in spite of them."""
         self._losses = 0
@@ -159,7 +172,7 @@ class IslandActorPool:
                 self._joining[slot] = (actor, actor.prepare.remote())
         self._report_waiting(now)
 
-    def _handle_loss(self, slot: int, actor: ActorHandle) -> None:
+    def _handle_loss(self, slot: int, actor: ActorHandle, reason: str = "an actor was lost") -> None:
         # The actor may only be unreachable; kill it so that its replacement gets the CPU.
         ray.kill(actor)
         self._vacant |= {slot} - {STANDBY}
@@ -169,7 +182,7 @@ class IslandActorPool:
                 f"{self._losses} actors were lost and no epoch was completed: is there enough memory for "
                 "them? Take fewer islands, or a larger machine"
             )
-        self._report("an actor was lost: its islands continue from their last epoch")
+        self._report(f"{reason}: its islands continue from their last epoch")
 
     def _report_waiting(self, now: float) -> None:
         waiting = sum(slot != STANDBY for slot in self._joining)

@@ -5,6 +5,7 @@ Islands are passed and returned by value, so that the loss of an actor costs onl
 
 from importlib.metadata import version
 from threading import Event
+from time import monotonic
 
 import ray
 
@@ -47,11 +48,12 @@ class IslandActor:
     @ray.method(num_returns=2)
     def advance(self, before: PackedEpoch, *arriving: bytes) -> tuple[PackedEpoch, bytes]:
         """Run an island from its last stop to the next one; return the packed epoch and its emigrants."""
+        began = monotonic()
         immigrants = [unpack_emigrants(packed, self._primitives) for packed in arriving]
         # A search that ends kills its actors, so no stop function is needed.
         epoch = run_epoch(self._island(before), immigrants, self._evaluator, self._problem, lambda: False)
         assert epoch is not None
-        report = pack_epoch(epoch, self._name, self._evaluator.memory)
+        report = pack_epoch(epoch, self._name, self._evaluator.memory, monotonic() - began)
         self._islands[report.index] = report.packed, epoch.island
         return report, report.emigrants
 

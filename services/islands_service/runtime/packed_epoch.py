@@ -38,6 +38,8 @@ class PackedEpoch:
         Id of the actor that ran the epoch.
     caches : mapping
         Memory of the caches of this actor.
+    seconds : float
+        Time that the actor took.
     """
 
     index: int
@@ -46,12 +48,15 @@ class PackedEpoch:
     steps: tuple[StepInfo, ...]
     actor: str = ""
     caches: Caches = field(default_factory=dict)
+    seconds: float = 0.0
 
 
-def pack_epoch(epoch: IslandEpoch, actor: str = "", caches: Caches | None = None) -> PackedEpoch:
+def pack_epoch(
+    epoch: IslandEpoch, actor: str = "", caches: Caches | None = None, seconds: float = 0.0
+) -> PackedEpoch:
     """Pickle the island and the emigrants of an epoch and keep the rest."""
     packed, emigrants = _pack(epoch.island), _pack(epoch.emigrants)
-    return PackedEpoch(epoch.island.index, packed, emigrants, epoch.steps, actor, caches or {})
+    return PackedEpoch(epoch.island.index, packed, emigrants, epoch.steps, actor, caches or {}, seconds)
 
 
 def unpack_island(packed: bytes, primitives: Mapping[str, Primitive]) -> Island:

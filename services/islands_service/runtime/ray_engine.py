@@ -1,9 +1,10 @@
 """Search engine on Ray: submits epochs of islands to actors and repeats those that are lost."""
 
 from collections.abc import Generator, Mapping
-from time import sleep
+from time import monotonic, sleep
 
 import ray
+from ray.actor import ActorHandle
 from ray.exceptions import RayError, RayTaskError
 
 from islands.evolution.archipelago import Archipelago
@@ -13,6 +14,7 @@ from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.model.expression import Primitive
 from islands_service.runtime.actor_pool import IslandActorPool
 from islands_service.runtime.cluster import LOSS_ERRORS
+from islands_service.runtime.epoch_deadline import EpochDeadlines
 from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
 from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.packed_epoch import PackedEpoch, PackedIslands, pack_epoch
@@ -45,7 +47,8 @@ class RayEngine:
             return
         pool = IslandActorPool(problem, len(start.islands), self._progress, self._title)
         try:
-            yield from _run_epochs(scheduler, pool, problem.settings.primitive_table, stop)
+            deadlines = EpochDeadlines(len(start.islands), problem.settings.population)
+            yield from _run_epochs(scheduler, pool, deadlines, problem.settings.primitive_table, stop)
         except RayError as error:
             raise ClusterError(f"Ray failed, and the search cannot continue: {error}") from error
         finally:
@@ -55,10 +58,11 @@ class RayEngine:
 def _run_epochs(
     scheduler: EpochScheduler[PackedEpoch],
     pool: IslandActorPool,
+    deadlines: EpochDeadlines,
     primitives: Mapping[str, Primitive],
     stop: Stop,
 ) -> Generator[ArchipelagoEpoch]:
-    in_flight = _InFlight(scheduler, pool)
+    in_flight = _InFlight(scheduler, pool, deadlines)
     while not (scheduler.finished or stop()):
         if pool.maintain():
             in_flight.submit()
@@ -67,6 +71,7 @@ def _run_epochs(
             if stop():
                 return
             pool.reset_losses()
+            deadlines.reset()
             in_flight.drop_old_references()
             yield ArchipelagoEpoch(
                 Archipelago(PackedIslands(reports, primitives)),
@@ -78,10 +83,14 @@ def _run_epochs(
 class _InFlight:
     """Submitted tasks, and references to values that actors hold or will compute."""
 
-    def __init__(self, scheduler: EpochScheduler[PackedEpoch], pool: IslandActorPool) -> None:
-        self._scheduler, self._pool = scheduler, pool
+    def __init__(
+        self, scheduler: EpochScheduler[PackedEpoch], pool: IslandActorPool, deadlines: EpochDeadlines
+    ) -> None:
+        self._scheduler, self._pool, self._deadlines = scheduler, pool, deadlines
         self._references: dict[tuple[int, int], References] = {}
-        self._pending: dict[ray.ObjectRef[PackedEpoch], EpochTask] = {}
+        # In the order of submission, in which each actor runs its tasks.
+        self._pending: dict[ray.ObjectRef[PackedEpoch], tuple[EpochTask, ActorHandle]] = {}
+        self._checked_at = monotonic()
         self._caches: dict[str, Caches] = {}
 
     @property
@@ -103,9 +112,10 @@ class _InFlight:
             arriving = [
                 self._get_references(source, task.begin)[1] for source in self._scheduler.sources[task.island]
             ]
-            report, leaving = self._pool.actor_for(task.island).advance.remote(before, *arriving)
+            actor = self._pool.actor_for(task.island)
+            report, leaving = actor.advance.remote(before, *arriving)
             self._references[task.island, task.end] = report, leaving
-            self._pending[report] = task
+            self._pending[report] = task, actor
 
     def _get_references(self, island: int, generation: int) -> References:
         key = island, generation
@@ -121,11 +131,35 @@ class _InFlight:
             return
         ray.wait(list(self._pending), num_returns=1, timeout=_POLL_SECONDS)
         ready, _ = ray.wait(list(self._pending), num_returns=len(self._pending), timeout=0)
-        lost = [
-            task for reference in ready if not self._collect(task := self._pending.pop(reference), reference)
-        ]
+        done = {reference: self._pending.pop(reference)[0] for reference in ready}
+        lost = [task for reference, task in done.items() if not self._collect(task, reference)]
+        if (now := monotonic()) - self._checked_at > _POLL_SECONDS:
+            self._checked_at = now
+            lost += self._replace_frozen(now)
         if lost:
             self._reschedule(lost)
+
+    def _replace_frozen(self, now: float) -> list[EpochTask]:
+        """Kill the actors whose deadline has passed; return their tasks."""
+        first: dict[ActorHandle, EpochTask] = {}
+        for task, actor in self._pending.values():
+            first.setdefault(actor, task)
+        computing = {actor: task for actor, task in first.items() if self._is_computable(task)}
+        frozen = {actor: computing[actor] for actor in self._deadlines.find_frozen(now, computing)}
+        for actor, task in frozen.items():
+            seconds = self._deadlines.seconds_allowed(task)
+            self._pool.replace(actor, f"an actor did not answer for {seconds:.0f} s and was replaced")
+        queues = {reference: task for reference, (task, actor) in self._pending.items() if actor in frozen}
+        for reference in queues:
+            del self._pending[reference]
+        return list(queues.values())
+
+    def _is_computable(self, task: EpochTask) -> bool:
+        """Return whether the results that a task needs are known."""
+        return all(
+            task.begin in self._scheduler.known[island]
+            for island in (task.island, *self._scheduler.sources[task.island])
+        )
 
     def drop_old_references(self) -> None:
         """Drop object references older than the last complete epoch."""
@@ -141,18 +175,20 @@ class _InFlight:
         except RayTaskError as error:
             raise error.cause from error
         self._caches[report.actor] = report.caches
+        self._deadlines.record(task, report.seconds)
         self._scheduler.complete(task, report)
         return True
 
     def _reschedule(self, tasks: list[EpochTask]) -> None:
         """Discard lost tasks and the later tasks of their islands."""
+        self._deadlines.extend()
         first: dict[int, int] = {}
         for task in tasks:
             self._scheduler.reschedule(task)
             first[task.island] = min(task.end, first.get(task.island, task.end))
         self._pending = {
-            reference: task
-            for reference, task in self._pending.items()
+            reference: (task, actor)
+            for reference, (task, actor) in self._pending.items()
             if task.end <= first.get(task.island, task.end)
         }
         # Objects with known values may have been lost with their machine: put those values again.
