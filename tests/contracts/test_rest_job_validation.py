@@ -1,10 +1,10 @@
 """Validation of identification jobs over REST against the columns, rows and times of a real record."""
 
-import asyncio
 from dataclasses import replace
 
 import pytest
 
+from islands_api.web.uploads.owner_slots import OwnerSlots
 from support.service import csv, emptied, npz, problem_of, spec
 
 #: Unusual column names that a text table can have.
@@ -123,7 +123,7 @@ def test_a_replayed_job_is_not_inspected_again(service, dataset):
     """An inspection may take two minutes; a client that lost the response repeats its request earlier."""
     order, state = spec(dataset, rows="0:100"), service.app.state.islands
     first = service.submit({"Idempotency-Key": "inspected"}, **order)
-    service.app.state.islands = replace(state, inspection_slots=asyncio.Semaphore(0))
+    service.app.state.islands = replace(state, inspection_slots=OwnerSlots(0, 0))
     try:
         again = service.client.post(
             "/v1/jobs", json=order, headers={"Idempotency-Key": "inspected"}, timeout=3.0

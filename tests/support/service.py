@@ -56,8 +56,16 @@ class Service:
     def port(self) -> int:
         return int(self.url.rpartition(":")[2])
 
-    def upload(self, content: bytes, name: str = "record.csv", /, **form: Any) -> httpx.Response:
-        return self.client.post("/v1/datasets", files={"file": (name, content)}, data=form)
+    def upload(
+        self,
+        content: bytes,
+        name: str = "record.csv",
+        headers: dict[str, str] | None = None,
+        /,
+        **form: Any,
+    ) -> httpx.Response:
+        files = {"file": (name, content)}
+        return self.client.post("/v1/datasets", files=files, data=form, headers=headers)
 
     def submit(self, headers: dict[str, str] | None = None, /, **spec: Any) -> httpx.Response:
         return self.client.post("/v1/jobs", json=spec, headers=headers)

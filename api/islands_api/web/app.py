@@ -12,13 +12,19 @@ from starlette.middleware.gzip import GZipMiddleware
 from islands_api.web import exception_handlers
 from islands_api.web.auth import KeyCache
 from islands_api.web.concurrency import BlockingExecutor
-from islands_api.web.dependencies import MAX_CONCURRENT_DRAWINGS, MAX_CONCURRENT_INSPECTIONS, AppState
+from islands_api.web.dependencies import (
+    MAX_CONCURRENT_DRAWINGS,
+    MAX_CONCURRENT_INSPECTIONS,
+    MAX_INSPECTIONS_PER_OWNER,
+    AppState,
+)
 from islands_api.web.event_hub import JobEventHub
 from islands_api.web.middleware import BodyLimit, RequestLogging, SameOrigin
 from islands_api.web.problems import ProblemDocument
 from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.rate_limit import RateLimiter
 from islands_api.web.routes import ROUTERS
+from islands_api.web.uploads.owner_slots import OwnerSlots
 from islands_service.liveness import EVERY, send_heartbeat
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -59,8 +65,8 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             hub,
             RateLimiter(settings.rate, settings.burst),
             ServiceMetrics(opened),
-            asyncio.Semaphore(MAX_CONCURRENT_INSPECTIONS),
-            asyncio.Semaphore(MAX_CONCURRENT_DRAWINGS),
+            OwnerSlots(MAX_CONCURRENT_INSPECTIONS, MAX_INSPECTIONS_PER_OWNER),
+            OwnerSlots(MAX_CONCURRENT_DRAWINGS, MAX_CONCURRENT_DRAWINGS),
             executor,
         )
         app.state.keys = KeyCache(state)

@@ -1,6 +1,5 @@
 """State shared by the routes of one application, and the dependency that injects it."""
 
-import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, ParamSpec, TypeVar
@@ -11,6 +10,7 @@ from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.event_hub import JobEventHub
 from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.rate_limit import RateLimiter
+from islands_api.web.uploads.owner_slots import OwnerSlots
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -20,6 +20,9 @@ T = TypeVar("T")
 
 #: Maximum number of uploads that are inspected at once; each takes a core.
 MAX_CONCURRENT_INSPECTIONS = 2
+
+#: Maximum number of uploads of one owner that are inspected at once: an inspection may take two minutes.
+MAX_INSPECTIONS_PER_OWNER = 1
 
 #: Maximum number of figure processes at once; each takes a core.
 MAX_CONCURRENT_DRAWINGS = 1
@@ -35,8 +38,8 @@ class AppState:
     hub: JobEventHub
     rate_limiter: RateLimiter
     metrics: ServiceMetrics
-    inspection_slots: asyncio.Semaphore
-    figure_slots: asyncio.Semaphore
+    inspection_slots: OwnerSlots
+    figure_slots: OwnerSlots
     executor: BlockingExecutor
 
     async def run_blocking(self, operation: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:

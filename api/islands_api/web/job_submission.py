@@ -76,7 +76,7 @@ async def _validate_and_store(state: AppState, request: Request, submission: Sub
         return replayed, False
     for inspection in inspections:
         with link_blob(state.blobs.path(inspection.dataset.blob), inspection.dataset.name) as path:
-            async with state.inspection_slots:
+            async with state.inspection_slots.hold(submission.owner):
                 await inspect_file(
                     path,
                     inspection.request,

@@ -18,7 +18,7 @@ from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import Cursor, FormRoute, Limit, decode_cursor, encode_cursor
 from islands_api.web.responses import JSONDocument, dataset_document
-from islands_api.web.uploads import parse_file_name, receive
+from islands_api.web.uploads.uploaded_file import parse_file_name, receive
 from islands_service.domain.job_spec import Name
 from islands_service.intake.file_inspection import InspectionRequest, inspect_file
 from islands_service.intake.job_inputs import link_blob
@@ -123,7 +123,7 @@ async def _store_upload(
     settings = state.settings
     with state.blobs.receiving() as stream:
         # Limit the number of uploads in progress: a small file may decompress to a thousand times its size.
-        async with state.inspection_slots:
+        async with state.inspection_slots.hold(owner):
             size, blob = await state.run_blocking(
                 receive, file.file, stream, name, compressed, settings.max_unpacked
             )

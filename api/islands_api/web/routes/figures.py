@@ -185,7 +185,7 @@ async def _figure_response(
 ) -> Response:
     blob = await state.run_blocking(state.store.results.artefact, job, name)
     if blob is None:
-        async with state.figure_slots:
+        async with state.figure_slots.hold(caller.owner):
             # Another request may have drawn the figure in the meantime.
             blob = await state.run_blocking(state.store.results.artefact, job, name)
             if blob is None:

@@ -9,7 +9,7 @@ import pytest
 
 from islands.errors import RecordError
 from islands_api.web.problems import PayloadTooLargeError
-from islands_api.web.uploads import MAX_NAME_BYTES, parse_file_name, receive
+from islands_api.web.uploads.uploaded_file import MAX_NAME_BYTES, parse_file_name, receive
 
 #: File names of clients, and the names that are stored.
 NAMES = {
