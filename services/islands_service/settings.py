@@ -1,11 +1,12 @@
 """Settings of the service, read from environment variables. Each field is ``ISLANDS_`` and its name."""
 
 import os
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated, Literal
 
 from platformdirs import user_data_path
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from islands.errors import SettingsError
@@ -15,6 +16,18 @@ LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 Positive = Annotated[float, Field(gt=0.0)]
 Count = Annotated[int, Field(ge=1)]
+
+
+def _check_networks(text: str) -> str:
+    networks = [network.strip() for network in text.split(",") if network.strip()]
+    for network in networks:
+        try:
+            ip_network(network)
+        except ValueError as error:
+            raise ValueError(
+                f"{error}: give addresses or networks, for example 127.0.0.1, 10.0.0.0/8"
+            ) from error
+    return ",".join(networks)
 
 
 class ServiceSettings(BaseSettings):
@@ -28,6 +41,12 @@ class ServiceSettings(BaseSettings):
         ``postgresql+psycopg://USER:PASSWORD@HOST/NAME``; by default SQLite in the data folder.
     host, port
         Address that the service listens on.
+    trusted_proxies
+        Addresses and networks of reverse proxies, separated by commas, whose headers ``X-Forwarded-For`` and
+        ``X-Forwarded-Proto`` are believed: ``127.0.0.1, 10.0.0.0/8``. None by default.
+    root_path
+        Path under which a proxy offers the service, for example ``/islands``; it precedes the path of every
+        ``Location``.
     ray_address
         ``HOST:PORT`` of a Ray cluster; by default a Ray head is started on this machine.
     coordinators
@@ -72,6 +91,8 @@ class ServiceSettings(BaseSettings):
     database: str = ""
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
+    trusted_proxies: Annotated[str, AfterValidator(_check_networks)] = ""
+    root_path: Annotated[str, Field(pattern=r"^(/[A-Za-z0-9._~-]+)*$")] = ""
     ray_address: str | None = None
     coordinators: Annotated[int, Field(ge=0, le=64)] = 1
     lease: Annotated[float, Field(ge=1.0)] = 5.0

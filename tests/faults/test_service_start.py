@@ -9,7 +9,8 @@ from threading import Timer
 import pytest
 import trustme
 
-from islands_api.__main__ import main, open_listener
+from islands_api.__main__ import main
+from islands_api.server.listener import open_listener
 from islands_service.supervisor import MISCONFIGURED
 from support.command_line import succeed
 from support.processes import eventually, kill

@@ -22,6 +22,8 @@ from fastapi import FastAPI
 from sqlalchemy import Connection
 
 from islands.io.records import write_record
+from islands_api.server.http_server import HTTPServer, make_server_config
+from islands_api.server.listener import open_listener
 from islands_api.web.app import create_app
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import Job, Submission
@@ -85,13 +87,13 @@ def served(folder: Path, /, **changes: Any) -> Iterator[Service]:
     app = create_app(settings, store)
     with (
         structlog.testing.capture_logs([structlog.contextvars.merge_contextvars]) as logs,
-        listening(app) as url,
+        listening(app, settings) as url,
         httpx.Client(base_url=url, timeout=PATIENCE, verify=False) as client,
     ):
         yield Service(url, client, app, store, settings, logs)
 
 
-class _Server(uvicorn.Server):
+class _Server(HTTPServer):
     """Server with an event that is set when it listens."""
 
     def __init__(self, config: uvicorn.Config) -> None:
@@ -106,24 +108,16 @@ class _Server(uvicorn.Server):
 
 
 @contextmanager
-def listening(app: FastAPI, **options: Any) -> Iterator[str]:
-    """Serve an application and yield its URL; the options are those of uvicorn."""
-    config = uvicorn.Config(
-        app,
-        port=0,
-        log_level="critical",
-        access_log=False,
-        timeout_graceful_shutdown=1,
-        server_header=False,
-        **options,
-    )
-    server = _Server(config)
-    thread = threading.Thread(target=server.run)
+def listening(app: FastAPI, settings: ServiceSettings) -> Iterator[str]:
+    """Serve an application as in production, on a free port, and yield its URL."""
+    server = _Server(make_server_config(app, settings))
+    listener = open_listener("127.0.0.1", 0)
+    thread = threading.Thread(target=server.run, args=([listener],))
     thread.start()
     try:
         assert server.listens.wait(PATIENCE)
         assert server.started, "the server does not start"
-        yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}"
     finally:
         server.should_exit = True
         thread.join()

@@ -17,14 +17,17 @@ from islands_api.web.problems import (
     MEDIA_TYPE,
     PROBLEMS,
     AuthenticationError,
+    HeadersTooLargeError,
     MalformedBodyError,
     MethodNotAllowedError,
     PayloadTooLargeError,
     ProblemKind,
     RateLimitError,
+    RequestTimeoutError,
     ResourceNotFoundError,
     UnsupportedMediaTypeError,
     lookup_problem,
+    problem_document,
 )
 from islands_service.domain.job import QuotaError
 from islands_service.store.blobs import BlobNotFoundError
@@ -41,6 +44,8 @@ _FRAMEWORK_PROBLEMS = {
         MethodNotAllowedError,
         UnsupportedMediaTypeError,
         PayloadTooLargeError,
+        RequestTimeoutError,
+        HeadersTooLargeError,
     )
 }
 
@@ -62,13 +67,7 @@ def problem_response(
     headers: Mapping[str, str] | None = None,
 ) -> JSONResponse:
     """Return a problem document as a response."""
-    document = {
-        "type": f"/problems/{problem.type}",
-        "title": problem.title,
-        "status": int(problem.status),
-        "detail": detail,
-        "request_id": request.scope.get("state", {}).get("request_id"),
-    }
+    document = problem_document(problem, detail, request.scope.get("state", {}).get("request_id"))
     if errors is not None:
         document["errors"] = errors
     headers = dict(headers or {})
@@ -153,11 +152,14 @@ async def _handle_http_exception(request: Request, error: Exception) -> JSONResp
 def _allowed_methods(request: Request) -> list[str]:
     """Return the methods of all routes of a path; the framework returns those of the first one only."""
     routes = request.app.router.routes
-    return [
+    allowed = {
         method
         for method in METHODS
         if any(route.matches({**request.scope, "method": method})[0] == Match.FULL for route in routes)
-    ]
+    }
+    if "GET" in allowed:
+        allowed.add("HEAD")
+    return [method for method in METHODS if method in allowed]
 
 
 def internal_error(request: Request, error: Exception) -> JSONResponse:

@@ -64,6 +64,20 @@ class UnsupportedMediaTypeError(HTTPException):
         super().__init__(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, message)
 
 
+class RequestTimeoutError(HTTPException):
+    """The client has not sent the whole request in time."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(HTTPStatus.REQUEST_TIMEOUT, message)
+
+
+class HeadersTooLargeError(HTTPException):
+    """The headers of the request have more bytes than this service accepts."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, message)
+
+
 class MethodNotAllowedError(HTTPException):
     """The path does not accept the method; the header Allow lists the methods that it accepts."""
 
@@ -74,6 +88,10 @@ class CrossOriginError(IslandsError):
 
 class ResourceNotFoundError(IslandsError):
     """There is no such model, figure or result."""
+
+
+class NotReadyError(IslandsError):
+    """The service cannot accept jobs now."""
 
 
 class ResultNotReadyError(IslandsError):
@@ -118,6 +136,12 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         ),
         ResourceNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "not-found", "There is no such resource"),
         MalformedBodyError: ProblemKind(HTTPStatus.BAD_REQUEST, "bad-request", "The request cannot be read"),
+        RequestTimeoutError: ProblemKind(
+            HTTPStatus.REQUEST_TIMEOUT, "request-timeout", "The request was not complete in time"
+        ),
+        HeadersTooLargeError: ProblemKind(
+            HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, "headers-too-large", "The headers are too large"
+        ),
         MethodNotAllowedError: ProblemKind(
             HTTPStatus.METHOD_NOT_ALLOWED, "method-not-allowed", "The method is not allowed here"
         ),
@@ -138,6 +162,7 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         StoreUnavailableError: ProblemKind(
             HTTPStatus.SERVICE_UNAVAILABLE, "store-unavailable", "The database does not answer"
         ),
+        NotReadyError: ProblemKind(HTTPStatus.SERVICE_UNAVAILABLE, "not-ready", "The service is not ready"),
         CommitUnknownError: ProblemKind(
             HTTPStatus.GATEWAY_TIMEOUT, "store-in-doubt", "The outcome of the write is unknown"
         ),
@@ -188,6 +213,17 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}},
     }
 }
+
+
+def problem_document(problem: ProblemKind, detail: str, request_id: str | None) -> dict[str, Any]:
+    """Return the body of an error response, with the fields of `ProblemDocument`."""
+    return {
+        "type": f"/problems/{problem.type}",
+        "title": problem.title,
+        "status": int(problem.status),
+        "detail": detail,
+        "request_id": request_id,
+    }
 
 
 def lookup_problem(error: Exception) -> ProblemKind:

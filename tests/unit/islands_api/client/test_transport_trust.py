@@ -44,9 +44,10 @@ def secure(
     issued.private_key_pem.write_to_path(folder / "key.pem")
     for each in issued.cert_chain_pems:
         each.write_to_path(folder / "cert.pem", append=True)
-    certificate = {"ssl_certfile": folder / "cert.pem", "ssl_keyfile": folder / "key.pem"}
+    certificate = {"tls_certificate": folder / "cert.pem", "tls_key": folder / "key.pem"}
     settings = ServiceSettings(data_dir=Path(shutil.copyfile(prepared_sqlite, folder / "islands.db")).parent)
-    with listening(create_app(settings, Store(settings.url)), **certificate) as url:
+    settings = settings.model_copy(update=certificate)
+    with listening(create_app(settings, Store(settings.url)), settings) as url:
         yield int(url.rpartition(":")[2])
 
 

@@ -1,0 +1,1 @@
+"""HTTP server: listening socket, HTTP protocol and uvicorn's configuration. Read `http_server` first."""
