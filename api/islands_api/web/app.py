@@ -19,7 +19,7 @@ from islands_api.web.dependencies import (
     AppState,
 )
 from islands_api.web.event_hub import JobEventHub
-from islands_api.web.middleware import BodyLimit, RequestLogging, SameOrigin
+from islands_api.web.middleware import BodyLimit, HeadRequests, RequestLogging, RootPath, SameOrigin
 from islands_api.web.problems import ProblemDocument
 from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.rate_limit import RateLimiter
@@ -100,7 +100,10 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     app.add_middleware(GZipMiddleware, minimum_size=_GZIP_MIN_BYTES, compresslevel=5)
     app.add_middleware(BodyLimit, settings=settings)
     app.add_middleware(SameOrigin, settings=settings)
+    app.add_middleware(HeadRequests)
     app.add_middleware(RequestLogging)
+    if settings.root_path:
+        app.add_middleware(RootPath, root_path=settings.root_path)
     _install_tracing(app, traces)
     _install_openapi(app)
     return app

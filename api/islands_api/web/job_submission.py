@@ -59,7 +59,11 @@ async def submit_job(
     job, new = await _validate_and_store(state, request, submission)
     if new:
         state.metrics.accepted.inc()
-    headers = {"Location": f"{JOBS_PATH}/{job.id}", "ETag": etag(job), "Retry-After": "1"}
+    headers = {
+        "Location": f"{state.settings.root_path}{JOBS_PATH}/{job.id}",
+        "ETag": etag(job),
+        "Retry-After": "1",
+    }
     if not new:
         headers["Idempotent-Replayed"] = "true"
     return JSONDocument(job_document(job), 202, headers)

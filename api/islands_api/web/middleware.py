@@ -1,5 +1,7 @@
-"""Middleware: request id, logging, latency, security headers, body limit and origin check."""
+"""Middleware: request id, logging, latency, security headers, body limit, origin check, prefix and HEAD."""
 
+import asyncio
+import re
 import secrets
 from time import perf_counter
 from typing import Any
@@ -35,6 +37,9 @@ SECURITY_HEADERS = {
     "frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
 }
 
+#: Ids of requests that are kept: UUIDs and ids of proxies, but nothing that could forge a line of the log.
+_REQUEST_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
+
 #: Header of responses over TLS: browsers use HTTPS for a year.
 _HSTS_HEADERS = {"Strict-Transport-Security": "max-age=31536000"}
 
@@ -55,10 +60,7 @@ class RequestLogging:
             return await self._app(scope, receive, send)
         start = perf_counter()
         given = Headers(scope=scope).get("x-request-id", "")
-        # Only short alphanumeric ids: the id is written to the log.
-        request_id = (
-            given if given.isascii() and given.isalnum() and len(given) <= 64 else secrets.token_hex(8)
-        )
+        request_id = given if _REQUEST_ID.fullmatch(given) else secrets.token_hex(8)
         scope.setdefault("state", {})["request_id"] = request_id
         security = {**SECURITY_HEADERS, **(_HSTS_HEADERS if scope["scheme"] == "https" else {})}
         started = False
@@ -111,7 +113,8 @@ class BodyLimit:
         """Handle a request."""
         if scope["type"] != "http":
             return await self._app(scope, receive, send)
-        max_bytes = self._max_upload_bytes if scope["path"] == UPLOAD_PATH else MAX_BODY_BYTES
+        path = scope["path"].removeprefix(scope.get("root_path", ""))
+        max_bytes = self._max_upload_bytes if path == UPLOAD_PATH else MAX_BODY_BYTES
         declared = Headers(scope=scope).get("content-length", "0")
         error = PayloadTooLargeError(f"the request has more than {max_bytes} bytes, the maximum of this path")
         if declared.isdecimal() and int(declared) > max_bytes:
@@ -135,11 +138,13 @@ class SameOrigin:
     """Middleware that rejects requests from pages of other sites and with foreign host names.
 
     A loopback address needs no key, so that any page in the user's browser could send requests: to the
-    address itself, or to a host name of the attacker that resolves to it (DNS rebinding).
+    address itself, or to a host name of the attacker that resolves to it (DNS rebinding). A page of another
+    site does not know the key of a service with keys. There ``Origin`` is not compared with ``Host``, which
+    behind a proxy may be the name of the upstream.
     """
 
     def __init__(self, app: ASGIApp, settings: ServiceSettings) -> None:
-        self._app, self._allowed_hosts = app, None if settings.keys_needed else LOOPBACK
+        self._app, self._keys_needed = app, settings.keys_needed
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handle a request."""
@@ -152,14 +157,63 @@ class SameOrigin:
 
     def _refusal(self, headers: Headers) -> str:
         host, origin = headers.get("host", ""), headers.get("origin")
-        if origin is not None and _get_url_part(origin, "netloc") != host:
+        if origin is not None and not self._is_same_origin(origin, host, headers.get("sec-fetch-site")):
             return f"the page at {origin} may not use this service: open the service's own page"
-        if (
-            self._allowed_hosts is not None
-            and _get_url_part(f"//{host}", "hostname") not in self._allowed_hosts
-        ):
-            return f"{host} is not a name of this service: without keys it accepts only loopback names"
+        if not self._keys_needed and _get_url_part(f"//{host}", "hostname") not in LOOPBACK:
+            return (
+                f"{host} is not a name of this service: without keys it accepts only loopback names; "
+                "behind a proxy start it with --require-keys"
+            )
         return ""
+
+    def _is_same_origin(self, origin: str, host: str, site: str | None) -> bool:
+        # Browsers send Sec-Fetch-Site to HTTPS and loopback addresses, and pages cannot set it.
+        if site is not None:
+            return site in ("same-origin", "none")
+        return self._keys_needed or _get_url_part(origin, "netloc") == host
+
+
+class RootPath:
+    """Middleware that accepts the path of a request with and without the prefix of a proxy.
+
+    Some proxies remove the prefix before they forward a request, and some do not.
+    """
+
+    def __init__(self, app: ASGIApp, root_path: str) -> None:
+        self._app, self._root_path = app, root_path
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handle a request."""
+        if scope["type"] == "http":
+            scope["root_path"] = self._root_path
+            if not f"{scope['path']}/".startswith(f"{self._root_path}/"):
+                scope["path"] = self._root_path + scope["path"]
+        return await self._app(scope, receive, send)
+
+
+class HeadRequests:
+    """Middleware that answers HEAD like GET, without a body. An endless response ends after its headers."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handle a request."""
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            return await self._app(scope, receive, send)
+        answered = asyncio.Event()
+
+        async def send_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                await send(message)
+                await send({"type": "http.response.body"})
+                answered.set()
+
+        async def receive_until_answered() -> Message:
+            await answered.wait()
+            return {"type": "http.disconnect"}
+
+        return await self._app({**scope, "method": "GET"}, receive_until_answered, send_headers)
 
 
 def _get_url_part(url: str, part: str) -> str:

@@ -104,6 +104,19 @@ class Blobs:
                 _sync(folder)
         return blob
 
+    def check_writable(self) -> None:
+        """Write a temporary file.
+
+        Raises
+        ------
+        StorageFullError
+        OSError
+            The folder cannot be written.
+        """
+        with self.receiving() as stream:
+            stream.write(bytes(4096))
+            stream.flush()
+
     def all(self) -> Iterator[tuple[str, Path]]:
         """Yield every blob with its path; files that are only partly written have an empty name."""
         for path in self._folder.glob(f"*{_PART}"):

@@ -46,6 +46,13 @@ def serve(
     require_keys: Annotated[
         bool | None, typer.Option("--require-keys", help="Require a key on this machine, too.")
     ] = None,
+    trusted_proxies: Annotated[
+        str | None,
+        typer.Option("--trusted-proxies", help="Addresses of proxies whose X-Forwarded-For is believed."),
+    ] = None,
+    root_path: Annotated[
+        str | None, typer.Option("--root-path", help="Path prefix of a proxy, for example /islands.")
+    ] = None,
     log_format: Annotated[str | None, typer.Option("--log-format", help="text or json.")] = None,
 ) -> None:
     """Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next start."""

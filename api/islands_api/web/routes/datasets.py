@@ -81,7 +81,7 @@ async def upload(
         InspectionRequest(tuple(inputs), output, dt, reading=_parse_reading(reading)),
     )
     state.metrics.received.inc(stored.bytes if new else 0)
-    headers = {"Location": f"{router.prefix}/{stored.id}"}
+    headers = {"Location": f"{state.settings.root_path}{router.prefix}/{stored.id}"}
     return JSONDocument(dataset_document(stored), 201 if new else 200, headers)
 
 

@@ -68,7 +68,8 @@ async def events(
             request.app.state.keys, caller, _stream(state, found, min(last_event_id, found.version))
         ),
         media_type="text/event-stream",
-        headers={"Cache-Control": "no-store"},
+        # nginx buffers responses unless this header forbids it.
+        headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
     )
 
 

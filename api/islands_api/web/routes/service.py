@@ -1,5 +1,7 @@
 """Service endpoints: liveness, readiness, metrics, and descriptions of problem types."""
 
+import asyncio
+from asyncio import Future
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Response
@@ -7,8 +9,11 @@ from prometheus_client import CONTENT_TYPE_LATEST
 
 from islands_api.schemas import Health
 from islands_api.web.auth import Operator
-from islands_api.web.dependencies import AppStateDep
-from islands_api.web.problems import PROBLEMS, RESPONSES, ResourceNotFoundError
+from islands_api.web.dependencies import AppState, AppStateDep
+from islands_api.web.problems import PROBLEMS, RESPONSES, NotReadyError, ResourceNotFoundError
+
+#: Seconds that the database and the disk have to answer a readiness check.
+_READY_SECONDS = 2.0
 
 router = APIRouter(tags=["service"], responses=RESPONSES)
 
@@ -21,9 +26,26 @@ async def healthz() -> Any:
 
 @router.get("/readyz", response_model=Health)
 async def readyz(state: AppStateDep) -> Any:
-    """Return 200 if the database answers, so that jobs are accepted. Ray may still be starting."""
-    await state.run_blocking(state.store.jobs.versions, [])
+    """Return 200 if the database answers and data can be written, so that jobs are accepted.
+
+    Ray may still be starting. If one of them hangs, the status is 503 after two seconds.
+    """
+    check = asyncio.ensure_future(state.run_blocking(_check_ready, state))
+    # The thread of a hanging check cannot be interrupted: leave it behind.
+    done, _ = await asyncio.wait({check}, timeout=_READY_SECONDS)
+    if not done:
+        check.add_done_callback(Future.exception)
+        raise NotReadyError(f"the database or the disk has not answered within {_READY_SECONDS:.0f} s")
+    await check
     return {"status": "ready"}
+
+
+def _check_ready(state: AppState) -> None:
+    state.store.jobs.versions([])
+    try:
+        state.blobs.check_writable()
+    except OSError as error:
+        raise NotReadyError(f"the data folder cannot be written: {error.strerror}") from error
 
 
 @router.get(

@@ -1,0 +1,167 @@
+"""REST interface behind proxies: origins, prefixes, client addresses, HEAD, readiness."""
+
+import errno
+import threading
+
+import pytest
+
+from islands.errors import SettingsError
+from islands_api.web.routes import service as routes
+from islands_service.settings import service_settings
+from support.service import csv, kept, problem_of, queued, spec
+
+#: Header of the proxy of another site or of the service's own page, as browsers send it.
+SITE = "Sec-Fetch-Site"
+
+
+@pytest.fixture(scope="module")
+def behind_proxy(serve):
+    """A service with keys that a proxy on this machine offers under a prefix."""
+    with serve(require_keys=True, root_path="/tools/islands", trusted_proxies="127.0.0.1") as running:
+        yield running
+
+
+def test_the_default_of_a_proxy_that_changes_the_host_is_accepted(behind_proxy):
+    """By default nginx sends the name of the upstream as Host, and passes Origin on."""
+    headers = {**behind_proxy.key(), "Origin": "https://islands.example.org"}
+    order = spec(kept(behind_proxy.store, behind_proxy.store.keys.all()[0].owner))
+    assert behind_proxy.submit(headers, **order).status_code == 202
+    assert behind_proxy.submit({**headers, SITE: "same-origin"}, **order).status_code == 202
+    for site in ("cross-site", "same-site"):
+        problem_of(behind_proxy.submit({**headers, SITE: site}, **order), 403, "cross-origin")
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site", "same-origin"])
+def test_a_service_without_keys_believes_the_browser_about_the_site(service, site):
+    """A proxy on another port of this machine changes the host, and the browser knows it better."""
+    headers = {"Origin": "http://127.0.0.1:1", SITE: site}
+    answer = service.submit(headers, **spec(kept(service.store)))
+    assert answer.status_code == (202 if site == "same-origin" else 403)
+    rebound = {"Origin": "http://evil.example", "Host": "evil.example", SITE: "same-origin"}
+    assert "--require-keys" in problem_of(
+        service.client.get("/v1/jobs", headers=rebound), 403, "cross-origin"
+    )
+
+
+@pytest.mark.parametrize("prefix", ["", "/tools/islands"])
+def test_a_location_has_the_prefix_of_the_proxy(behind_proxy, prefix, monkeypatch):
+    """Some proxies remove the prefix from the path, and some do not."""
+    monkeypatch.setattr("islands_api.web.middleware.MAX_BODY_BYTES", 1000)  # less than the upload
+    headers = behind_proxy.key()
+    answer = behind_proxy.client.post(
+        f"{prefix}/v1/datasets", files={"file": ("record.csv", csv())}, headers=headers
+    )
+    assert answer.status_code in (200, 201), answer.text
+    dataset = answer.json()["id"]
+    assert answer.headers["location"] == f"/tools/islands/v1/datasets/{dataset}"
+    answer = behind_proxy.client.post(f"{prefix}/v1/jobs", json=spec(dataset), headers=headers)
+    assert answer.headers["location"] == f"/tools/islands/v1/jobs/{answer.json()['id']}"
+    assert behind_proxy.client.get(answer.headers["location"], headers=headers).status_code == 200
+    assert behind_proxy.client.get("/openapi.json").json()["servers"] == [{"url": "/tools/islands"}]
+
+
+def test_only_a_trusted_proxy_names_the_address_of_a_client(serve):
+    """Otherwise a client would escape the rate limit of its address with a new address in each request."""
+    wrong = {"Authorization": "Bearer islands_wrong"}
+    for proxies, expected in (("", {401, 429}), ("192.0.2.0/24", {401, 429}), ("127.0.0.0/8, ::1", {401})):
+        with serve(require_keys=True, trusted_proxies=proxies, rate=0.1, burst=20) as running:
+            answers = [
+                running.client.get("/v1/jobs", headers={**wrong, "X-Forwarded-For": f"203.0.113.{number}"})
+                for number in range(6)
+            ]
+            assert {answer.status_code for answer in answers} == expected
+
+
+def test_the_last_untrusted_address_is_that_of_the_client(serve):
+    """A client may send X-Forwarded-For itself: the proxy appends the address that it sees."""
+    with serve(require_keys=True, trusted_proxies="127.0.0.1", rate=0.1, burst=20) as running:
+        answers = [
+            running.client.get(
+                "/v1/jobs",
+                headers={"Authorization": "Bearer x", "X-Forwarded-For": f"203.0.113.{number}, 198.51.100.7"},
+            )
+            for number in range(6)
+        ]
+    assert {answer.status_code for answer in answers} == {401, 429}
+
+
+def test_https_at_the_proxy_is_https_for_the_headers(behind_proxy):
+    headers = {"X-Forwarded-Proto": "https"}
+    assert "strict-transport-security" in behind_proxy.client.get("/healthz", headers=headers).headers
+
+
+@pytest.mark.parametrize("value", ["localhost", "10.0.0.1/8", "*", "10.0.0.0/33"])
+def test_a_proxy_that_is_no_network_is_refused(value):
+    with pytest.raises(SettingsError, match=r"ISLANDS_TRUSTED_PROXIES.*give addresses or networks"):
+        service_settings(trusted_proxies=value)
+
+
+@pytest.mark.parametrize("value", ["islands", "/islands/", "/", "//evil", "/a b"])
+def test_a_root_path_that_is_no_path_is_refused(value):
+    with pytest.raises(SettingsError, match="ISLANDS_ROOT_PATH"):
+        service_settings(root_path=value)
+
+
+def test_event_streams_forbid_buffering(service):
+    job = queued(service.store)
+    with service.client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
+        assert answer.headers["x-accel-buffering"] == "no"
+        assert answer.headers["cache-control"] == "no-store"
+
+
+@pytest.mark.parametrize("path", ["/", "/healthz", "/v1/jobs", "/v1/jobs/{job}", "/openapi.json", "/nothing"])
+def test_head_has_the_headers_of_get_and_no_body(service, path):
+    path = path.format(job=queued(service.store).id)
+    got, head = service.client.get(path), service.client.head(path)
+    assert head.status_code == got.status_code
+    assert head.content == b""
+    varying = {"x-request-id", "date"}
+    assert {name: value for name, value in head.headers.items() if name not in varying} == {
+        name: value for name, value in got.headers.items() if name not in varying
+    }
+    assert service.client.get("/healthz").status_code == 200  # the connection is still usable
+
+
+def test_head_of_a_stream_ends_after_the_headers(service):
+    answer = service.client.head(f"/v1/jobs/{queued(service.store).id}/events", timeout=5.0)
+    assert answer.status_code == 200
+    assert answer.headers["content-type"].startswith("text/event-stream")
+
+
+def test_head_is_allowed_wherever_get_is(service):
+    assert service.client.patch("/v1/jobs").headers["allow"] == "GET, HEAD, POST"
+    answer = service.client.head("/v1/jobs/x/cancel")
+    assert (answer.status_code, answer.headers["allow"]) == (405, "POST")
+
+
+@pytest.mark.parametrize("failure", [errno.EROFS, errno.EACCES, errno.ENOENT])
+def test_a_service_that_cannot_write_is_not_ready(service, monkeypatch, failure):
+    def refuse(*_, **__):
+        raise OSError(failure, "it is read-only", "/srv/secret")
+
+    monkeypatch.setattr("tempfile.NamedTemporaryFile", refuse)
+    answer = service.client.get("/readyz")
+    assert "the data folder cannot be written: it is read-only" in problem_of(answer, 503, "not-ready")
+    assert "/srv" not in answer.text
+
+
+def test_a_full_disk_is_not_ready(service, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(errno.ENOSPC, "no space left")
+
+    monkeypatch.setattr("tempfile.NamedTemporaryFile", refuse)
+    problem_of(service.client.get("/readyz"), 507, "storage-full")
+
+
+def test_a_database_that_hangs_is_not_ready_within_the_deadline(service, monkeypatch):
+    released = threading.Event()
+    monkeypatch.setattr(routes, "_READY_SECONDS", 0.1)
+    monkeypatch.setattr(service.store.jobs, "versions", lambda _: released.wait(20.0))
+    try:
+        for _ in range(3):
+            answer = service.client.get("/readyz", timeout=5.0)
+            assert "has not answered within" in problem_of(answer, 503, "not-ready")
+            assert answer.headers["retry-after"] == "1"
+        assert service.client.get("/healthz").status_code == 200
+    finally:
+        released.set()
