@@ -96,6 +96,7 @@ class RequestLogging:
         if route not in ("/healthz", "/readyz", "/metrics"):
             log.info(
                 "request",
+                client=scope["client"][0] if scope["client"] else None,
                 method=scope["method"],
                 path=scope["path"],
                 status=status,
