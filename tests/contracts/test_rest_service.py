@@ -1,10 +1,13 @@
 """Service-level REST behaviour: origins and host names, metrics, health checks and request log."""
 
 import json
+import platform
+from importlib.metadata import version
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from islands_api.web import prometheus
 from islands_service.domain.job import JobState, ProgressReport
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, claimed
@@ -130,6 +133,37 @@ def test_metrics_show_the_current_state_of_jobs(service):
         "cancelled": 0,
     }
     assert ("islands_best_error", label) not in read_metrics(service)
+
+
+def test_metrics_describe_the_process_the_disk_and_the_commits(service):
+    found = read_metrics(service)
+    (build,) = [dict(labels) for name, labels in found if name == "islands_build_info"]
+    assert build == {"version": version("islands"), "python": platform.python_version(), "role": "api"}
+    assert found["process_resident_memory_bytes", ()] > 1e7
+    assert 0 < found["islands_disk_free_bytes", ()] < found["islands_disk_bytes", ()]
+    queued(service.store)
+    after = read_metrics(service)
+    count = "islands_store_commit_seconds_count", ()
+    assert after[count] == found[count] + 1
+
+
+def test_metrics_show_the_owners_with_most_jobs(service, monkeypatch):
+    monkeypatch.setattr(prometheus, "MAX_OWNERS", 2)
+    for owner, jobs in (("a", 3), ("b", 1), ("c", 4), ("d", 2)):
+        for _ in range(jobs):
+            queued(service.store, owner)
+    claimed(service.store)
+    found = {
+        labels: value
+        for (name, labels), value in read_metrics(service).items()
+        if name == "islands_owner_jobs"
+    }
+    assert found == {
+        (("owner", "a"), ("state", "queued")): 2.0,
+        (("owner", "a"), ("state", "running")): 1.0,
+        (("owner", "c"), ("state", "queued")): 4.0,
+        (("owner", ""), ("state", "queued")): 3.0,
+    }
 
 
 def test_metrics_count_requests_by_route_and_not_by_path(service):

@@ -64,7 +64,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             Blobs(settings.blobs),
             hub,
             RateLimiter(settings.rate, settings.burst),
-            ServiceMetrics(opened),
+            ServiceMetrics(opened, settings.data_dir),
             OwnerSlots(MAX_CONCURRENT_INSPECTIONS, MAX_INSPECTIONS_PER_OWNER),
             OwnerSlots(MAX_CONCURRENT_DRAWINGS, MAX_CONCURRENT_DRAWINGS),
             executor,

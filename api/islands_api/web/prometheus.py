@@ -1,12 +1,20 @@
 """Prometheus metrics: requests as they arrive, and the state of all jobs at each scrape."""
 
-from collections.abc import Iterator
+import collections
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+from prometheus_client import Counter, Gauge, Histogram, generate_latest
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from islands_service.domain.job import JobState
+from islands_service.metrics import make_registry
 from islands_service.store import Store
+
+#: Largest number of owners with metrics of their jobs: each is a time series.
+MAX_OWNERS = 50
 
 
 class ServiceMetrics:
@@ -15,10 +23,12 @@ class ServiceMetrics:
     Parameters
     ----------
     store : Store
+    folder : Path
+        Data folder, whose disk is measured.
     """
 
-    def __init__(self, store: Store) -> None:
-        self.registry = CollectorRegistry()
+    def __init__(self, store: Store, folder: Path) -> None:
+        self.registry = make_registry("api")
         self.latency = Histogram(
             "islands_request_seconds",
             "Time until the response started, by route.",
@@ -31,7 +41,15 @@ class ServiceMetrics:
             "islands_dataset_bytes_received", "Bytes of data sets received.", registry=self.registry
         )
         self.streams = Gauge("islands_event_streams", "Open event streams.", registry=self.registry)
+        commits = Histogram(
+            "islands_store_commit_seconds",
+            "Time of a transaction of the store, which may contain several operations.",
+            buckets=(0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0),
+            registry=self.registry,
+        )
+        store.database.observe_commit = commits.observe
         self.registry.register(_JobCollector(store))
+        self.registry.register(_DiskCollector(folder))
 
     def page(self) -> bytes:
         """Return all metrics in the text format of Prometheus.
@@ -41,6 +59,19 @@ class ServiceMetrics:
         StoreUnavailableError
         """
         return generate_latest(self.registry)
+
+
+class _DiskCollector(Collector):
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def collect(self) -> Iterator[Metric]:
+        """Query the disk of the data folder."""
+        disk = shutil.disk_usage(self._folder)
+        yield GaugeMetricFamily("islands_disk_bytes", "Size of the disk of the data folder.", disk.total)
+        yield GaugeMetricFamily(
+            "islands_disk_free_bytes", "Free bytes on the disk of the data folder.", disk.free
+        )
 
 
 class _JobCollector(Collector):
@@ -61,6 +92,14 @@ class _JobCollector(Collector):
         yield GaugeMetricFamily(
             "islands_queue_oldest_seconds", "Waiting time of the oldest queued job.", statistics.oldest
         )
+        active = GaugeMetricFamily(
+            "islands_owner_jobs",
+            f"Queued and running jobs of the {MAX_OWNERS} owners with most, and of all others.",
+            labels=["owner", "state"],
+        )
+        for (owner, state), count in _combine_owners(statistics.active).items():
+            active.add_metric([owner, state], count)
+        yield active
         yield GaugeMetricFamily("islands_leases", "Leases that have not expired.", statistics.leases)
         running = (
             ("islands_evaluations_per_second", "Individuals evaluated per second.", "evaluations_per_second"),
@@ -73,3 +112,15 @@ class _JobCollector(Collector):
                 if progress.get(field) is not None:
                     family.add_metric([job], progress[field])
             yield family
+
+
+def _combine_owners(counts: Mapping[tuple[str, JobState], int]) -> Mapping[tuple[str, JobState], int]:
+    """Return the counts of the owners with the most jobs; the rest are combined under an empty name."""
+    totals = collections.Counter[str]()
+    for (owner, _), count in counts.items():
+        totals[owner] += count
+    shown = {owner for owner, _ in totals.most_common(MAX_OWNERS)}
+    combined = collections.Counter[tuple[str, JobState]]()
+    for (owner, state), count in counts.items():
+        combined[owner if owner in shown else "", state] += count
+    return combined

@@ -11,6 +11,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
+from time import monotonic
 from typing import Any, TypeVar
 
 from sqlalchemy import Connection
@@ -80,6 +81,8 @@ class Database:
         self._waiting: SimpleQueue[_Waiting | None] = SimpleQueue()
         self._writer: Thread | None = None
         self._closed = False
+        #: Called with the seconds of each group commit.
+        self.observe_commit: Callable[[float], None] = _ignore_commit
         # Ensures that concurrent first writers start one thread, and that no operation is queued after the
         # end.
         self._lock = Lock()
@@ -179,7 +182,7 @@ class Database:
 
     def _run_transaction(self, operations: list[Callable[[Connection], Any]]) -> list[_OperationResult]:
         """Run a group of operations in one transaction; return their results once it is durable."""
-        committing = False
+        committing, began = False, monotonic()
         try:
             with translate_db_errors(), self._writing.begin() as connection:
                 results = [_run_operation(operation, connection) for operation in operations]
@@ -193,7 +196,12 @@ class Database:
                 "the connection to the database was lost during the commit, and it is unknown whether the "
                 "transaction was written: check, or repeat the request with the same idempotency key"
             ) from error
+        self.observe_commit(monotonic() - began)
         return results
+
+
+def _ignore_commit(_seconds: float) -> None:
+    """Do nothing with the duration of a commit."""
 
 
 def _run_operation(operation: Callable[[Connection], Any], connection: Connection) -> _OperationResult:

@@ -12,6 +12,7 @@ from uuid import uuid4
 from sqlalchemy import Connection, Row, Select, delete, func, insert, select, tuple_
 
 from islands_service.domain.job import (
+    ACTIVE,
     RESUMABLE,
     TERMINAL,
     Event,
@@ -55,11 +56,14 @@ class QueueStatistics:
         Seconds that the oldest queued job has waited since it was last queued.
     running : mapping
         Progress of the jobs with a valid lease, by job.
+    active : mapping
+        Number of queued and running jobs by owner and state.
     """
 
     counts: Mapping[JobState, int]
     oldest: float
     running: Mapping[str, Mapping[str, Any]]
+    active: Mapping[tuple[str, JobState], int]
 
     @property
     def leases(self) -> int:
@@ -258,6 +262,11 @@ class Jobs:
     def queue_statistics(self) -> QueueStatistics:
         """Return statistics of the jobs of all owners."""
         counted = select(jobs.c.state, func.count()).group_by(jobs.c.state)
+        active = (
+            select(jobs.c.owner, jobs.c.state, func.count())
+            .where(jobs.c.state.in_(ACTIVE))
+            .group_by(jobs.c.owner, jobs.c.state)
+        )
         oldest = select(func.coalesce(now() - func.min(jobs.c.updated), 0.0)).where(
             jobs.c.state == JobState.QUEUED
         )
@@ -270,6 +279,7 @@ class Jobs:
                 {state: counts.get(state, 0) for state in JobState},
                 connection.execute(oldest).scalar_one(),
                 {row.id: read_document(row.progress) or {} for row in connection.execute(running)},
+                {(row[0], JobState(row[1])): row[2] for row in connection.execute(active)},
             )
 
 
