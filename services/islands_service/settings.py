@@ -74,6 +74,9 @@ class ServiceSettings(BaseSettings):
         Requests per second of one key, and requests that it may send at once; a rate of 0 disables the limit.
     tls_certificate, tls_key
         PEM files for HTTPS.
+    metrics_host, metrics_port
+        Address at which a coordinator serves its metrics to Prometheus, without a key; no metrics with
+        port 0. The coordinators of ``islands serve`` use this port and the following ones.
     log_format
         Format of log messages: ``text`` or ``json``.
     telemetry
@@ -111,6 +114,8 @@ class ServiceSettings(BaseSettings):
     require_keys: bool = False
     tls_certificate: Path | None = None
     tls_key: Path | None = None
+    metrics_host: str = "127.0.0.1"
+    metrics_port: Annotated[int, Field(ge=0, le=65535)] = 0
     log_format: Literal["text", "json"] = "text"
     telemetry: str = ""
     lifeline: int | None = None

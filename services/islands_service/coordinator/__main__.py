@@ -10,6 +10,7 @@ from islands.errors import IslandsError
 from islands_service.coordinator.coordinator import Coordinator
 from islands_service.liveness import StopRequest, stop_on_signals, watch_supervisor
 from islands_service.logging_config import configure_logs
+from islands_service.process_metrics import make_registry, serve_metrics
 from islands_service.settings import service_settings
 
 
@@ -22,14 +23,19 @@ def main() -> int:
     parser.add_argument(
         "--name", default=f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(3)}", help="unique"
     )
-    name = parser.parse_args().name
+    parser.add_argument(
+        "--metrics-port", type=int, help="port of the metrics; ISLANDS_METRICS_PORT by default"
+    )
+    arguments = parser.parse_args()
     stopping = StopRequest()
     try:
         settings = service_settings()
         configure_logs(settings.log_format, "coordinator")
         stop_on_signals(stopping)
+        if port := arguments.metrics_port or settings.metrics_port:
+            serve_metrics(make_registry("coordinator"), settings.metrics_host, port)
         with watch_supervisor(settings.lifeline):
-            Coordinator(settings, name, stopping).run()
+            Coordinator(settings, arguments.name, stopping).run()
     except IslandsError as error:
         print(f"coordinator: {error}", file=sys.stderr)
         return 1

@@ -78,7 +78,10 @@ def roles(settings: ServiceSettings) -> list[Role]:
     children += [
         Role(
             f"coordinator {index}",
-            (*python, "islands_service.coordinator", "--name", f"{instance}-{index}"),
+            (
+                *(*python, "islands_service.coordinator", "--name", f"{instance}-{index}"),
+                *(("--metrics-port", str(settings.metrics_port + index)) if settings.metrics_port else ()),
+            ),
             max(settings.lease, _MIN_COORDINATOR_TIMEOUT),
             needs=needs,
         )

@@ -1,0 +1,40 @@
+"""Prometheus metrics of every process: version, memory, CPU time and open files; and their endpoint."""
+
+import platform
+from importlib.metadata import version
+
+from prometheus_client import CollectorRegistry, Info, ProcessCollector, start_http_server
+
+from islands.errors import SettingsError
+
+
+def make_registry(role: str) -> CollectorRegistry:
+    """Return a registry with the metrics of this process.
+
+    Parameters
+    ----------
+    role : str
+        ``api`` or ``coordinator``, a label of ``islands_build_info``.
+    """
+    registry = CollectorRegistry()
+    ProcessCollector(registry=registry)
+    build = Info("islands_build", "Version of islands and of Python.", registry=registry)
+    build.info({"version": version("islands"), "python": platform.python_version(), "role": role})
+    return registry
+
+
+def serve_metrics(registry: CollectorRegistry, host: str, port: int) -> None:
+    """Serve the metrics of a process without a web interface from a background thread, at ``/metrics``.
+
+    Raises
+    ------
+    SettingsError
+        The address does not belong to this machine, or another program uses the port.
+    """
+    try:
+        start_http_server(port, host, registry)
+    except OSError as error:
+        raise SettingsError(
+            f"cannot serve metrics at {host}, port {port} ({error.strerror}): set ISLANDS_METRICS_HOST and "
+            "ISLANDS_METRICS_PORT to a free port of this machine"
+        ) from error
