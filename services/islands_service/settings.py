@@ -58,6 +58,12 @@ class ServiceSettings(BaseSettings):
         Least time between two checkpoints: about the work that a crash can lose.
     max_upload, max_unpacked
         Largest upload, and largest size that it may unpack to.
+    max_uploads, max_uploads_per_owner
+        Uploads in progress, of all owners and of one. The data folder needs room for ``max_uploads`` files of
+        ``max_upload`` bytes and two of ``max_unpacked`` bytes.
+    body_timeout, body_rate
+        Longest time without a byte of a request's body, and least bytes per second after that time; a rate of
+        0 disables the latter.
     inspection_memory, inspection_seconds
         Memory and time budget of the process that reads an uploaded file.
     max_stored
@@ -102,6 +108,10 @@ class ServiceSettings(BaseSettings):
     checkpoint_every: Positive = 5.0
     max_upload: Count = 256_000_000
     max_unpacked: Count = 1_000_000_000
+    max_uploads: Count = 32
+    max_uploads_per_owner: Count = 4
+    body_timeout: Positive = 30.0
+    body_rate: Annotated[float, Field(ge=0.0)] = 20_000.0
     inspection_memory: Count = 6_000_000_000
     inspection_seconds: Positive = 120.0
     max_stored: Count = 5_000_000_000

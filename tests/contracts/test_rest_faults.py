@@ -7,12 +7,14 @@ import tempfile
 import threading
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import httpx
 import pytest
 from sqlalchemy import update
 
 from islands_api.web.routes import figures
+from islands_service.store.blobs import Blobs
 from islands_service.store.database import StorageFullError
 from islands_service.store.tables import models, results
 from support.databases import server
@@ -73,13 +75,16 @@ def test_a_full_disk_while_drawing_is_reported_as_such(disk, serve):
 
 
 def test_a_full_disk_during_an_upload_is_reported_as_such(disk, serve, monkeypatch):
-    """The framework stores uploads of more than a megabyte in the temporary folder of the system."""
+    """The disk that receives bodies is full first, then that of the links to files under their names."""
     with serve() as service:
+        monkeypatch.setattr(Blobs, "spool", partial(tempfile.TemporaryFile, dir=disk))
         monkeypatch.setattr(tempfile, "tempdir", str(disk))
         filler = filled(disk)
         detail = problem_of(service.upload(csv() + b"\n" * 2_000_000), 507, "storage-full")
         assert detail == StorageFullError.__doc__
         filler.unlink()
+        monkeypatch.undo()
+        monkeypatch.setattr(tempfile, "tempdir", str(disk))
         dataset = service.upload(csv()).json()["id"]
         with suppress(OSError):
             for number in range(1000):

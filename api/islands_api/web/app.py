@@ -25,6 +25,7 @@ from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.rate_limit import RateLimiter
 from islands_api.web.routes import ROUTERS
 from islands_api.web.uploads.owner_slots import OwnerSlots
+from islands_api.web.uploads.upload_admission import UploadAdmission
 from islands_service.liveness import EVERY, send_heartbeat
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -65,6 +66,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             hub,
             RateLimiter(settings.rate, settings.burst),
             ServiceMetrics(opened, settings.data_dir),
+            UploadAdmission(settings.max_uploads, settings.max_uploads_per_owner),
             OwnerSlots(MAX_CONCURRENT_INSPECTIONS, MAX_INSPECTIONS_PER_OWNER),
             OwnerSlots(MAX_CONCURRENT_DRAWINGS, MAX_CONCURRENT_DRAWINGS),
             executor,

@@ -127,16 +127,26 @@ async def _get_principal(
     return await authenticate(request)
 
 
+def check_scope(caller: Principal, scope: str) -> None:
+    """Refuse a caller without a scope.
+
+    Raises
+    ------
+    InsufficientScopeError
+    """
+    if scope not in caller.scopes:
+        raise InsufficientScopeError(
+            f"the key has the scopes {', '.join(sorted(caller.scopes))}, but this request needs "
+            f"{scope}: ask for another key"
+        )
+
+
 def _require_scope(scope: str) -> Callable[[Principal], Awaitable[Principal]]:
-    async def check_scope(caller: Annotated[Principal, Depends(_get_principal)]) -> Principal:
-        if scope not in caller.scopes:
-            raise InsufficientScopeError(
-                f"the key has the scopes {', '.join(sorted(caller.scopes))}, but this request needs "
-                f"{scope}: ask for another key"
-            )
+    async def check_caller(caller: Annotated[Principal, Depends(_get_principal)]) -> Principal:
+        check_scope(caller, scope)
         return caller
 
-    return check_scope
+    return check_caller
 
 
 #: Type of a route parameter that receives a caller with the scope `read`.

@@ -11,6 +11,7 @@ from islands_api.web.event_hub import JobEventHub
 from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.rate_limit import RateLimiter
 from islands_api.web.uploads.owner_slots import OwnerSlots
+from islands_api.web.uploads.upload_admission import UploadAdmission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -38,6 +39,7 @@ class AppState:
     hub: JobEventHub
     rate_limiter: RateLimiter
     metrics: ServiceMetrics
+    uploads: UploadAdmission
     inspection_slots: OwnerSlots
     figure_slots: OwnerSlots
     executor: BlockingExecutor

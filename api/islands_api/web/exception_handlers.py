@@ -17,6 +17,7 @@ from islands_api.web.problems import (
     MEDIA_TYPE,
     PROBLEMS,
     AuthenticationError,
+    BodyTimeoutError,
     HeadersTooLargeError,
     MalformedBodyError,
     MethodNotAllowedError,
@@ -39,6 +40,7 @@ log = structlog.get_logger()
 _FRAMEWORK_PROBLEMS = {
     PROBLEMS[kind].status: PROBLEMS[kind]
     for kind in (
+        BodyTimeoutError,
         MalformedBodyError,
         ResourceNotFoundError,
         MethodNotAllowedError,

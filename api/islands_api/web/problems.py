@@ -50,6 +50,17 @@ class PayloadTooLargeError(HTTPException):
         super().__init__(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, message)
 
 
+class UploadLimitError(RateLimitError):
+    """The owner, or the service, has too many uploads in progress."""
+
+
+class BodyTimeoutError(HTTPException):
+    """The body of the request arrives too slowly. The connection is closed: the rest may never arrive."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(HTTPStatus.REQUEST_TIMEOUT, message, {"Connection": "close"})
+
+
 class MalformedBodyError(HTTPException):
     """The body of the request is damaged, or does not have the type that it declares."""
 
@@ -153,6 +164,12 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         DatasetInUseError: ProblemKind(HTTPStatus.CONFLICT, "dataset-in-use", "A job needs the data set"),
         PayloadTooLargeError: ProblemKind(
             HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "too-large", "The request is too large"
+        ),
+        BodyTimeoutError: ProblemKind(
+            HTTPStatus.REQUEST_TIMEOUT, "body-timeout", "The request arrives too slowly"
+        ),
+        UploadLimitError: ProblemKind(
+            HTTPStatus.TOO_MANY_REQUESTS, "too-many-uploads", "Too many uploads in progress"
         ),
         QuotaError: ProblemKind(HTTPStatus.TOO_MANY_REQUESTS, "quota-exceeded", "The quota is used up"),
         RateLimitError: ProblemKind(HTTPStatus.TOO_MANY_REQUESTS, "too-many-requests", "Too many requests"),

@@ -8,7 +8,8 @@ import binascii
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager
 from http import HTTPStatus
 from math import isfinite
 from operator import itemgetter
@@ -18,9 +19,12 @@ from fastapi import Query, Request, Response
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 
-from islands.errors import SettingsError
-from islands_api.web.auth import authenticate
+from islands.errors import IslandsError, SettingsError
+from islands_api.web.auth import Principal, authenticate, check_scope
+from islands_api.web.middleware import FORM_OVERHEAD_BYTES
 from islands_api.web.problems import MalformedBodyError, UnsupportedMediaTypeError
+from islands_api.web.uploads.body_reader import BodyReader
+from islands_api.web.uploads.upload_request import UploadRequest
 
 #: Maximum number of digits of an integer: parsing takes time proportional to the square of the digits.
 _MAX_INTEGER_DIGITS = 400
@@ -44,15 +48,18 @@ class BodyRoute(APIRoute):
         async def handle(request: Request) -> Response:
             # Authenticate before reading the body, so that anonymous clients cannot make the server
             # buffer data.
-            await authenticate(request)
+            caller = await authenticate(request)
             media = request.headers.get("content-type", "")
             if media.partition(";")[0].strip().lower() != self.media:
                 raise UnsupportedMediaTypeError(
                     f"the body has {f'the type {media}' if media else 'no type'}: send it as {self.media}"
                 )
             try:
-                return await handler(_StrictRequest(request.scope, request.receive))
+                async with self.receiving(request, caller) as received:
+                    return await handler(received)
             except HTTPException as error:
+                if isinstance(error.__cause__, IslandsError):  # raised while the framework read the body
+                    raise error.__cause__ from None
                 if error.status_code != HTTPStatus.BAD_REQUEST or isinstance(error, MalformedBodyError):
                     raise
                 if isinstance(error.__cause__, OSError):  # for example a full disk
@@ -62,6 +69,13 @@ class BodyRoute(APIRoute):
                 ) from error
 
         return handle
+
+    @asynccontextmanager
+    async def receiving(self, request: Request, caller: Principal) -> AsyncIterator[Request]:  # noqa: ARG002
+        """Return the request with limits on its body."""
+        settings = request.app.state.islands.settings
+        body = BodyReader(request.receive, settings.body_timeout, settings.body_rate)
+        yield _StrictRequest(request.scope, body.receive)
 
 
 class JSONRoute(BodyRoute):
@@ -75,6 +89,30 @@ class FormRoute(BodyRoute):
 
     media = "multipart/form-data"
     advice = "send the record as the part 'file' of a form, under a name of at most 200 characters"
+
+    @asynccontextmanager
+    async def receiving(self, request: Request, caller: Principal) -> AsyncIterator[Request]:
+        """Return the request with limits on its body, after all checks that are possible without the body.
+
+        Raises
+        ------
+        InsufficientScopeError, UploadLimitError, QuotaError, StorageFullError
+        """
+        check_scope(caller, "write")
+        state = request.app.state.islands
+        settings = state.settings
+        length = request.headers.get("content-length", "")
+        least = max(0, int(length) - FORM_OVERHEAD_BYTES) if length.isdecimal() else 0
+        most = least if length else settings.max_upload
+        with state.uploads.admit(caller.owner):
+            stored = await state.run_blocking(state.store.datasets.stored_bytes, caller.owner)
+            with (
+                state.uploads.reserve(caller.owner, least, most, stored, settings.max_stored) as reserved,
+                await state.run_blocking(state.blobs.spool) as target,
+            ):
+                room = reserved + FORM_OVERHEAD_BYTES
+                body = BodyReader(request.receive, settings.body_timeout, settings.body_rate, room)
+                yield UploadRequest(request.scope, body.receive, target)
 
 
 class _StrictRequest(Request):

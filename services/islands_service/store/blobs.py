@@ -85,6 +85,16 @@ class Blobs:
                 with suppress(FileNotFoundError):
                     Path(stream.name).unlink()
 
+    def spool(self) -> IO[bytes]:
+        """Open a nameless file for bytes of a request, which vanishes when it is closed or the process ends.
+
+        Raises
+        ------
+        StorageFullError
+        """
+        with translate_disk_full():
+            return tempfile.TemporaryFile(dir=self._folder)
+
     def keep(self, stream: IO[bytes]) -> str:
         """Store a file that has received all its bytes as a blob.
 

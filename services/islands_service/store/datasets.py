@@ -126,6 +126,11 @@ class Datasets:
             if connection.execute(_select(owner, identity)).one_or_none() is None:
                 _check_quota(connection, owner, size, most_bytes)
 
+    def stored_bytes(self, owner: str) -> int:
+        """Return the total size of the data sets of an owner."""
+        with self._database.read() as connection:
+            return _sum_bytes(connection, owner)
+
     def get(self, owner: str, dataset: str) -> StoredDataset:
         """Return a data set.
 
@@ -187,11 +192,14 @@ def dataset_id(blob: str, suffix: str, reading: Mapping[str, Any] | None = None)
     return f"{blob[:32]}-{suffix.removeprefix('.')}"
 
 
+def _sum_bytes(connection: Connection, owner: str) -> int:
+    total = select(func.coalesce(func.sum(datasets.c.bytes), 0)).where(datasets.c.owner == owner)
+    # PostgreSQL returns a decimal number for a sum of integers.
+    return int(connection.execute(total).scalar_one())
+
+
 def _check_quota(connection: Connection, owner: str, size: int, most: int) -> None:
-    used = connection.execute(
-        select(func.coalesce(func.sum(datasets.c.bytes), 0)).where(datasets.c.owner == owner)
-    ).scalar_one()
-    used = int(used)  # PostgreSQL returns a decimal number for a sum of integers
+    used = _sum_bytes(connection, owner)
     if used + size > most:
         raise QuotaError(
             f"the data sets take {used / 1e6:.1f} MB, this one has {size / 1e6:.1f} MB, and "
