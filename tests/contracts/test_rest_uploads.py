@@ -118,7 +118,7 @@ def test_a_body_that_stalls_or_is_too_slow_is_a_problem_and_frees_everything(imp
                 connection.settimeout(10.0)
         status, kind, _, headers = answer(connection)
         assert time.monotonic() - start < 3.0
-        assert (status, kind, headers["connection"]) == (408, "body-timeout", "close")
+        assert (status, kind, headers["connection"]) == (408, "request-timeout", "close")
         assert connection.recv(1) == b""
     assert not receiving(impatient)
 

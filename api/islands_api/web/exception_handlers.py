@@ -17,7 +17,6 @@ from islands_api.web.problems import (
     MEDIA_TYPE,
     PROBLEMS,
     AuthenticationError,
-    BodyTimeoutError,
     HeadersTooLargeError,
     MalformedBodyError,
     MethodNotAllowedError,
@@ -40,7 +39,6 @@ log = structlog.get_logger()
 _FRAMEWORK_PROBLEMS = {
     PROBLEMS[kind].status: PROBLEMS[kind]
     for kind in (
-        BodyTimeoutError,
         MalformedBodyError,
         ResourceNotFoundError,
         MethodNotAllowedError,

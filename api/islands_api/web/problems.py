@@ -54,13 +54,6 @@ class UploadLimitError(RateLimitError):
     """The owner, or the service, has too many uploads in progress."""
 
 
-class BodyTimeoutError(HTTPException):
-    """The body of the request arrives too slowly. The connection is closed: the rest may never arrive."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(HTTPStatus.REQUEST_TIMEOUT, message, {"Connection": "close"})
-
-
 class MalformedBodyError(HTTPException):
     """The body of the request is damaged, or does not have the type that it declares."""
 
@@ -76,10 +69,10 @@ class UnsupportedMediaTypeError(HTTPException):
 
 
 class RequestTimeoutError(HTTPException):
-    """The client has not sent the whole request in time."""
+    """The client has not sent the whole request in time. The connection is closed after it."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(HTTPStatus.REQUEST_TIMEOUT, message)
+        super().__init__(HTTPStatus.REQUEST_TIMEOUT, message, {"Connection": "close"})
 
 
 class HeadersTooLargeError(HTTPException):
@@ -164,9 +157,6 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         DatasetInUseError: ProblemKind(HTTPStatus.CONFLICT, "dataset-in-use", "A job needs the data set"),
         PayloadTooLargeError: ProblemKind(
             HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "too-large", "The request is too large"
-        ),
-        BodyTimeoutError: ProblemKind(
-            HTTPStatus.REQUEST_TIMEOUT, "body-timeout", "The request arrives too slowly"
         ),
         UploadLimitError: ProblemKind(
             HTTPStatus.TOO_MANY_REQUESTS, "too-many-uploads", "Too many uploads in progress"

@@ -5,7 +5,7 @@ from time import monotonic
 
 from starlette.types import Message, Receive
 
-from islands_api.web.problems import BodyTimeoutError
+from islands_api.web.problems import RequestTimeoutError
 from islands_service.domain.job import QuotaError
 
 
@@ -33,7 +33,7 @@ class BodyReader:
 
         Raises
         ------
-        BodyTimeoutError
+        RequestTimeoutError
             No byte arrived in time, or the body is too slow.
         QuotaError
             The body is longer than the owner's quota allows.
@@ -49,7 +49,7 @@ class BodyReader:
                 message = await self._receive()
         except TimeoutError:
             self._waited += monotonic() - start
-            raise BodyTimeoutError(
+            raise RequestTimeoutError(
                 f"{self._received / 1e6:.3g} MB of the body arrived in {self._waited:.3g} s, but the service "
                 f"needs some bytes every {self._timeout:g} s and {self._rate:g} bytes per second: use a "
                 "faster connection, or compress the file (.gz)"
