@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from support.command_line import succeed
-from support.processes import eventually, kill
+from support.processes import descendants, eventually, kill
 from support.service import HIDDEN, KNOWN, held, hidden
 from support.service_processes import Service, serving
 
@@ -79,5 +79,20 @@ def test_running_diagnosis_is_cancelled_within_seconds_and_restarts(service: Ser
     eventually(lambda: "effects" in str((service.job(job)["progress"] or {}).get("phase")))
     assert service.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 202
     assert service.ended(job, seconds=5.0)["state"] == "cancelled"
+    # No process continues to compute: those of the fits have another name while they are idle.
+    eventually(lambda: "ray::_call" not in str(descendants(service.process.pid)), seconds=5.0)
     assert service.ask("POST", f"/v1/jobs/{job}/resume").status_code == 202
     assert [effect["name"] for effect in found(service, job)[0]["effects"]] == [HIDDEN]
+
+
+def test_cancelled_step_without_checks_is_abandoned(service: Service, tmp_path: Path) -> None:
+    """The coordinator restarts in its process and runs the next job."""
+    files = {"file": ("hidden.csv", hidden(tmp_path, LONG))}
+    dataset = service.ask("POST", "/v1/datasets", files=files).json()["id"]
+    coordinator = service.one("coordinator")
+    job = service.submit(5, dataset=dataset, preset="auto")
+    eventually(lambda: "fit of" in str((service.job(job)["progress"] or {}).get("phase")))
+    assert service.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 202
+    assert service.ended(job, seconds=5.0)["state"] == "cancelled"
+    assert service.found(service.submit(5))
+    assert service.one("coordinator") == coordinator

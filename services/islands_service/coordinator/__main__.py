@@ -5,9 +5,11 @@ import os
 import secrets
 import socket
 import sys
+from functools import partial
 
 from islands.errors import IslandsError
 from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.process_restart import restart_process
 from islands_service.liveness import StopRequest, stop_on_signals, watch_supervisor
 from islands_service.logging_config import configure_logs
 from islands_service.process_metrics import make_registry, serve_metrics
@@ -35,7 +37,8 @@ def main() -> int:
         if port := arguments.metrics_port or settings.metrics_port:
             serve_metrics(make_registry("coordinator"), settings.metrics_host, port)
         with watch_supervisor(settings.lifeline):
-            Coordinator(settings, arguments.name, stopping).run()
+            abandon = partial(restart_process, settings.lifeline)
+            Coordinator(settings, arguments.name, stopping, abandon).run()
     except IslandsError as error:
         print(f"coordinator: {error}", file=sys.stderr)
         return 1

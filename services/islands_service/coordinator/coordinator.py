@@ -12,15 +12,8 @@ import structlog
 
 from islands.errors import IslandsError
 from islands_service.coordinator.heartbeat import CoordinatorStopping, HangGuard, Heartbeat, JobCancelled
-from islands_service.domain.job import (
-    DISCREPANCY,
-    IDENTIFICATION,
-    JobOutcome,
-    JobState,
-    Lease,
-    LeaseLostError,
-    ProgressReport,
-)
+from islands_service.coordinator.job_runners import JOB_RUNNERS
+from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
 from islands_service.liveness import StopRequest, stop_on_signals
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
@@ -49,28 +42,6 @@ SWEEP_INTERVAL = 600.0
 #: Seconds after which a blob that no row references is deleted.
 ORPHAN_AGE = 3600.0
 
-#: Runs a job: lease, store, blobs, engine, check that raises if it must end, seconds between checkpoints.
-JobRunner = Callable[[Lease, Store, Blobs, "Engine", Callable[[], None], float], JobOutcome]
-
-
-def _run_identification(*arguments: object) -> JobOutcome:
-    # These imports take half a second: claim the job before them.
-    from islands_service.coordinator.identification_job import run_identification_job  # noqa: PLC0415
-
-    return run_identification_job(*arguments)  # type: ignore[arg-type]
-
-
-def _run_diagnosis(*arguments: object) -> JobOutcome:
-    from islands_service.coordinator.diagnosis_job import run_diagnosis_job  # noqa: PLC0415
-
-    return run_diagnosis_job(*arguments)  # type: ignore[arg-type]
-
-
-#: Runner of each kind of job.
-JOB_RUNNERS: Mapping[str, JobRunner] = MappingProxyType(
-    {IDENTIFICATION: _run_identification, DISCREPANCY: _run_diagnosis}
-)
-
 
 class Coordinator:
     """Runs jobs one at a time on a Ray cluster to which it stays connected.
@@ -82,10 +53,18 @@ class Coordinator:
         Unique among the running coordinators.
     stopping : StopRequest
         Ends the loop. The current job is released with its last checkpoint.
+    abandon : callable
+        See `Heartbeat`.
     """
 
-    def __init__(self, settings: ServiceSettings, name: str, stopping: StopRequest) -> None:
-        self._settings, self._name, self._stopping = settings, name, stopping
+    def __init__(
+        self,
+        settings: ServiceSettings,
+        name: str,
+        stopping: StopRequest,
+        abandon: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._settings, self._name, self._stopping, self._abandon = settings, name, stopping, abandon
         self._store = Store(settings.url)
         self._blobs = Blobs(settings.blobs)
         self._traces = Traces(settings.telemetry, "coordinator")
@@ -150,7 +129,9 @@ class Coordinator:
             log.info("job claimed", kind=lease.job.kind)
             started = monotonic()
             try:
-                with Heartbeat(self._store, lease, self._settings.lease, self._stopping) as heartbeat:
+                with Heartbeat(
+                    self._store, lease, self._settings.lease, self._stopping, self._abandon
+                ) as heartbeat:
                     outcome = self._run_job(lease, heartbeat)
                     self._finish(lease, outcome, heartbeat)
                 log.info("job finished", state=outcome.state, seconds=round(monotonic() - started, 3))
@@ -207,6 +188,7 @@ class Coordinator:
 
     def _finish(self, lease: Lease, outcome: JobOutcome, heartbeat: Heartbeat) -> None:
         """Store the outcome of a job. Retry while the store is unavailable or full: the work is done."""
+        heartbeat.complete()
         while True:
             try:
                 return self._store.leases.finish(lease, outcome)

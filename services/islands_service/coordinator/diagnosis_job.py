@@ -64,7 +64,7 @@ def run_diagnosis_job(
     report("reading the record")
     record, columns = read_record_and_columns(spec, datasets, blobs)
     simulator = make_simulator(spec.simulation, record, columns)
-    found = diagnose(record, simulator, spec.tolerance, spec.seed, report, map_cases or ray_map())
+    found = diagnose(record, simulator, spec.tolerance, spec.seed, report, map_cases or ray_map(check=check))
     report("a formula for the unexplained residual")
     formula = explain_residual(found, spec.seed)
     wall_s = monotonic() - started

@@ -1,8 +1,9 @@
 """Heartbeat of a lease: renews the lease and reports whether the job may continue."""
 
 import os
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
+from math import inf
 from threading import Event, Thread
 from time import monotonic
 from types import TracebackType
@@ -23,11 +24,14 @@ if TYPE_CHECKING:
 
 log = structlog.get_logger()
 
-#: Renewals in the duration of a lease. Several may be late, and a cancellation request is noticed soon.
+#: Renewals in the duration of a lease; several may be late.
 RENEWALS_PER_LEASE = 10
 
-#: Seconds that a cancelled job has to end by itself. Then the heartbeat stores the cancellation.
-CANCEL_GRACE = 1.0
+#: Seconds between two checks whether cancellation of the job is requested.
+CANCEL_POLL = 0.2
+
+#: Seconds that a job has to end by itself. Then the heartbeat stores the cancellation and abandons the job.
+CANCEL_GRACE = 0.4
 
 #: Seconds without a call of `Heartbeat.check` after which a search counts as hanging. A search checks many
 #: times a second; a checkpoint of a thousand islands takes half a minute.
@@ -53,12 +57,23 @@ class Heartbeat:
         Duration of the lease.
     stopping : StopRequest
         Stop request of the coordinator.
+    abandon : callable
+        Called if a cancelled job, or one whose lease is lost, does not end by itself: the computation is in a
+        long step without checks. `restart_process` ends it; the default lets it come to its end.
     """
 
-    def __init__(self, store: Store, lease: Lease, seconds: float, stopping: StopRequest) -> None:
+    def __init__(
+        self,
+        store: Store,
+        lease: Lease,
+        seconds: float,
+        stopping: StopRequest,
+        abandon: Callable[[], None] = lambda: None,
+    ) -> None:
         self._store, self._lease, self._seconds, self._stopping = store, lease, seconds, stopping
+        self._abandon = abandon
         self._over = Event()
-        self._lost = self._cancelled = False
+        self._lost = self._cancelled = self._completed = self._abandoned = False
         self._checked_at: float | None = None
         self._thread = Thread(target=self._beat, name="heartbeat", daemon=True)
 
@@ -92,6 +107,10 @@ class Heartbeat:
         if self._stopping.requested:
             raise CoordinatorStopping("the coordinator is stopping")
 
+    def complete(self) -> None:
+        """Mark the computation as complete: a cancellation is too late while its outcome is being stored."""
+        self._completed = True
+
     @contextmanager
     def search(self) -> Iterator[None]:
         """End the process if `check` is not called for `HANG_TIMEOUT` within the block.
@@ -106,23 +125,38 @@ class Heartbeat:
             self._checked_at = None
 
     def _beat(self) -> None:
-        waited = 0.0
-        while not self._over.wait(self._seconds / RENEWALS_PER_LEASE):
+        period = self._seconds / RENEWALS_PER_LEASE
+        renew_at, end_by = 0.0, inf
+        while not self._over.wait(min(period, CANCEL_POLL)):
             self._exit_if_hanging()
-            if self._lost:
-                continue
+            now = monotonic()
             try:
-                self._cancelled = self._store.leases.renew(self._lease, self._seconds) or self._cancelled
-                waited += self._seconds / RENEWALS_PER_LEASE if self._cancelled else 0.0
-                if waited > CANCEL_GRACE:
-                    # The job is in a long step without checks, such as a refinement: discard its result.
-                    self._store.leases.finish(self._lease, JobOutcome(JobState.CANCELLED))
-                    self._lost = True
+                if self._lost:
+                    pass
+                elif now >= renew_at:
+                    self._cancelled |= self._store.leases.renew(self._lease, self._seconds)
+                    renew_at = now + period
+                else:
+                    self._cancelled |= self._store.leases.is_cancel_requested(self._lease)
+                if self._cancelled or self._lost:
+                    end_by = min(end_by, now + CANCEL_GRACE)
+                if now > end_by and not (self._completed or self._abandoned):
+                    self._end_job()
             except LeaseLostError:
-                self._lost = True
+                # If the main thread has just stored the outcome, this thread ends before the time is over.
+                self._lost, end_by = True, min(end_by, now + CANCEL_GRACE)
             except StoreError as error:
                 # The lease may expire meanwhile. Then the next renewal raises `LeaseLostError`.
                 log.warning("heartbeat failed", job=self._lease.job.id, reason=str(error))
+
+    def _end_job(self) -> None:
+        """Store that the job is cancelled, unless its lease is lost, and abandon the computation."""
+        if not self._lost:
+            self._store.leases.finish(self._lease, JobOutcome(JobState.CANCELLED))
+            self._lost = True
+        self._abandoned = True
+        log.warning("job abandoned", job=self._lease.job.id)
+        self._abandon()
 
     def _exit_if_hanging(self) -> None:
         checked_at = self._checked_at

@@ -46,7 +46,7 @@ ACTIVE = (JobState.QUEUED, JobState.RUNNING)
 RESUMABLE = (JobState.FAILED, JobState.CANCELLED)
 
 #: Kind of a job that identifies a model; a key of ``JOB_RUNNERS`` in
-#: `islands_service.coordinator.coordinator`.
+#: `islands_service.coordinator.job_runners`.
 IDENTIFICATION = "identification"
 
 #: Kind of a job that diagnoses a simulation.

@@ -12,6 +12,9 @@ from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands_service.runtime.cluster import cluster
 from islands_service.runtime.errors import ClusterError
 
+#: Seconds between two checks.
+_CHECK_SECONDS = 0.1
+
 A = TypeVar("A")
 R = TypeVar("R")
 
@@ -36,10 +39,17 @@ def ray_pool(workers: int | None = None, address: str | None = None) -> Iterator
         yield ray_map(workers)
 
 
-def ray_map(workers: int | None = None) -> ParallelMap:
+def ray_map(workers: int | None = None, check: Callable[[], object] = lambda: None) -> ParallelMap:
     """Return a parallel map on the Ray cluster to which this process is connected when the map is called.
 
     The map raises a `ClusterError` if the process is not connected to Ray, or if Ray fails.
+
+    Parameters
+    ----------
+    workers : int or None
+        See `ray_pool`.
+    check : callable
+        Called many times a second during the computation. If it raises an error, all calls are ended.
     """
     task: Any = ray.remote(num_cpus=1, max_retries=3)(_call)
 
@@ -50,19 +60,25 @@ def ray_map(workers: int | None = None) -> ParallelMap:
         submitted = [task.remote(shared, argument) for argument in islice(upcoming, workers)]
         pending = set(submitted)
         # The list grows during the iteration.
-        for reference in submitted:
-            while reference in pending:
-                done, _ = ray.wait(list(pending), num_returns=1)
-                pending -= set(done)
-                more = [task.remote(shared, argument) for argument in islice(upcoming, len(done))]
-                submitted += more
-                pending |= set(more)
-            try:
-                yield ray.get(reference)
-            except RayTaskError as error:
-                raise error.cause from error
-            except RayError as error:
-                raise ClusterError(f"Ray failed, and the computation cannot continue: {error}") from error
+        try:
+            for reference in submitted:
+                while reference in pending:
+                    check()
+                    done, _ = ray.wait(list(pending), num_returns=1, timeout=_CHECK_SECONDS)
+                    pending -= set(done)
+                    more = [task.remote(shared, argument) for argument in islice(upcoming, len(done))]
+                    submitted += more
+                    pending |= set(more)
+                try:
+                    yield ray.get(reference)
+                except RayTaskError as error:
+                    raise error.cause from error
+                except RayError as error:
+                    raise ClusterError(f"Ray failed, and the computation cannot continue: {error}") from error
+        finally:
+            for reference in pending:
+                # A compiled kernel cannot be interrupted: end its process.
+                ray.cancel(reference, force=True)
 
     return parallel_map
 

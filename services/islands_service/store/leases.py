@@ -74,6 +74,12 @@ class Leases:
 
         return self._database.write(operation)
 
+    def is_cancel_requested(self, lease: Lease) -> bool:
+        """Return whether cancellation of a job is requested; the lease is neither checked nor extended."""
+        query = select(jobs.c.cancel_requested).where(jobs.c.id == lease.job.id)
+        with self._database.read() as connection:
+            return bool(connection.execute(query).scalar())
+
     def report(self, lease: Lease, report: ProgressReport) -> Job:
         """Store progress, history points and checkpoint of a job: all together or none of them.
 

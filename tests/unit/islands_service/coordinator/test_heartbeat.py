@@ -1,6 +1,7 @@
 """`Heartbeat`: renews a lease, and reports cancel requests, stop requests and lost leases."""
 
 import time
+from threading import Event
 from typing import Any
 
 import pytest
@@ -134,11 +135,48 @@ def test_cancelled_job_without_checks_is_cancelled_by_the_heartbeat(
         store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {}))
 
 
+def test_job_that_does_not_end_is_abandoned_once_and_stored_as_cancelled(
+    store: Store, lease: Lease, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(heartbeats, "CANCEL_GRACE", 0.1)
+    states = []
+
+    def abandon() -> None:
+        states.append(store.jobs.get(ALICE, lease.job.id).state)
+
+    with Heartbeat(store, lease, SECONDS, StopRequest(), abandon):
+        store.jobs.cancel(ALICE, lease.job.id)
+        eventually(lambda: states, seconds=20.0)
+        time.sleep(0.3)
+    assert states == [JobState.CANCELLED]
+
+
+def test_job_of_a_lost_lease_is_abandoned(
+    store: Store, lease: Lease, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another coordinator runs it, so that this one computes for nothing."""
+    monkeypatch.setattr(heartbeats, "CANCEL_GRACE", 0.1)
+    take_over(store)
+    abandoned = Event()
+    with Heartbeat(store, lease, SECONDS, StopRequest(), abandoned.set):
+        assert abandoned.wait(20.0)
+    assert store.jobs.get(ALICE, lease.job.id).state == JobState.RUNNING
+
+
+def test_cancellation_is_noticed_soon_under_a_long_lease(store: Store) -> None:
+    submitted(store)
+    lease = claimed(store, 600.0)
+    with Heartbeat(store, lease, 600.0, StopRequest()) as heartbeat:
+        time.sleep(0.3)  # renewed once, the next renewal is due in a minute
+        store.jobs.cancel(ALICE, lease.job.id)
+        eventually(lambda: raised_by_check(heartbeat) is JobCancelled, seconds=10.0)
+
+
 def test_cancelled_job_that_stops_in_time_stores_its_outcome(
     store: Store, lease: Lease, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(heartbeats, "CANCEL_GRACE", 5.0)
-    with Heartbeat(store, lease, SECONDS, StopRequest()) as heartbeat:
+    with Heartbeat(store, lease, SECONDS, StopRequest(), lambda: pytest.fail("abandoned")) as heartbeat:
         store.jobs.cancel(ALICE, lease.job.id)
         eventually(lambda: raised_by_check(heartbeat) is JobCancelled, seconds=20.0)
         time.sleep(0.2)
