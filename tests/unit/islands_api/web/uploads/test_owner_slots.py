@@ -13,7 +13,10 @@ OWNERS = "abc"
 
 #: An owner's request arrives; the request of a place among those that hold or wait ends or is cancelled.
 EVENTS = st.lists(
-    st.tuples(st.sampled_from(["arrive", "end", "cancel"]), st.sampled_from(OWNERS), st.integers(0, 5)),
+    st.tuples(
+        st.sampled_from(["arrive", "arrive", "end", "cancel"]), st.sampled_from(OWNERS), st.integers(0, 5)
+    ),
+    min_size=20,
     max_size=60,
 )
 
