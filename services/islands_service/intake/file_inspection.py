@@ -1,4 +1,4 @@
-"""Inspection of an untrusted file in a subprocess with limited memory and time.
+"""Inspection of an untrusted file in a confined subprocess with limited memory and time.
 
 A file that exhausts memory, or makes its reader loop, ends only this subprocess.
 """
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from islands.errors import RecordError, SettingsError
+from islands_service.intake.confinement import confine
 
 if TYPE_CHECKING:
     from islands.io.records import Preview
@@ -80,7 +81,7 @@ async def inspect_file(
         The file or the requested columns cannot be read.
     """
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "islands_service.intake.file_inspection"),
+        *(sys.executable, "-P", "-m", "islands_service.intake.file_inspection"),
         stdin=PIPE,
         stdout=PIPE,
         stderr=PIPE,
@@ -116,6 +117,7 @@ def main() -> None:
     """Inspect the file named on standard input, and write the result to standard output."""
     message = json.load(sys.stdin)
     _limit(message["memory"], message["seconds"])
+    confine([Path(message["path"]).resolve()])
     # Import after the limits are set, so that the imported code is subject to them.
     from islands.io.records import read_dataset  # noqa: PLC0415
     from islands.io.records.preview import preview_table  # noqa: PLC0415
