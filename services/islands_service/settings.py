@@ -74,6 +74,9 @@ class ServiceSettings(BaseSettings):
         Individuals that one job may evaluate.
     max_islands
         Islands of one job.
+    max_job_memory
+        Estimated memory of the individuals of one job: 11.4 kB for each. 0 stands for half of the memory of
+        the machine of the API; set it if the islands run on other machines.
     retention
         Time after which a finished job is deleted; 0 keeps it for ever.
     rate, burst
@@ -118,6 +121,7 @@ class ServiceSettings(BaseSettings):
     max_active: Count = 10_000
     max_evaluations: Count = 10_000_000_000
     max_islands: Count = 256
+    max_job_memory: Annotated[int, Field(ge=0)] = 0
     retention: Annotated[float, Field(ge=0.0)] = 90 * 86_400.0
     rate: Annotated[float, Field(ge=0.0)] = 50.0
     burst: Count = 200

@@ -13,7 +13,7 @@ UNUSUAL_NAMES = ['u "in" V', "y\nout", "v;|\tw", "größe 😀", "<b>&amp;", "u+
 
 @pytest.fixture(scope="module")
 def service(serve):
-    with serve() as running:
+    with serve(max_job_memory=8_000_000_000) as running:
         yield emptied(running)
 
 
@@ -58,6 +58,11 @@ def test_a_valid_job_is_accepted_and_stored_unchanged(service, dataset, changes)
         ({"inputs": ["u_V+2"]}, "invalid-record", "has no column u_V+2"),
         ({"inputs": ["t_s"]}, "invalid-record", "has no time column"),
         ({"inputs": []}, "invalid-request", "/inputs: Tuple should have at least 1 item"),
+        (
+            {"settings": {"population": 100_000, "islands": 256, "generations": 1}},
+            "invalid-settings",
+            "256 islands of 100000 individuals need about 292 GB of memory",
+        ),
         ({"output": "u_V"}, "invalid-record", "column u_V is given as input and as output"),
         ({"output": 'y"\n'}, "invalid-record", "record.csv has no column"),
         ({"seed": -1}, "invalid-request", "/seed: Input should be greater than or equal to 0"),

@@ -238,16 +238,9 @@ class Coordinator:
         warm_up(lambda line: log.info("kernels", note=line))
 
     def _make_engine(self, lease: Lease) -> "Engine":
-        from islands_service.runtime.actor_pool import kill_stale_actors  # noqa: PLC0415
-        from islands_service.runtime.ray_engine import RayEngine  # noqa: PLC0415
+        from islands_service.coordinator.job_engine import make_job_engine  # noqa: PLC0415
 
-        if ended := kill_stale_actors(lease.job.id, lease.epoch):
-            log.warning("actors of a lost lease ended", actors=ended)
-
-        def warn(message: str, _fraction: float | None = None, /) -> None:
-            log.warning("islands", note=message)
-
-        return RayEngine(warn, f"{lease.job.id}.{lease.epoch}")
+        return make_job_engine(lease)
 
     def _sweep_if_due(self) -> None:
         if monotonic() > self._sweep_at:
@@ -275,6 +268,7 @@ PROBLEM_TYPES: Mapping[str, str] = MappingProxyType(
     {
         "RecordError": "invalid-record",
         "SettingsError": "invalid-settings",
+        "JobMemoryError": "insufficient-memory",
         "ModelError": "invalid-model",
         "DatasetNotFoundError": "no-such-dataset",
         "BlobNotFoundError": "no-such-blob",

@@ -15,6 +15,7 @@ from islands.io.records.column_names import find_column
 from islands.io.records.row_range import overlap, parse_rows
 from islands.io.records.validation import check_choice
 from islands.io.simulator_spec.specification import SIMULATORS, ModelSpec, PhysicalSpec, innermost
+from islands_service.domain.job_memory import DEFAULT_SHARE, estimate_memory, machine_memory
 from islands_service.domain.job_spec import (
     LIMITS,
     MAX_SHIFT,
@@ -82,7 +83,9 @@ def _parts(spec: Identification | Discrepancy, settings: ServiceSettings) -> lis
 
 def _check_identification(spec: Identification, settings: ServiceSettings) -> list[Part]:
     """Check the settings of an identification; return the data that it reads."""
-    resolve_job_settings(spec, settings.max_islands, settings.max_evaluations)
+    resolved = resolve_job_settings(spec, settings.max_islands, settings.max_evaluations)
+    limit = settings.max_job_memory or int(DEFAULT_SHARE * machine_memory())
+    estimate_memory(resolved).check_limit(limit)
     return list(spec.parts)
 
 

@@ -8,6 +8,7 @@ import socket
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from math import inf
 from pathlib import Path
 
 import ray
@@ -77,6 +78,11 @@ def cluster(address: str | None = None, cpus: int | None = None) -> Iterator[Non
     logging.getLogger("ray").setLevel(logging.CRITICAL)
     with _local_ray(cpus or _count_cpus()) if address is None else _remote_cluster(address):
         yield
+
+
+def cluster_memory() -> float:
+    """Return the memory in bytes that the machines of the connected cluster offer; infinite if unknown."""
+    return float(ray.cluster_resources().get("memory", inf))
 
 
 @contextmanager

@@ -1,0 +1,45 @@
+"""Engine that runs the islands of a job on the cluster to which the coordinator is connected."""
+
+from sys import maxsize
+
+import structlog
+
+from islands.evolution.engine import Engine
+from islands_service.domain.job import IDENTIFICATION, Job, Lease
+from islands_service.domain.job_memory import estimate_memory, machine_memory
+from islands_service.domain.job_spec import parse_identification, resolve_job_settings
+from islands_service.runtime.actor_pool import kill_stale_actors
+from islands_service.runtime.cluster import cluster_memory
+from islands_service.runtime.ray_engine import RayEngine
+
+log = structlog.get_logger()
+
+
+def make_job_engine(lease: Lease) -> Engine:
+    """Return an engine for a job, and end the actors of its earlier leases.
+
+    Raises
+    ------
+    JobMemoryError
+        The cluster, or the machine of this process, has not enough memory for the job.
+    """
+    check_memory(lease.job)
+    if ended := kill_stale_actors(lease.job.id, lease.epoch):
+        log.warning("actors of a lost lease ended", actors=ended)
+
+    def warn(message: str, _fraction: float | None = None, /) -> None:
+        log.warning("islands", note=message)
+
+    return RayEngine(warn, f"{lease.job.id}.{lease.epoch}")
+
+
+def check_memory(job: Job) -> None:
+    """Check the memory that a job needs when it starts: the cluster may have changed since the submission.
+
+    Raises
+    ------
+    JobMemoryError
+    """
+    if job.kind == IDENTIFICATION:
+        settings = resolve_job_settings(parse_identification(job.spec), maxsize, maxsize)
+        estimate_memory(settings).check_available(cluster_memory(), machine_memory())
