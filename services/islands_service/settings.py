@@ -75,7 +75,7 @@ class ServiceSettings(BaseSettings):
     max_islands
         Islands of one job.
     max_job_memory
-        Estimated memory of the individuals of one job: 11.4 kB for each. 0 stands for half of the memory of
+        Estimated memory of the individuals of one job: 11.4 kB for each. 0 means half of the memory of
         the machine of the API; set it if the islands run on other machines.
     retention
         Time after which a finished job is deleted; 0 keeps it for ever.
