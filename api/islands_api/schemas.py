@@ -9,9 +9,10 @@ from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, PRIORITIES, 
 from islands_service.domain.job_spec import Discrepancy, Identification
 
 _JOB_ID = "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
-_DATASET_ID = "9f86d081884c7d659a2feaa0c55ad015-csv"
+#: Example of the id of a data set.
+DATASET_ID = "9f86d081884c7d659a2feaa0c55ad015-csv"
 _SPEC: dict[str, Any] = {
-    "dataset": _DATASET_ID,
+    "dataset": DATASET_ID,
     "inputs": ["u_V"],
     "output": "y_um",
     "preset": "auto",
@@ -19,7 +20,7 @@ _SPEC: dict[str, Any] = {
     "settings": {"islands": 2, "generations": 40},
 }
 _DISCREPANCY: dict[str, Any] = {
-    "dataset": _DATASET_ID,
+    "dataset": DATASET_ID,
     "input": "u_V",
     "output": "y_um",
     "channels": ["T_K"],
@@ -33,86 +34,6 @@ class ResponseModel(BaseModel):
     """Base class of responses. Accepts unknown fields, which a newer service may send."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
-
-
-class Column(ResponseModel):
-    """Column of a data set."""
-
-    name: str
-    unit: str
-    samples: int | None = Field(description="None if the column cannot be read.")
-    minimum: float | None = None
-    maximum: float | None = None
-    mean: float | None = None
-    deviation: float | None = Field(default=None, description="Standard deviation.")
-    problem: str = Field(
-        default="", description="Why the column can be neither input nor output. Empty if it can."
-    )
-
-
-class RecordFact(ResponseModel):
-    """Measured property of a record."""
-
-    name: str = Field(description="Property, for example `dead-time`.", examples=["dead-time"])
-    signal: str = Field(description="Column that it describes. Empty for the whole record.")
-    value: bool | float | None = Field(description="None if the record does not determine it.")
-    unit: str
-    interval: tuple[float, float] | None = Field(default=None, description="95 % interval of the value.")
-    confidence: float | None = Field(default=None, description="Probability that the value is right.")
-    sentence: str = Field(description="The fact in one sentence.")
-
-
-class ChosenColumns(ResponseModel):
-    """Inputs and output that the facts describe."""
-
-    inputs: tuple[str, ...]
-    output: str
-    confidence: float | None = Field(
-        default=None, description="Probability that the choice is right. None if it was given."
-    )
-    reason: str
-
-
-class Inspection(ResponseModel):
-    """Facts about the record in a file."""
-
-    rows: str | None = Field(
-        default=None, description="`START:STOP`, the samples that were measured. None if all were."
-    )
-    choice: ChosenColumns
-    facts: tuple[RecordFact, ...]
-
-
-class Preview(ResponseModel):
-    """Content of a file."""
-
-    samples: int | None
-    columns: tuple[Column, ...]
-    time: str | None = Field(default=None, description="Name of the time column.")
-    dt: float | None = Field(default=None, description="Sampling time in seconds. None if it is unknown.")
-    warnings: tuple[str, ...] = ()
-    reading: dict[str, Any] = Field(default_factory=dict, description="Options of reading.")
-    inspection: Inspection | None = Field(
-        default=None, description="Facts about the record. None if no two columns form one."
-    )
-
-
-class DatasetView(ResponseModel):
-    """Uploaded record."""
-
-    id: str = Field(examples=[_DATASET_ID])
-    name: str
-    sha256: str
-    bytes: int
-    created: datetime
-    preview: Preview
-
-
-class DatasetPage(ResponseModel):
-    """Page of data sets, newest first."""
-
-    items: tuple[DatasetView, ...]
-    next: str | None = Field(default=None, description="Cursor of the next page. None on the last page.")
 
 
 class JobMetadata(BaseModel):
@@ -149,7 +70,7 @@ class DiscrepancyRequest(JobMetadata, Discrepancy):
             "examples": [
                 {**_DISCREPANCY, "name": "piezo against its model"},
                 {
-                    "dataset": _DATASET_ID,
+                    "dataset": DATASET_ID,
                     "input": "u_V",
                     "output": "y_um",
                     "simulation": {"kind": "column", "column": "y_sim_um"},
@@ -231,6 +152,10 @@ class JobView(ResponseModel):
     progress: dict[str, Any] | None = None
     summary: dict[str, Any] | None = Field(default=None, description="Summary of the result.")
     problem: dict[str, Any] | None = Field(default=None, description="Why the job failed.")
+    versions: dict[str, str | None] = Field(
+        default_factory=dict,
+        description="Version of islands that accepted the `job` and wrote its `checkpoint` and `result`.",
+    )
 
 
 class JobPage(ResponseModel):

@@ -78,7 +78,9 @@ class ServiceSettings(BaseSettings):
         Estimated memory of the individuals of one job: 11.4 kB for each. 0 means half of the memory of
         the machine of the API; set it if the islands run on other machines.
     retention
-        Time after which a finished job is deleted; 0 keeps it for ever.
+        Time after which a finished job is deleted; 0 keeps it for ever. An idempotency key is valid as long.
+    audit_retention
+        Time after which an entry of the audit trail is deleted; 0 keeps it for ever.
     rate, burst
         Requests per second of one key, and requests that it may send at once; a rate of 0 disables the limit.
     tls_certificate, tls_key
@@ -123,6 +125,7 @@ class ServiceSettings(BaseSettings):
     max_islands: Count = 256
     max_job_memory: Annotated[int, Field(ge=0)] = 0
     retention: Annotated[float, Field(ge=0.0)] = 90 * 86_400.0
+    audit_retention: Annotated[float, Field(ge=0.0)] = 365 * 86_400.0
     rate: Annotated[float, Field(ge=0.0)] = 50.0
     burst: Count = 200
     require_keys: bool = False

@@ -256,17 +256,6 @@ def test_every_figure_is_drawn_once_and_stored(service, document, finished):
     assert "script" not in report.headers["content-security-policy"]
 
 
-@pytest.mark.nightly
-def test_a_figure_of_a_deleted_record_is_rejected(service):
-    job = run_identification(service)
-    dataset = service.client.get(f"/v1/jobs/{job}").json()["spec"]["dataset"]
-    problem_of(service.client.get(f"/v1/jobs/{job}/figures/islands.svg"), 404, "not-found")
-    assert service.client.delete(f"/v1/datasets/{dataset}").status_code == 204
-    for path in ("figures/record.svg", "models/1/figures/hold.svg", "models/1/simulation", "report"):
-        detail = problem_of(service.client.get(f"/v1/jobs/{job}/{path}"), 404, "no-such-dataset")
-        assert dataset in detail
-
-
 def test_the_preview_of_a_data_set_describes_its_columns(service):
     preview = service.upload(csv(123), "größe.csv").json()["preview"]
     assert (preview["samples"], preview["time"], preview["dt"], preview["warnings"]) == (123, "t_s", 0.01, [])

@@ -13,6 +13,7 @@ from islands_service.domain.job import (
     ACTIVE,
     TERMINAL,
     IdempotencyError,
+    JobDeletedError,
     JobState,
     QuotaError,
 )
@@ -125,13 +126,21 @@ def test_owners_have_separate_idempotency_keys(store):
     assert submitted(store, ALICE, idempotency_key="k").id != submitted(store, BOB, idempotency_key="k").id
 
 
-def test_key_of_a_deleted_job_can_be_reused(store):
+def test_key_of_a_deleted_job_creates_no_second_job_until_it_expires(store):
     job = submitted(store, idempotency_key="k")
     store.jobs.cancel(ALICE, job.id)
     store.jobs.delete(ALICE, job.id)
-    again, new = store.jobs.submit(asked(idempotency_key="k", spec={"seed": 8}))
-    assert new
-    assert again.id != job.id
+    before = contents(store)
+    for ask in (store.jobs.submit, store.jobs.find_replay):
+        with pytest.raises(JobDeletedError, match=f"{job.id} .* take a new key"):
+            ask(asked(idempotency_key="k"))
+        with pytest.raises(IdempotencyError, match=job.id):
+            ask(asked(idempotency_key="k", spec={"seed": 8}))
+    store.retention.delete_expired(3600.0)
+    assert contents(store) == before
+    assert submitted(store, BOB, idempotency_key="k").id != job.id
+    store.retention.delete_expired(-1.0)
+    assert store.jobs.submit(asked(idempotency_key="k"))[1]
 
 
 def test_concurrent_requests_with_the_same_key_get_one_job(database):

@@ -1,6 +1,7 @@
 """Contract of the store for data sets, keys and retention."""
 
 import time
+from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 
@@ -8,7 +9,7 @@ import pytest
 from sqlalchemy import update
 
 from islands.errors import SettingsError
-from islands_service.domain.job import TERMINAL, JobState, QuotaError
+from islands_service.domain.job import TERMINAL, DatasetDeletedError, JobState, QuotaError
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError, dataset_id
 from islands_service.store.keys import PREFIX, SCOPES, KeyNotFoundError
 from islands_service.store.tables import datasets, jobs
@@ -124,26 +125,85 @@ def test_pages_of_data_sets_are_newest_first_and_hold_each_once(store):
                 found += page
                 if after is None:
                     break
-            assert found == expected
+            assert [each.id for each in found] == [each.id for each in expected]
     assert store.datasets.page(BOB) == ((), None)
 
 
+def test_page_contains_only_a_summary_of_each_preview(store):
+    """A list of 200 data sets with 1000 columns each would have tens of megabytes."""
+    wide = {**PREVIEW, "samples": 9, "dt": 0.1, "time": None, "columns": PREVIEW["columns"] * 1000}
+    dataset, _ = store.datasets.add(ALICE, "a.csv", ".csv", BLOB, 12, wide)
+    summary = {"samples": 9, "columns": 1000, "time": None, "dt": 0.1, "warnings": 0}
+    assert store.datasets.page(ALICE)[0] == (replace(dataset, preview=summary),)
+    # Rows of earlier versions have no summary.
+    store.database.write(lambda connection: connection.execute(update(datasets).values(summary=None)))
+    assert store.datasets.page(ALICE)[0][0].preview == summary
+    assert store.datasets.get(ALICE, dataset.id).preview == wide
+
+
 @pytest.mark.parametrize("state", JobState)
-def test_data_set_can_be_deleted_unless_a_job_needs_it(store, state):
+def test_data_set_can_be_deleted_unless_an_unfinished_job_needs_it(store, state):
     dataset, _ = added(store)
     other, _ = added(store, number=1)
-    job_in(store, state, spec={"records": [{"dataset": dataset.id, "use": "estimation"}]})
+    job = job_in(store, state, spec={"recordings": [{"dataset": dataset.id}]})
     before = contents(store)
     if state in TERMINAL:
         store.datasets.delete(ALICE, dataset.id)
-        with pytest.raises(DatasetNotFoundError, match=dataset.id):
-            store.datasets.get(ALICE, dataset.id)
+        for ask in (store.datasets.get, store.datasets.delete):
+            with pytest.raises(DatasetNotFoundError, match=dataset.id):
+                ask(ALICE, dataset.id)
+        # The figures of the job need it.
+        assert store.datasets.get(ALICE, dataset.id, deleted=True) == dataset
+        assert dataset.blob in store.retention.named_blobs()
     else:
-        with pytest.raises(DatasetInUseError, match=dataset.id):
+        with pytest.raises(DatasetInUseError, match=f"{job.id} needs"):
             store.datasets.delete(ALICE, dataset.id)
         assert contents(store) == before
     store.datasets.delete(ALICE, other.id)
-    assert store.datasets.page(ALICE)[0] == (() if state in TERMINAL else (dataset,))
+    assert other.blob not in store.retention.named_blobs()
+    left = [each.id for each in store.datasets.page(ALICE)[0]]
+    assert left == ([] if state in TERMINAL else [dataset.id])
+
+
+@pytest.mark.parametrize("by", ["owner", "retention"])
+def test_deleted_data_set_is_kept_and_counted_until_its_last_job_is_deleted(store, by):
+    dataset, _ = added(store, size=600)
+    jobs_of_it = [job_in(store, JobState.SUCCEEDED, spec={"dataset": dataset.id}) for _ in range(2)]
+    store.datasets.delete(ALICE, dataset.id)
+    with pytest.raises(QuotaError, match="results still need"):
+        added(store, number=1, size=500, most_bytes=1000)
+    if by == "owner":
+        store.jobs.delete(ALICE, jobs_of_it[0].id)
+        assert dataset.blob in store.retention.named_blobs()
+        store.jobs.delete(ALICE, jobs_of_it[1].id)
+    else:
+        store.retention.delete_expired(-1.0)
+    assert not contents(store)["datasets"]
+    assert added(store, number=1, size=500, most_bytes=1000)[1]
+
+
+def test_deleted_data_set_is_restored_by_the_same_upload(store):
+    dataset, _ = added(store, size=600)
+    job_in(store, JobState.SUCCEEDED, spec={"dataset": dataset.id})
+    store.datasets.delete(ALICE, dataset.id)
+    again, new = added(store, size=600, most_bytes=600)
+    assert (again.id, new) == (dataset.id, True)
+    assert [each.id for each in store.datasets.page(ALICE)[0]] == [dataset.id]
+    assert not added(store)[1]
+
+
+def test_job_without_its_data_set_is_not_resumed(store):
+    first, second = (added(store, number=number)[0] for number in range(2))
+    spec = {"dataset": first.id, "recordings": [{"dataset": second.id}], "validation": 0.25}
+    job = job_in(store, JobState.FAILED, spec=spec)
+    assert job.datasets == (first.id, second.id)
+    store.datasets.delete(ALICE, second.id)
+    before = contents(store)
+    with pytest.raises(DatasetDeletedError, match=f"{second.id} .* upload the same file again"):
+        store.jobs.resume(ALICE, job.id)
+    assert contents(store) == before
+    added(store, number=1)
+    assert store.jobs.resume(ALICE, job.id).state == JobState.QUEUED
 
 
 def test_job_of_another_owner_does_not_block_a_deletion(store):

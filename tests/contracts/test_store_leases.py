@@ -7,7 +7,7 @@ from contextlib import ExitStack
 import pytest
 
 from islands_service.domain.job import TERMINAL, JobState, ProgressReport
-from islands_service.store.leases import ATTEMPTS
+from islands_service.store.job_rows.job_claims import ATTEMPTS
 from support.stores import (
     ALICE,
     BOB,

@@ -15,9 +15,8 @@ from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
 from islands_api.client.recording_parts import make_part
 from islands_api.client.response_parsing import read_as, read_mapping
+from islands_api.dataset_schemas import DatasetPage, DatasetSummary, DatasetView
 from islands_api.schemas import (
-    DatasetPage,
-    DatasetView,
     HistoryPage,
     JobPage,
     JobView,
@@ -32,7 +31,7 @@ T = TypeVar("T")
 JobRef = JobView | str
 
 #: Data set or its id.
-DatasetRef = DatasetView | str
+DatasetRef = DatasetView | DatasetSummary | str
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,12 +256,12 @@ def events_path(which: JobRef) -> str:
     return f"/v1/jobs/{_quote_id(which)}/events"
 
 
-def get_id(which: JobView | DatasetView | str) -> str:
+def get_id(which: JobView | DatasetRef) -> str:
     """Return the id of a job or data set that is given as a value or as an id."""
     return which if isinstance(which, str) else which.id
 
 
-def _quote_id(which: JobView | DatasetView | str) -> str:
+def _quote_id(which: JobView | DatasetRef) -> str:
     """Return an id as one percent-encoded path segment."""
     return quote(get_id(which), safe="")
 

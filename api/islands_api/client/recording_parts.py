@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-from islands_api.schemas import DatasetView
+from islands_api.dataset_schemas import DatasetSummary, DatasetView
 
 
-def make_part(given: DatasetView | str | Mapping[str, Any], rows: str | None = None) -> Mapping[str, Any]:
+def make_part(
+    given: DatasetView | DatasetSummary | str | Mapping[str, Any], rows: str | None = None
+) -> Mapping[str, Any]:
     """Return a recording in the form of the body; one that is given in this form is returned unchanged.
 
     Parameters

@@ -10,6 +10,7 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
 from islands_api.web.dependencies import AppState
 from islands_api.web.problems import AuthenticationError, InsufficientScopeError
+from islands_service.domain.job import Requester
 from islands_service.store.database import StoreError
 from islands_service.store.keys import SCOPES, Key
 
@@ -35,12 +36,15 @@ class Principal:
         Owner of the caller's jobs and data sets.
     scopes : frozenset of str
         Scopes of the key.
+    requester : Requester
+        Key and address, for the audit trail.
     secret : str or None
         Secret of the key. None if the request had no key.
     """
 
     owner: str
     scopes: frozenset[str]
+    requester: Requester
     secret: str | None = field(default=None, repr=False)
 
 
@@ -110,14 +114,14 @@ async def _check_key(
                 "this service needs a key: send 'Authorization: Bearer islands_...'; its operator creates "
                 "one with 'islands keys create'"
             )
-        return Principal(LOCAL_OWNER, frozenset(SCOPES))
+        return Principal(LOCAL_OWNER, frozenset(SCOPES), Requester(address))
     key = await request.app.state.keys.find(credentials.credentials)
     if key is None or not key.valid:
         state.rate_limiter.acquire(f"address {address}", min(_INVALID_KEY_TOKENS, state.settings.burst))
         reason = "is unknown" if key is None else "was revoked" if key.revoked is not None else "has expired"
         raise AuthenticationError(f"the key {reason}: ask the operator of this service for another one")
     state.rate_limiter.acquire(f"key {key.id}")
-    return Principal(key.owner, key.scopes, credentials.credentials)
+    return Principal(key.owner, key.scopes, Requester(address, key.id), credentials.credentials)
 
 
 async def _get_principal(

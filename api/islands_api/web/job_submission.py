@@ -10,7 +10,7 @@ from islands_api.web.auth import Principal
 from islands_api.web.dependencies import AppState
 from islands_api.web.problems import ResourceNotFoundError, ResultNotReadyError
 from islands_api.web.responses import JSONDocument, job_document
-from islands_service.domain.job import Job, JobState, Submission
+from islands_service.domain.job import Job, JobState, Requester, Submission
 from islands_service.intake.file_inspection import inspect_file
 from islands_service.intake.job_inputs import link_blob
 from islands_service.intake.job_validation import PendingInspection, validate_job
@@ -56,7 +56,7 @@ async def submit_job(
         The job could only fail, or its owner has used up a quota.
     """
     submission = Submission(caller.owner, request.spec, kind, request.name, request.priority, key)
-    job, new = await _validate_and_store(state, request, submission)
+    job, new = await _validate_and_store(state, request, submission, caller.requester)
     if new:
         state.metrics.accepted.inc()
     headers = {
@@ -74,7 +74,9 @@ def etag(job: Job) -> str:
     return f'"{job.version}"'
 
 
-async def _validate_and_store(state: AppState, request: Request, submission: Submission) -> tuple[Job, bool]:
+async def _validate_and_store(
+    state: AppState, request: Request, submission: Submission, by: Requester
+) -> tuple[Job, bool]:
     replayed, inspections = await state.run_blocking(_validate_or_replay, state, request, submission)
     if replayed is not None:
         return replayed, False
@@ -87,7 +89,7 @@ async def _validate_and_store(state: AppState, request: Request, submission: Sub
                     state.settings.inspection_memory,
                     state.settings.inspection_seconds,
                 )
-    return await state.run_blocking(state.store.jobs.submit, submission, state.settings.max_active)
+    return await state.run_blocking(state.store.jobs.submit, submission, state.settings.max_active, by)
 
 
 def _validate_or_replay(

@@ -15,7 +15,14 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from islands.errors import IslandsError, ModelError, RecordError, SettingsError
-from islands_service.domain.job import IdempotencyError, JobNotFoundError, JobStateError, QuotaError
+from islands_service.domain.job import (
+    DatasetDeletedError,
+    IdempotencyError,
+    JobDeletedError,
+    JobNotFoundError,
+    JobStateError,
+    QuotaError,
+)
 from islands_service.store.blobs import BlobNotFoundError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError
@@ -154,6 +161,12 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         ),
         ResultNotReadyError: ProblemKind(HTTPStatus.CONFLICT, "not-finished", "The job has no result"),
         JobStateError: ProblemKind(HTTPStatus.CONFLICT, "wrong-state", "The job's state does not allow this"),
+        DatasetDeletedError: ProblemKind(
+            HTTPStatus.CONFLICT, "dataset-deleted", "The job's data set was deleted"
+        ),
+        JobDeletedError: ProblemKind(
+            HTTPStatus.GONE, "job-deleted", "The job of the idempotency key was deleted"
+        ),
         DatasetInUseError: ProblemKind(HTTPStatus.CONFLICT, "dataset-in-use", "A job needs the data set"),
         PayloadTooLargeError: ProblemKind(
             HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "too-large", "The request is too large"

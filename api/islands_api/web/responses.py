@@ -30,11 +30,12 @@ def job_document(job: Job) -> dict[str, Any]:
         "progress": job.progress,
         "summary": job.summary,
         "problem": job.problem,
+        "versions": job.versions,
     }
 
 
 def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
-    """Convert a data set to a document with the fields of `islands_api.schemas.DatasetView`."""
+    """Convert a data set to a document with the fields of `islands_api.dataset_schemas.DatasetView`."""
     return {
         "id": dataset.id,
         "name": dataset.name,
@@ -43,6 +44,13 @@ def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
         "created": _format_time(dataset.created),
         "preview": dataset.preview,
     }
+
+
+def dataset_summary(dataset: StoredDataset) -> dict[str, Any]:
+    """Convert a data set of a page to a document: `islands_api.dataset_schemas.DatasetSummary`."""
+    document = dataset_document(dataset)
+    summary = document.pop("preview")
+    return {**document, **summary}
 
 
 class JSONDocument(JSONResponse):

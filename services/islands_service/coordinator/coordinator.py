@@ -12,6 +12,14 @@ import structlog
 
 from islands.errors import IslandsError
 from islands_service.coordinator.heartbeat import CoordinatorStopping, HangGuard, Heartbeat, JobCancelled
+from islands_service.coordinator.job_failures import (
+    RETRY_BACKOFF,
+    TRANSIENT_ERRORS,
+    JobDeclinedError,
+    check_readable,
+    describe_interruption,
+    make_problem_document,
+)
 from islands_service.coordinator.job_runners import JOB_RUNNERS
 from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
 from islands_service.liveness import StopRequest, stop_on_signals
@@ -137,6 +145,13 @@ class Coordinator:
                 log.info("job finished", state=outcome.state, seconds=round(monotonic() - started, 3))
             except LeaseLostError as error:
                 log.warning("lease lost", reason=str(error))
+            except JobDeclinedError as error:
+                log.warning("job declined", reason=str(error))
+                self._give_back(self._store.leases.decline, lease, str(error))
+            except TRANSIENT_ERRORS as error:
+                log.error("job interrupted", trace=traceback.format_exc())
+                reason = describe_interruption(error)
+                self._give_back(self._store.leases.postpone, lease, reason, RETRY_BACKOFF)
             except CoordinatorStopping:
                 self._release(lease)
             except StoreError as error:
@@ -162,20 +177,15 @@ class Coordinator:
             )
         except JobCancelled:
             return JobOutcome(JobState.CANCELLED)
-        except (LeaseLostError, CoordinatorStopping, ClusterError, StoreError):
+        except (LeaseLostError, CoordinatorStopping, ClusterError, StoreError, JobDeclinedError):
             raise
-        except IslandsError as error:
-            return JobOutcome(JobState.FAILED, problem=make_problem_document(error))
+        except TRANSIENT_ERRORS:
+            raise
         except Exception as error:
-            log.error("job failed", trace=traceback.format_exc())
-            return JobOutcome(
-                JobState.FAILED,
-                problem={
-                    "type": "defect",
-                    "title": "The job met a defect of the service",
-                    "detail": f"{type(error).__name__}: {error}. Please report it with the job's id.",
-                },
-            )
+            check_readable(lease.job.versions["job"], "job", error)
+            trace = None if isinstance(error, IslandsError) else traceback.format_exc()
+            log.error("job failed", reason=str(error), trace=trace)
+            return JobOutcome(JobState.FAILED, problem=make_problem_document(error))
 
     def _check(self, heartbeat: Heartbeat) -> None:
         """Raise the reason why a job must end; see `Heartbeat.check`."""
@@ -200,8 +210,12 @@ class Coordinator:
                 self._stopping.wait(RETRY_SECONDS)
 
     def _release(self, lease: Lease, attempted: bool = False) -> None:
+        self._give_back(self._store.leases.release, lease, attempted)
+
+    def _give_back(self, how: Callable[..., None], *arguments: object) -> None:
+        """Return a job to the queue, by an operation of the store."""
         try:
-            self._store.leases.release(lease, attempted)
+            how(*arguments)
             log.info("job released")
         except (LeaseLostError, StoreError) as error:
             # Another coordinator claims the job after the lease has expired.
@@ -250,27 +264,10 @@ class Coordinator:
     def _sweep(self) -> None:
         if self._settings.retention:
             self._store.retention.delete_expired(self._settings.retention)
+        if self._settings.audit_retention:
+            self._store.retention.delete_old_audit(self._settings.audit_retention)
         # Read the clock before the references, and those before the files: a blob that is referenced only
         # after the query is younger than the limit.
         before = time() - ORPHAN_AGE
         removed = self._blobs.sweep(self._store.retention.named_blobs(), before)
         log.info("swept", blobs=removed)
-
-
-def make_problem_document(error: IslandsError) -> dict[str, str]:
-    """Describe to the owner of a job why it failed."""
-    kind = PROBLEM_TYPES.get(type(error).__name__, "job-failed")
-    return {"type": kind, "title": "The job failed", "detail": str(error)}
-
-
-#: Problem types of errors that the input of a job can cause, by class name.
-PROBLEM_TYPES: Mapping[str, str] = MappingProxyType(
-    {
-        "RecordError": "invalid-record",
-        "SettingsError": "invalid-settings",
-        "JobMemoryError": "insufficient-memory",
-        "ModelError": "invalid-model",
-        "DatasetNotFoundError": "no-such-dataset",
-        "BlobNotFoundError": "no-such-blob",
-    }
-)

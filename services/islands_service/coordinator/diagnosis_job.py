@@ -60,7 +60,9 @@ def run_diagnosis_job(
             log.warning("report failed", job=lease.job.id, reason=str(error))
 
     spec = parse_discrepancy(lease.job.spec)
-    datasets = {part.dataset: store.datasets.get(lease.job.owner, part.dataset) for part in spec.parts}
+    datasets = {
+        part.dataset: store.datasets.get(lease.job.owner, part.dataset, deleted=True) for part in spec.parts
+    }
     report("reading the record")
     record, columns = read_record_and_columns(spec, datasets, blobs)
     simulator = make_simulator(spec.simulation, record, columns)

@@ -1,6 +1,5 @@
 """Identification job: the search on Ray, its progress, its checkpoints and its result."""
 
-import gzip
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
@@ -14,21 +13,16 @@ from islands.evolution.presets import AUTO
 from islands.evolution.search_result import SearchResult
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.facade.automatic.kind_choice import Choice, choice_from_document
+from islands.facade.automatic.kind_choice import Choice
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.identify import identify
-from islands.io.checkpoints import (
-    archipelago_from_document,
-    checkpoint_text,
-    history_document,
-    state_document,
-    state_from_document,
-)
+from islands.io.checkpoints import history_document
 from islands.io.models import model_json
 from islands.io.result_folder import result_document
 from islands.io.result_text.model_description import describe
 from islands.model.equations import equation
-from islands_service.domain.job import Job, JobOutcome, JobState, Lease, ProgressReport
+from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
+from islands_service.domain.job import JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.store import Store
@@ -63,19 +57,20 @@ def run_identification_job(
     """
     job = lease.job
     spec = parse_identification(job.spec)
-    datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
+    datasets = {name: store.datasets.get(job.owner, name, deleted=True) for name in spec.datasets}
     record, validation = read_record_and_validation(spec, datasets, blobs)
-    start, spent, choice = _load_checkpoint(job, blobs)
-    reporter = _ProgressReporter(lease, store, blobs, check, every, start, spent)
+    checkpoints = JobCheckpoints(job, blobs)
+    start = checkpoints.read()
+    reporter = _ProgressReporter(lease, store, checkpoints, check, every, start)
 
     def stop() -> bool:
         check()
         return False
 
     preset: str | Choice = spec.preset
-    if preset == AUTO and start is not None:
+    if preset == AUTO and start.state is not None:
         # A job of an earlier version without preset stored no choice, and had this default.
-        preset = choice or "hysteresis"
+        preset = start.choice or "hysteresis"
     elif preset == AUTO:
         preset = choose_preset(record, validation, spec.changes, reporter.report_stage)
     reporter.choice = preset if isinstance(preset, Choice) else None
@@ -87,16 +82,16 @@ def run_identification_job(
         progress=reporter,
         stage=reporter.report_stage,
         stop=stop,
-        start=start,
+        start=start.state,
         engine=engine,
         **spec.changes,
     )
     reporter.flush()
-    return make_outcome(result.with_wall_time(reporter.spent).search_result)
+    return make_outcome(result.with_wall_time(reporter.spent).search_result, start.note)
 
 
-def make_outcome(found: SearchResult) -> JobOutcome:
-    """Return the part of a search result that the store keeps."""
+def make_outcome(found: SearchResult, note: str = "") -> JobOutcome:
+    """Return the part of a search result that the store keeps, with a note for the owner in its summary."""
     document = result_document(found)
     models = document.pop("models")
     recommended = document["recommended"]
@@ -113,19 +108,10 @@ def make_outcome(found: SearchResult) -> JobOutcome:
         "evaluations": document["search"]["evaluations"],
         "wall_s": document["search"]["wall_s"],
         "ended_by": document["search"]["ended_by"],
+        **({"note": note} if note else {}),
     }
     files = [model_json(entry.model) for entry in found.models]
     return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
-
-
-def _load_checkpoint(job: Job, blobs: Blobs) -> tuple[SearchState | None, float, Choice | None]:
-    """Return the search state at the last checkpoint of a job, the seconds spent, and the choice of auto."""
-    if job.checkpoint is None:
-        return None, 0.0, None
-    text = gzip.decompress(blobs.read(job.checkpoint)).decode()
-    archipelago, about = archipelago_from_document(text, f"the checkpoint of job {job.id}")
-    choice = choice_from_document(about["choice"]) if about.get("choice") else None
-    return state_from_document(archipelago, about), float(about["wall_s"]), choice
 
 
 class _ProgressReporter:
@@ -135,19 +121,20 @@ class _ProgressReporter:
         self,
         lease: Lease,
         store: Store,
-        blobs: Blobs,
+        checkpoints: JobCheckpoints,
         check: Callable[[], None],
         every: float,
-        start: SearchState | None,
-        spent: float,
+        start: JobStart,
     ) -> None:
-        self._lease, self._store, self._blobs = lease, store, blobs
+        self._lease, self._store, self._checkpoints = lease, store, checkpoints
         self._check, self._every = check, every
-        self._started_at = monotonic() - spent
-        self._first = (monotonic(), 0 if start is None else start.evaluations)
+        self._started_at = monotonic() - start.spent
+        state = start.state
+        self._first = (monotonic(), 0 if state is None else state.evaluations)
+        self._note = {"note": start.note} if start.note else {}
         # Number of stored points that will not change. The last point of a history is replaced until the best
         # improves.
-        self._stored_points = 0 if start is None else len(start.history) - 1
+        self._stored_points = 0 if state is None else len(state.history) - 1
         self._report_at = self._checkpoint_at = monotonic()  # store the first populations immediately
         self._last: tuple[SearchState, Settings] | None = None
         #: Choice of the preset auto, which checkpoints contain.
@@ -167,12 +154,18 @@ class _ProgressReporter:
     def report_stage(self, message: str, _fraction: float | None = None, /) -> None:
         """Store the stage before or after the epochs as the phase."""
         self._check()
-        reached = self._progress(*self._last) if self._last else self._lease.job.progress or {}
+        reached = self._progress(*self._last) if self._last else self._reached_before()
         try:
             self._store.leases.report(self._lease, ProgressReport({**reached, "phase": message}))
         except StoreError as error:
             # Continue the search. The next report has the progress.
             log.warning("report failed", job=self._lease.job.id, reason=str(error))
+
+    def _reached_before(self) -> dict[str, Any]:
+        """Return the progress of earlier attempts, without their note."""
+        before = {} if self._note else {**(self._lease.job.progress or {})}
+        before.pop("note", None)
+        return {**before, **self._note}
 
     def flush(self) -> None:
         """Store the last state. Retry while the store is unavailable."""
@@ -187,20 +180,23 @@ class _ProgressReporter:
         report = ProgressReport(self._progress(state, settings), points, after=after)
         try:
             if started >= self._checkpoint_at:
-                report = replace(report, checkpoint=self._blobs.write(self._checkpoint(state)))
+                blob = self._checkpoints.write(state, self.spent, self.choice)
+                report = replace(report, checkpoint=blob)
             self._store.leases.report(self._lease, report)
         except StoreError as error:
             # Continue the search. The next report contains the same points.
             log.warning("report failed", job=self._lease.job.id, reason=str(error))
             self._report_at = monotonic() + REPORT_EVERY
             if report.checkpoint is not None:
-                # The unreferenced checkpoint stays on disk until a sweep: do not write another one at once.
+                self._checkpoints.remember(report.checkpoint)
+                # The checkpoint stays on disk until the next one is stored: do not write that at once.
                 self._checkpoint_at = monotonic() + self._every
             return False
         self._stored_points = len(state.history) - 1
         now = monotonic()
         self._report_at = now + REPORT_EVERY
         if report.checkpoint is not None:
+            self._checkpoints.supersede(report.checkpoint)
             self._checkpoint_at = now + max(self._every, (now - started) / CHECKPOINT_SHARE)
         return True
 
@@ -220,14 +216,10 @@ class _ProgressReporter:
             "best_error": min((error for error in best.values() if isfinite(error)), default=None),
             "best_by_size": best,
             "islands": [least**0.5 if isfinite(least) else None for least in last.islands],
+            **self._note,
         }
 
     def _points(self, state: SearchState) -> tuple[tuple[Any, ...], int]:
         new = history_document(state.history[self._stored_points :])
         after = state.history[self._stored_points - 1].generation if self._stored_points else -1
         return tuple((*point[:3], tuple(point[3])) for point in new), after
-
-    def _checkpoint(self, state: SearchState) -> bytes:
-        choice = None if self.choice is None else self.choice.to_document()
-        about = {"job": self._lease.job.id, "wall_s": self.spent, "choice": choice, **state_document(state)}
-        return gzip.compress(checkpoint_text(state.archipelago, about).encode(), compresslevel=1, mtime=0)

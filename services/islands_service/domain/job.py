@@ -21,9 +21,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from importlib.metadata import version
 from typing import Any
 
 from islands.errors import IslandsError
+
+#: Version of islands of this process.
+ISLANDS_VERSION = version("islands")
 
 
 class JobState(StrEnum):
@@ -74,12 +78,36 @@ class IdempotencyError(IslandsError):
     """An idempotency key was used before with a different request."""
 
 
+class DatasetDeletedError(IslandsError):
+    """A data set that the job needs was deleted."""
+
+
+class JobDeletedError(IslandsError):
+    """The job of an idempotency key was deleted."""
+
+
 class QuotaError(IslandsError):
     """An owner has reached the limit of active jobs or of stored data."""
 
 
 class LeaseLostError(IslandsError):
     """The lease is no longer valid: the job was claimed again, or is finished. The holder must not write."""
+
+
+@dataclass(frozen=True, slots=True)
+class Requester:
+    """Origin of a request that changes something, for the audit trail.
+
+    Attributes
+    ----------
+    address : str
+        Address of the client, or ``command line``.
+    key : str or None
+        Id of the key; None if the request needed none.
+    """
+
+    address: str
+    key: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +164,8 @@ class Job:
         Reason of the failure.
     created, updated, started, finished : float
         Seconds since 1970 by the clock of the database.
+    versions : mapping
+        Version of islands that accepted the ``job``, and that wrote its ``checkpoint`` and its ``result``.
     """
 
     id: str
@@ -156,6 +186,14 @@ class Job:
     updated: float
     started: float | None
     finished: float | None
+    versions: Mapping[str, str | None]
+
+    @property
+    def datasets(self) -> tuple[str, ...]:
+        """Data sets that the specification names, also one that this version cannot parse."""
+        parts = [self.spec, self.spec.get("validation"), *(self.spec.get("recordings") or ())]
+        named = [part.get("dataset") for part in parts if isinstance(part, dict)]
+        return tuple(dict.fromkeys(name for name in named if isinstance(name, str)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -101,7 +101,7 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
         The job, its data or the model no longer exists.
     """
     spec = parse_identification(job.spec)
-    datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
+    datasets = {name: store.datasets.get(job.owner, name, deleted=True) for name in spec.datasets}
     record, validation = read_record_and_validation(spec, datasets, blobs)
     document = store.results.document(job.id)
     stored = store.results.models(job.id, rank)

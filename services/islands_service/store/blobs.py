@@ -147,6 +147,12 @@ class Blobs:
                     removed += 1
         return removed
 
+    def discard(self, blob: str) -> None:
+        """Remove a blob that no row references and no process is about to write; it may be missing."""
+        # A file that cannot be removed now is removed by a sweep.
+        with suppress(OSError):
+            self._at(blob).unlink()
+
     def _at(self, blob: str) -> Path:
         return self._folder / blob[:2] / blob
 

@@ -19,7 +19,7 @@ from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from islands.errors import IslandsError
-from islands_service.store.connections import make_engine
+from islands_service.store.backends.connections import make_engine
 
 T = TypeVar("T")
 

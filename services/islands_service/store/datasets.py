@@ -6,13 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Row, delete, func, insert, select, tuple_
+from sqlalchemy import Connection, case, func, insert, select, tuple_, update
 
 from islands.errors import IslandsError
-from islands_service.domain.job import ACTIVE, QuotaError
-from islands_service.store import dialect
+from islands_service.domain.job import ACTIVE, QuotaError, Requester
+from islands_service.store.audit import Action, record_change
+from islands_service.store.backends import dialect
+from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.dialect import now
+from islands_service.store.job_rows.job_deletion import delete_unused_datasets
 from islands_service.store.tables import datasets, jobs
 
 
@@ -41,7 +43,7 @@ class StoredDataset:
         Size of the file.
     preview : mapping
         Columns with units and statistics, sampling, warnings: see `islands.io.records.preview`. Jobs read the
-        file with the options ``reading``.
+        file with the options ``reading``. In a page it contains only the fields of `summarise_preview`.
     """
 
     owner: str
@@ -74,8 +76,9 @@ class Datasets:
         size: int,
         preview: Mapping[str, Any],
         most_bytes: int | None = None,
+        by: Requester | None = None,
     ) -> tuple[StoredDataset, bool]:
-        """Add a data set; return it, and whether it is new.
+        """Add a data set; return it, and whether it is new. One that was deleted is restored.
 
         Raises
         ------
@@ -87,8 +90,17 @@ class Datasets:
         def operation(connection: Connection) -> tuple[StoredDataset, bool]:
             dialect.lock_owner(connection, owner)
             existing = connection.execute(_select(owner, identity)).one_or_none()
-            if existing is not None:
+            if existing is not None and existing.deleted is None:
                 return _make_dataset(existing), False
+            record_change(connection, Action.UPLOAD, owner, identity, by)
+            if existing is not None:
+                restore = (
+                    update(datasets)
+                    .where(datasets.c.owner == owner, datasets.c.id == identity)
+                    .values(deleted=None, name=name, created=now())
+                    .returning(datasets)
+                )
+                return _make_dataset(connection.execute(restore).one()), True
             if most_bytes is not None:
                 _check_quota(connection, owner, size, most_bytes)
             values = {
@@ -99,6 +111,7 @@ class Datasets:
                 "blob": blob,
                 "bytes": size,
                 "preview": json.dumps(preview),
+                "summary": json.dumps(summarise_preview(preview)),
                 "created": now(),
             }
             row = connection.execute(insert(datasets).values(values).returning(datasets)).one()
@@ -123,16 +136,22 @@ class Datasets:
         """
         with self._database.read() as connection:
             identity = dataset_id(blob, suffix, reading)
+            # One that was deleted but is kept for a job counts already.
             if connection.execute(_select(owner, identity)).one_or_none() is None:
                 _check_quota(connection, owner, size, most_bytes)
 
     def stored_bytes(self, owner: str) -> int:
         """Return the total size of the data sets of an owner."""
         with self._database.read() as connection:
-            return _sum_bytes(connection, owner)
+            return sum(_sum_bytes(connection, owner))
 
-    def get(self, owner: str, dataset: str) -> StoredDataset:
+    def get(self, owner: str, dataset: str, deleted: bool = False) -> StoredDataset:
         """Return a data set.
+
+        Parameters
+        ----------
+        deleted : bool
+            Whether to return also one that its owner has deleted but that a job still names.
 
         Raises
         ------
@@ -140,7 +159,7 @@ class Datasets:
         """
         with self._database.read() as connection:
             row = connection.execute(_select(owner, dataset)).one_or_none()
-        if row is None:
+        if row is None or (row.deleted is not None and not deleted):
             raise DatasetNotFoundError(
                 f"there is no data set {dataset!r}: upload it first, or list the existing ones"
             )
@@ -151,19 +170,21 @@ class Datasets:
     ) -> tuple[tuple[StoredDataset, ...], tuple[float, str] | None]:
         """Return a page of the data sets of an owner, newest first, and the position of the next page.
 
-        The position is None on the last page.
+        The position is None on the last page. The previews are summaries.
         """
-        query = select(datasets).where(datasets.c.owner == owner)
+        query = _PAGE.where(datasets.c.owner == owner, datasets.c.deleted.is_(None))
         if after is not None:
             query = query.where(tuple_(datasets.c.created, datasets.c.id) < tuple_(*after))
         query = query.order_by(datasets.c.created.desc(), datasets.c.id.desc()).limit(limit + 1)
         with self._database.read() as connection:
-            found = [_make_dataset(row) for row in connection.execute(query)]
+            found = [_make_dataset(row, _read_summary(row)) for row in connection.execute(query)]
         more, found = len(found) > limit, found[:limit]
         return tuple(found), (found[-1].created, found[-1].id) if more else None
 
-    def delete(self, owner: str, dataset: str) -> None:
+    def delete(self, owner: str, dataset: str, by: Requester | None = None) -> None:
         """Delete a data set that no unfinished job needs.
+
+        As long as a finished job names it, the row and the bytes are kept for its figures.
 
         Raises
         ------
@@ -171,7 +192,9 @@ class Datasets:
         """
 
         def operation(connection: Connection) -> None:
-            if connection.execute(_select(owner, dataset)).one_or_none() is None:
+            dialect.lock_owner(connection, owner)
+            row = connection.execute(_select(owner, dataset)).one_or_none()
+            if row is None or row.deleted is not None:
                 raise DatasetNotFoundError(f"there is no data set {dataset!r}")
             user = connection.execute(
                 select(jobs.c.id)
@@ -180,7 +203,13 @@ class Datasets:
             ).scalar()
             if user is not None:
                 raise DatasetInUseError(f"job {user} needs data set {dataset!r}: wait for it, or cancel it")
-            connection.execute(delete(datasets).where(datasets.c.owner == owner, datasets.c.id == dataset))
+            connection.execute(
+                update(datasets)
+                .where(datasets.c.owner == owner, datasets.c.id == dataset)
+                .values(deleted=now())
+            )
+            delete_unused_datasets(connection, owner)
+            record_change(connection, Action.DELETE_DATASET, owner, dataset, by)
 
         self._database.write(operation)
 
@@ -192,18 +221,39 @@ def dataset_id(blob: str, suffix: str, reading: Mapping[str, Any] | None = None)
     return f"{blob[:32]}-{suffix.removeprefix('.')}"
 
 
-def _sum_bytes(connection: Connection, owner: str) -> int:
-    total = select(func.coalesce(func.sum(datasets.c.bytes), 0)).where(datasets.c.owner == owner)
+def summarise_preview(preview: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of a preview that a list contains: of the columns only their number."""
+    return {
+        "samples": preview.get("samples"),
+        "columns": len(preview.get("columns", ())),
+        "time": preview.get("time"),
+        "dt": preview.get("dt"),
+        "warnings": len(preview.get("warnings", ())),
+    }
+
+
+def _sum_bytes(connection: Connection, owner: str) -> tuple[int, int]:
+    """Return the total sizes of the listed data sets, and of the deleted ones that are kept for jobs."""
+    query = (
+        select(datasets.c.deleted.is_(None), func.sum(datasets.c.bytes))
+        .where(datasets.c.owner == owner)
+        .group_by(datasets.c.deleted.is_(None))
+    )
     # PostgreSQL returns a decimal number for a sum of integers.
-    return int(connection.execute(total).scalar_one())
+    sums = {bool(listed): int(total) for listed, total in connection.execute(query)}
+    return sums.get(True, 0), sums.get(False, 0)
 
 
 def _check_quota(connection: Connection, owner: str, size: int, most: int) -> None:
-    used = _sum_bytes(connection, owner)
+    listed, kept = _sum_bytes(connection, owner)
+    used = listed + kept
     if used + size > most:
+        advice = "delete some"
+        if kept:
+            advice += f" (results still need {kept / 1e6:.1f} MB of deleted ones: delete their jobs)"
         raise QuotaError(
             f"the data sets take {used / 1e6:.1f} MB, this one has {size / 1e6:.1f} MB, and "
-            f"{most / 1e6:.1f} MB is the most: delete some"
+            f"{most / 1e6:.1f} MB is the most: {advice}"
         )
 
 
@@ -211,7 +261,20 @@ def _select(owner: str, dataset: str) -> Any:
     return select(datasets).where(datasets.c.owner == owner, datasets.c.id == dataset)
 
 
-def _make_dataset(row: Row[Any]) -> StoredDataset:
-    return StoredDataset(
-        row.owner, row.id, row.name, row.suffix, row.blob, row.bytes, json.loads(row.preview), row.created
+#: Rows for a page. Those of earlier versions have no summary, and it is made from their preview.
+_PAGE = select(
+    *(datasets.c[name] for name in ("owner", "id", "name", "suffix", "blob", "bytes", "created", "summary")),
+    case((datasets.c.summary.is_(None), datasets.c.preview)).label("preview"),
+)
+
+
+def _read_summary(row: Any) -> dict[str, Any]:
+    return (
+        summarise_preview(json.loads(row.preview)) if row.summary is None else dict(json.loads(row.summary))
     )
+
+
+def _make_dataset(row: Any, preview: Mapping[str, Any] | None = None) -> StoredDataset:
+    if preview is None:
+        preview = json.loads(row.preview)
+    return StoredDataset(row.owner, row.id, row.name, row.suffix, row.blob, row.bytes, preview, row.created)

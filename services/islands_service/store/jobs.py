@@ -4,15 +4,15 @@ An owner has access only to its own jobs.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import Connection, Row, Select, delete, func, insert, select, tuple_
+from sqlalchemy import Connection, Row, Select, insert, select, tuple_
 
 from islands_service.domain.job import (
-    ACTIVE,
+    ISLANDS_VERSION,
     RESUMABLE,
     TERMINAL,
     Event,
@@ -20,20 +20,33 @@ from islands_service.domain.job import (
     JobNotFoundError,
     JobState,
     JobStateError,
+    Requester,
     Submission,
 )
-from islands_service.store import dialect
+from islands_service.store.audit import Action, record_change
+from islands_service.store.backends import dialect
+from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.dialect import now
-from islands_service.store.job_events import append_event, job_from_row, read_document, update_job
-from islands_service.store.submission_checks import check_quota, find_accepted_job, request_digest
+from islands_service.store.job_rows.job_deletion import delete_job
+from islands_service.store.job_rows.job_events import append_event, job_from_row, update_job
+from islands_service.store.job_rows.queue_statistics import QueueStatistics, read_queue_statistics
+from islands_service.store.job_rows.submission_checks import (
+    check_datasets,
+    check_quota,
+    find_accepted_job,
+    request_digest,
+)
 from islands_service.store.tables import events, jobs
 
 #: Largest number of jobs of a page.
 MAX_PAGE_SIZE = 200
 
 #: Built once, since building the statement takes as long as executing it.
-_INSERT_JOB = insert(jobs).values(state=JobState.QUEUED, created=now(), updated=now()).returning(jobs)
+_INSERT_JOB = (
+    insert(jobs)
+    .values(state=JobState.QUEUED, created=now(), updated=now(), islands_version=ISLANDS_VERSION)
+    .returning(jobs)
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,33 +55,6 @@ class JobRows:
 
     jobs: tuple[Job, ...]
     after: tuple[float, str] | None
-
-
-@dataclass(frozen=True, slots=True)
-class QueueStatistics:
-    """Statistics of the jobs of all owners.
-
-    Attributes
-    ----------
-    counts : mapping
-        Number of jobs by state.
-    oldest : float
-        Seconds that the oldest queued job has waited since it was last queued.
-    running : mapping
-        Progress of the jobs with a valid lease, by job.
-    active : mapping
-        Number of queued and running jobs by owner and state.
-    """
-
-    counts: Mapping[JobState, int]
-    oldest: float
-    running: Mapping[str, Mapping[str, Any]]
-    active: Mapping[tuple[str, JobState], int]
-
-    @property
-    def leases(self) -> int:
-        """Number of jobs with a valid lease."""
-        return len(self.running)
 
 
 class Jobs:
@@ -82,13 +68,17 @@ class Jobs:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def submit(self, submission: Submission, most_active: int | None = None) -> tuple[Job, bool]:
+    def submit(
+        self, submission: Submission, most_active: int | None = None, by: Requester | None = None
+    ) -> tuple[Job, bool]:
         """Accept a job durably; return it, and whether it is new.
 
         Raises
         ------
         IdempotencyError
             The key belongs to a different request.
+        JobDeletedError
+            The job of the key was deleted.
         QuotaError
             The owner has ``most_active`` unfinished jobs.
         StoreUnavailableError, StorageFullError
@@ -114,6 +104,7 @@ class Jobs:
             }
             row = connection.execute(_INSERT_JOB, values).one()
             append_event(connection, row, "queued")
+            record_change(connection, Action.SUBMIT, row.owner, row.id, by)
             return job_from_row(row), True
 
         return self._database.write(operation)
@@ -125,6 +116,8 @@ class Jobs:
         ------
         IdempotencyError
             The key belongs to a different request.
+        JobDeletedError
+            The job of the key was deleted.
         """
         with self._database.read() as connection:
             return find_accepted_job(connection, submission)
@@ -159,7 +152,7 @@ class Jobs:
         found = found[: min(limit, MAX_PAGE_SIZE)]
         return JobRows(tuple(found), (found[-1].created, found[-1].id) if more else None)
 
-    def cancel(self, owner: str, job: str) -> Job:
+    def cancel(self, owner: str, job: str, by: Requester | None = None) -> Job:
         """Cancel a queued job, or request cancellation of a running one; a repeated request has no effect.
 
         Raises
@@ -184,11 +177,14 @@ class Jobs:
                 finished=now() if waiting else None,
             )
             append_event(connection, row, "cancelled" if waiting else "cancelling")
+            record_change(connection, Action.CANCEL, owner, job, by)
             return job_from_row(row)
 
         return self._database.write(operation)
 
-    def resume(self, owner: str, job: str, most_active: int | None = None) -> Job:
+    def resume(
+        self, owner: str, job: str, most_active: int | None = None, by: Requester | None = None
+    ) -> Job:
         """Queue a failed or cancelled job again, to continue from its last checkpoint.
 
         Raises
@@ -196,6 +192,8 @@ class Jobs:
         JobNotFoundError
         JobStateError
             The job is queued or running, or has succeeded.
+        DatasetDeletedError
+            A data set of the job was deleted.
         QuotaError
             The owner has ``most_active`` unfinished jobs.
         """
@@ -207,6 +205,7 @@ class Jobs:
                 raise JobStateError(
                     f"job {job} is {current.state}: only a failed or cancelled job can be resumed"
                 )
+            check_datasets(connection, job_from_row(current))
             if most_active is not None:
                 check_quota(connection, owner, most_active)
             row = update_job(
@@ -215,16 +214,18 @@ class Jobs:
                 state=JobState.QUEUED,
                 cancel_requested=False,
                 stalled=0,
+                not_before=0.0,
                 problem=None,
                 finished=None,
             )
             append_event(connection, row, "queued")
+            record_change(connection, Action.RESUME, owner, job, by)
             return job_from_row(row)
 
         return self._database.write(operation)
 
-    def delete(self, owner: str, job: str) -> None:
-        """Delete a finished job with its events, history, result and artefacts.
+    def delete(self, owner: str, job: str, by: Requester | None = None) -> None:
+        """Delete a finished job with its events, history, result and artefacts; keep its idempotency key.
 
         Raises
         ------
@@ -237,7 +238,8 @@ class Jobs:
             current = _select_owned(connection, owner, job, locked=True)
             if current.state not in TERMINAL:
                 raise JobStateError(f"job {job} is {current.state}: cancel it first")
-            connection.execute(delete(jobs).where(jobs.c.id == job))
+            delete_job(connection, current)
+            record_change(connection, Action.DELETE, owner, job, by)
 
         self._database.write(operation)
 
@@ -261,26 +263,8 @@ class Jobs:
 
     def queue_statistics(self) -> QueueStatistics:
         """Return statistics of the jobs of all owners."""
-        counted = select(jobs.c.state, func.count()).group_by(jobs.c.state)
-        active = (
-            select(jobs.c.owner, jobs.c.state, func.count())
-            .where(jobs.c.state.in_(ACTIVE))
-            .group_by(jobs.c.owner, jobs.c.state)
-        )
-        oldest = select(func.coalesce(now() - func.min(jobs.c.updated), 0.0)).where(
-            jobs.c.state == JobState.QUEUED
-        )
-        running = select(jobs.c.id, jobs.c.progress).where(
-            jobs.c.state == JobState.RUNNING, jobs.c.lease_until > now()
-        )
         with self._database.read() as connection:
-            counts = {row[0]: row[1] for row in connection.execute(counted)}
-            return QueueStatistics(
-                {state: counts.get(state, 0) for state in JobState},
-                connection.execute(oldest).scalar_one(),
-                {row.id: read_document(row.progress) or {} for row in connection.execute(running)},
-                {(row[0], JobState(row[1])): row[2] for row in connection.execute(active)},
-            )
+            return read_queue_statistics(connection)
 
 
 def _select_owned(connection: Connection, owner: str, job: str, locked: bool = False) -> Row[Any]:

@@ -9,8 +9,10 @@ from typing import Any
 from sqlalchemy import Column, Connection, Row, func, insert, or_, select, update
 
 from islands.errors import IslandsError, SettingsError
+from islands_service.domain.job import Requester
+from islands_service.store.audit import Action, record_change
+from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.dialect import now
 from islands_service.store.tables import keys
 
 #: Scopes of a key, and what each allows.
@@ -67,7 +69,12 @@ class Keys:
         self._database = database
 
     def create(
-        self, name: str, scopes: frozenset[str], owner: str | None = None, seconds: float | None = None
+        self,
+        name: str,
+        scopes: frozenset[str],
+        owner: str | None = None,
+        seconds: float | None = None,
+        by: Requester | None = None,
     ) -> tuple[Key, str]:
         """Create a key, with a new owner unless one is given; return the key and its secret.
 
@@ -97,6 +104,7 @@ class Keys:
                 "expires": None if seconds is None else now() + seconds,
             }
             connection.execute(insert(keys).values(values))
+            record_change(connection, Action.CREATE_KEY, str(values["owner"]), identity, by)
             return _make_key(connection.execute(_query().where(keys.c.id == identity)).one())
 
         return self._database.write(operation), secret
@@ -116,7 +124,7 @@ class Keys:
         with self._database.read() as connection:
             return tuple(map(_make_key, connection.execute(_query().order_by(keys.c.created, keys.c.id))))
 
-    def revoke(self, key: str) -> Key:
+    def revoke(self, key: str, by: Requester | None = None) -> Key:
         """Revoke a key with immediate effect.
 
         Raises
@@ -131,6 +139,7 @@ class Keys:
             row = connection.execute(_query().where(keys.c.id == key)).one_or_none()
             if row is None:
                 raise KeyNotFoundError(f"there is no key {key!r}: list them with 'islands keys list'")
+            record_change(connection, Action.REVOKE_KEY, row.owner, key, by)
             return _make_key(row)
 
         return self._database.write(operation)

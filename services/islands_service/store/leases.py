@@ -8,27 +8,25 @@ A coordinator that resumes after its lease was taken over therefore does no harm
 import json
 from typing import Any
 
-from sqlalchemy import Connection, Row, and_, case, delete, func, insert, or_, select, update
+from sqlalchemy import Connection, Row, case, delete, insert, select, update
 
-from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
+from islands_service.domain.job import (
+    ISLANDS_VERSION,
+    Job,
+    JobOutcome,
+    JobState,
+    Lease,
+    LeaseLostError,
+    ProgressReport,
+)
+from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.dialect import now
-from islands_service.store.job_events import append_event, job_from_row, update_job
+from islands_service.store.job_rows.job_claims import claim_job
+from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document
 from islands_service.store.tables import artefacts, events, jobs, models, points, results
-
-#: Attempts since the last checkpoint after which a job is given up.
-ATTEMPTS = 5
 
 #: Progress events that are kept per job. A client that was away longer reads the job itself.
 KEPT = 500
-
-#: Problem of a job that failed after `ATTEMPTS` attempts.
-GAVE_UP = {
-    "type": "no-progress",
-    "title": "The job was given up",
-    "detail": f"{ATTEMPTS} attempts ended without progress, most likely for lack of memory: "
-    "use fewer islands, smaller populations or a shorter record, and resume or submit it again",
-}
 
 
 class Leases:
@@ -42,11 +40,12 @@ class Leases:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def claim(self, owner: str, seconds: float) -> Lease | None:
+    def claim(self, owner: str, seconds: float, version: str = ISLANDS_VERSION) -> Lease | None:
         """Claim the oldest job of the highest priority; None if no job can be claimed.
 
         A running job can be claimed if its lease has expired, or if its owner has the same name: only one
-        process at a time has a name, so the previous one must have ended.
+        process at a time has a name, so the previous one must have ended. A queued job cannot be claimed
+        while it waits for a repeated attempt, or if a coordinator of this version has declined it.
 
         Parameters
         ----------
@@ -54,8 +53,10 @@ class Leases:
             Name of the coordinator.
         seconds : float
             Duration of the lease; `renew` extends it.
+        version : str
+            Version of islands of the coordinator.
         """
-        return self._database.write(lambda connection: _claim(connection, owner, seconds))
+        return self._database.write(lambda connection: claim_job(connection, owner, seconds, version))
 
     def renew(self, lease: Lease, seconds: float) -> bool:
         """Extend a lease; return whether cancellation of the job is requested.
@@ -101,20 +102,50 @@ class Leases:
         ------
         LeaseLostError
         """
+        self._database.write(lambda connection: _release(connection, lease, attempted))
+
+    def postpone(self, lease: Lease, reason: str, seconds: float) -> None:
+        """Return a job to the queue after a failure that may pass. This counts as an attempt.
+
+        Parameters
+        ----------
+        reason : str
+            Shown to the owner as the note of the progress.
+        seconds : float
+            Time until the second attempt; doubled by every further one.
+
+        Raises
+        ------
+        LeaseLostError
+        """
 
         def operation(connection: Connection) -> None:
-            row = _update_fenced(
-                connection,
-                lease,
-                state=case((jobs.c.cancel_requested, JobState.CANCELLED), else_=JobState.QUEUED),
-                finished=case((jobs.c.cancel_requested, now())),
-                lease_owner=None,
-                attempt=jobs.c.attempt - int(not attempted),
-                stalled=case((jobs.c.stalled > 0, jobs.c.stalled - int(not attempted)), else_=0),
+            attempts = (
+                connection.execute(select(jobs.c.stalled).where(jobs.c.id == lease.job.id)).scalar() or 1
             )
-            append_event(connection, row, row.state)
+            _release(connection, lease, True, reason, not_before=now() + seconds * 2.0 ** (attempts - 1))
 
         self._database.write(operation)
+
+    def decline(self, lease: Lease, reason: str, version: str = ISLANDS_VERSION) -> None:
+        """Return a job to the queue for a coordinator of another version. This is no attempt.
+
+        Parameters
+        ----------
+        reason : str
+            Shown to the owner as the note of the progress.
+        version : str
+            Coordinators of this version do not claim the job again.
+
+        Raises
+        ------
+        LeaseLostError
+        """
+        self._database.write(
+            lambda connection: _release(
+                connection, lease, False, reason, declined=jobs.c.declined + f",{version},"
+            )
+        )
 
     def finish(self, lease: Lease, outcome: JobOutcome) -> None:
         """Store the outcome of a job together with its result.
@@ -135,6 +166,7 @@ class Leases:
                 checkpoint=None if outcome.state == JobState.SUCCEEDED else jobs.c.checkpoint,
                 summary=_text(outcome.summary),
                 problem=_text(outcome.problem),
+                result_version=jobs.c.result_version if outcome.document is None else ISLANDS_VERSION,
             )
             if outcome.document is not None:
                 # Also delete the artefacts, which belong to the previous result.
@@ -151,55 +183,27 @@ class Leases:
         self._database.write(operation)
 
 
-def _claim(connection: Connection, owner: str, seconds: float) -> Lease | None:
-    takes = or_(
-        jobs.c.state == JobState.QUEUED,
-        and_(jobs.c.state == JobState.RUNNING, or_(jobs.c.lease_until < now(), jobs.c.lease_owner == owner)),
-    )
-    first = (
-        select(jobs.c.id, jobs.c.stalled, jobs.c.cancel_requested)
-        .where(takes)
-        .order_by(jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
-        .limit(1)
-        .with_for_update(skip_locked=True)
-    )
-    while (found := connection.execute(first).one_or_none()) is not None:
-        if found.stalled >= ATTEMPTS:
-            _give_up(connection, found.id, found.cancel_requested)
-            continue
-        row = update_job(
-            connection,
-            found.id,
-            state=JobState.RUNNING,
-            lease_owner=owner,
-            lease_epoch=jobs.c.lease_epoch + 1,
-            lease_until=now() + seconds,
-            attempt=jobs.c.attempt + 1,
-            stalled=jobs.c.stalled + 1,
-            started=func.coalesce(jobs.c.started, now()),
-        )
-        append_event(connection, row, "running", json.dumps({"attempt": row.attempt}))
-        return Lease(job_from_row(row), row.lease_epoch)
-    return None
-
-
-def _give_up(connection: Connection, job: str, cancelled: bool) -> None:
-    """End a job that makes no progress: as cancelled if that was requested, else as failed."""
-    row = update_job(
+def _release(connection: Connection, lease: Lease, attempted: bool, reason: str = "", **values: Any) -> None:
+    if reason:
+        reached = connection.execute(select(jobs.c.progress).where(jobs.c.id == lease.job.id)).scalar()
+        values["progress"] = _text({**(read_document(reached) or {}), "phase": "waiting", "note": reason})
+    row = _update_fenced(
         connection,
-        job,
-        state=JobState.CANCELLED if cancelled else JobState.FAILED,
+        lease,
+        state=case((jobs.c.cancel_requested, JobState.CANCELLED), else_=JobState.QUEUED),
+        finished=case((jobs.c.cancel_requested, now())),
         lease_owner=None,
-        finished=now(),
-        problem=None if cancelled else _text(GAVE_UP),
+        attempt=jobs.c.attempt - int(not attempted),
+        stalled=case((jobs.c.stalled > 0, jobs.c.stalled - int(not attempted)), else_=0),
+        **values,
     )
-    append_event(connection, row, row.state, row.problem or "{}")
+    append_event(connection, row, row.state, json.dumps({"note": reason} if reason else {}))
 
 
 def _report(connection: Connection, lease: Lease, report: ProgressReport) -> Job:
     values: dict[str, Any] = {"progress": _text(report.progress)}
     if report.checkpoint is not None:
-        values |= {"checkpoint": report.checkpoint, "stalled": 0}
+        values |= {"checkpoint": report.checkpoint, "checkpoint_version": ISLANDS_VERSION, "stalled": 0}
     row = _update_fenced(connection, lease, **values)
     if report.points:
         # After a crash the same generations are reported again with equal values.

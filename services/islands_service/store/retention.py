@@ -3,9 +3,10 @@
 from sqlalchemy import Connection, delete, select, union
 
 from islands_service.domain.job import TERMINAL
+from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.dialect import now
-from islands_service.store.tables import artefacts, datasets, jobs
+from islands_service.store.job_rows.job_deletion import delete_unused_datasets
+from islands_service.store.tables import artefacts, audit, datasets, jobs, retired_keys
 
 
 class Retention:
@@ -20,13 +21,25 @@ class Retention:
         self._database = database
 
     def delete_expired(self, seconds: float) -> int:
-        """Delete the jobs that finished more than the given seconds ago; return their number."""
+        """Delete the jobs that finished more than the given seconds ago; return their number.
+
+        Idempotency keys of jobs that finished as long ago and were deleted before can be used again.
+        """
 
         def operation(connection: Connection) -> int:
             old = jobs.c.state.in_(TERMINAL) & (jobs.c.finished < now() - seconds)
-            return len(connection.execute(delete(jobs).where(old).returning(jobs.c.id)).all())
+            deleted = len(connection.execute(delete(jobs).where(old).returning(jobs.c.id)).all())
+            connection.execute(delete(retired_keys).where(retired_keys.c.finished < now() - seconds))
+            delete_unused_datasets(connection)
+            return deleted
 
         return self._database.write(operation)
+
+    def delete_old_audit(self, seconds: float) -> None:
+        """Delete the audit entries that are older than the given seconds."""
+        self._database.write(
+            lambda connection: connection.execute(delete(audit).where(audit.c.at < now() - seconds))
+        )
 
     def named_blobs(self) -> frozenset[str]:
         """Return all blobs that a row references."""

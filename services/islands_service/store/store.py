@@ -2,6 +2,7 @@
 
 from types import TracebackType
 
+from islands_service.store.audit import AuditTrail
 from islands_service.store.database import Database
 from islands_service.store.datasets import Datasets
 from islands_service.store.jobs import Jobs
@@ -19,7 +20,7 @@ class Store:
     durable. A job belongs to one lease at a time, and a write under an older one changes nothing and raises
     `LeaseLostError`. A checkpoint, its progress and its event appear together or not at all. An idempotency
     key names one job. Events of a job are numbered without gaps, in the order in which they became visible.
-    An owner cannot access data of another owner.
+    An owner cannot access data of another owner. A change and its entry in the audit trail appear together.
 
     Parameters
     ----------
@@ -47,6 +48,7 @@ class Store:
         self.datasets = Datasets(self.database)
         self.keys = Keys(self.database)
         self.retention = Retention(self.database)
+        self.audit = AuditTrail(self.database)
 
     def close(self) -> None:
         """Write the queued operations and close all connections."""

@@ -13,6 +13,7 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
+    text,
 )
 
 #: Constraints are named, because a migration cannot change an unnamed one.
@@ -59,11 +60,21 @@ jobs = Table(
     Column("updated", Float, nullable=False),
     Column("started", Float),
     Column("finished", Float),
+    # Versions of islands that accepted the job, and wrote its checkpoint and its result.
+    Column("islands_version", String(64)),
+    Column("checkpoint_version", String(64)),
+    Column("result_version", String(64)),
+    # Earliest time of the next claim.
+    Column("not_before", Float, nullable=False, server_default=text("0")),
+    # Versions of islands that cannot read the job, each in commas.
+    Column("declined", Text, nullable=False, server_default=""),
     UniqueConstraint("owner", "idempotency_key"),
-    Index(None, "state", "priority", "created"),
     Index(None, "owner", "created", "id"),
     Index(None, "owner", "state", "created", "id"),
 )
+
+#: Order of the queue.
+Index("ix_jobs_queue", jobs.c.state, jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
 
 #: Events of jobs. The number is the version of the job: without gaps, in the order of the commits.
 events = Table(
@@ -118,6 +129,21 @@ datasets = Table(
     Column("bytes", BigInteger, nullable=False),
     Column("preview", Text, nullable=False),
     Column("created", Float, nullable=False),
+    # The preview without its columns, for lists.
+    Column("summary", Text),
+    # Time of the deletion by the owner. The row is kept while a job names the data set.
+    Column("deleted", Float),
+)
+
+#: Idempotency keys of deleted jobs, kept as long as the job would have been.
+retired_keys = Table(
+    "retired_keys",
+    metadata,
+    Column("owner", String(64), primary_key=True),
+    Column("idempotency_key", String(255), primary_key=True),
+    Column("job_id", String(32), nullable=False),
+    Column("request_sha256", String(64), nullable=False),
+    Column("finished", Float, nullable=False),
 )
 
 keys = Table(
@@ -131,4 +157,21 @@ keys = Table(
     Column("created", Float, nullable=False),
     Column("expires", Float),
     Column("revoked", Float),
+)
+
+#: Changes that clients and operators have requested.
+audit = Table(
+    "audit",
+    metadata,
+    Column("number", BigInteger().with_variant(Integer, "sqlite"), primary_key=True),
+    Column("at", Float, nullable=False),
+    Column("action", String(32), nullable=False),
+    Column("owner", String(64), nullable=False),
+    # Id of the job, the data set or the key.
+    Column("subject", String(64), nullable=False),
+    # Key of the request; null without one.
+    Column("key_id", String(16)),
+    Column("address", String(64), nullable=False),
+    Index(None, "at"),
+    Index(None, "owner", "at"),
 )

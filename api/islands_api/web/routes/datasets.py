@@ -12,12 +12,12 @@ from pydantic import FiniteFloat
 
 from islands.errors import SettingsError
 from islands.io.records.reading_options import ReadingOptions
-from islands_api.schemas import DatasetPage, DatasetView
-from islands_api.web.auth import Reader, Writer
+from islands_api.dataset_schemas import DatasetPage, DatasetView
+from islands_api.web.auth import Principal, Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import Cursor, FormRoute, Limit, decode_cursor, encode_cursor
-from islands_api.web.responses import JSONDocument, dataset_document
+from islands_api.web.responses import JSONDocument, dataset_document, dataset_summary
 from islands_api.web.uploads.uploaded_file import parse_file_name, receive
 from islands_service.domain.job_spec import Name
 from islands_service.intake.file_inspection import InspectionRequest, inspect_file
@@ -74,7 +74,7 @@ async def upload(
     name, compressed = parse_file_name(file.filename)
     stored, new = await _store_upload(
         state,
-        caller.owner,
+        caller,
         file,
         name,
         compressed,
@@ -118,9 +118,14 @@ def _is_option(name: str, value: Any) -> bool:
 
 
 async def _store_upload(
-    state: AppState, owner: str, file: UploadFile, name: str, compressed: bool, inspection: InspectionRequest
+    state: AppState,
+    caller: Principal,
+    file: UploadFile,
+    name: str,
+    compressed: bool,
+    inspection: InspectionRequest,
 ) -> tuple[StoredDataset, bool]:
-    settings = state.settings
+    settings, owner, by = state.settings, caller.owner, caller.requester
     with state.blobs.receiving() as stream:
         # Limit the number of uploads in progress: a small file may decompress to a thousand times its size.
         async with state.inspection_slots.hold(owner):
@@ -144,18 +149,18 @@ async def _store_upload(
             # An upload that was rejected before this line is deleted at the end of the block.
             await state.run_blocking(state.blobs.keep, stream)
     return await state.run_blocking(
-        state.store.datasets.add, owner, name, suffix, blob, size, preview, settings.max_stored
+        state.store.datasets.add, owner, name, suffix, blob, size, preview, settings.max_stored, by
     )
 
 
 @router.get("", response_model=DatasetPage)
 async def datasets(caller: Reader, state: AppStateDep, cursor: Cursor = None, limit: Limit = 50) -> Any:
-    """List the data sets, newest first."""
+    """List the data sets, newest first: with the number of columns, without the columns themselves."""
     page, after = await state.run_blocking(
         state.store.datasets.page, caller.owner, decode_cursor(cursor), limit
     )
     return JSONDocument(
-        {"items": [dataset_document(dataset) for dataset in page], "next": encode_cursor(after)}
+        {"items": [dataset_summary(dataset) for dataset in page], "next": encode_cursor(after)}
     )
 
 
@@ -169,5 +174,9 @@ async def dataset(dataset: Id, caller: Reader, state: AppStateDep) -> Any:
 
 @router.delete("/{dataset}", status_code=204)
 async def delete(dataset: Id, caller: Writer, state: AppStateDep) -> None:
-    """Delete a data set that no unfinished job needs."""
-    await state.run_blocking(state.store.datasets.delete, caller.owner, dataset)
+    """Delete a data set that no unfinished job needs.
+
+    The figures of finished jobs can still be drawn: the bytes are kept, and count towards the quota,
+    until these jobs are deleted.
+    """
+    await state.run_blocking(state.store.datasets.delete, caller.owner, dataset, caller.requester)

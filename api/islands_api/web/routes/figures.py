@@ -202,7 +202,8 @@ async def _figure_response(
 async def _draw(state: AppState, caller: Principal, job: str, rank: int | None) -> None:
     found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
     for dataset in parse_identification(found.spec).datasets:
-        await state.run_blocking(state.store.datasets.get, caller.owner, dataset)  # raises if it was deleted
+        # Raises if an earlier version deleted it.
+        await state.run_blocking(state.store.datasets.get, caller.owner, dataset, deleted=True)
     _FAILURES.refuse(job, rank)
     try:
         await _run_figure_worker(state, caller, job, rank)

@@ -104,22 +104,23 @@ async def job(
 @router.post("/{job}/cancel", status_code=202, response_model=JobView)
 async def cancel(job: Id, caller: Writer, state: AppStateDep) -> Any:
     """Cancel a job: a queued one immediately, a running one within about a second."""
-    return JSONDocument(
-        job_document(await state.run_blocking(state.store.jobs.cancel, caller.owner, job)), 202
-    )
+    cancelled = await state.run_blocking(state.store.jobs.cancel, caller.owner, job, caller.requester)
+    return JSONDocument(job_document(cancelled), 202)
 
 
 @router.post("/{job}/resume", status_code=202, response_model=JobView)
 async def resume(job: Id, caller: Writer, state: AppStateDep) -> Any:
-    """Resume a failed or cancelled job from its last checkpoint."""
-    resumed = await state.run_blocking(state.store.jobs.resume, caller.owner, job, state.settings.max_active)
+    """Resume a failed or cancelled job from its last checkpoint. Its data sets must exist."""
+    resumed = await state.run_blocking(
+        state.store.jobs.resume, caller.owner, job, state.settings.max_active, caller.requester
+    )
     return JSONDocument(job_document(resumed), 202)
 
 
 @router.delete("/{job}", status_code=204)
 async def delete(job: Id, caller: Writer, state: AppStateDep) -> None:
-    """Delete a finished job with its result."""
-    await state.run_blocking(state.store.jobs.delete, caller.owner, job)
+    """Delete a finished job with its result. Its idempotency key creates no new job."""
+    await state.run_blocking(state.store.jobs.delete, caller.owner, job, caller.requester)
 
 
 @router.get("/{job}/history", response_model=HistoryPage)

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy import Connection, inspect, text
 
-from islands_service.store import dialect
+from islands_service.store.backends import dialect
 from islands_service.store.database import Database, StoreError
 
 if TYPE_CHECKING:
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 #: Revision that the code is written for. Importing Alembic takes a quarter of a second, and a database of
 #: this revision does not need it. A test compares this constant with the migrations.
-HEAD = "0001"
+HEAD = "0002"
 
 
 def prepare(database: Database) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from islands_api.client import AsyncClient, Client, calls
-from islands_api.schemas import DatasetView
+from islands_api.dataset_schemas import DatasetView
 
 
 def public_methods(kind: type) -> dict[str, Any]:

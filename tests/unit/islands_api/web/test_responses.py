@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands_api.schemas import DatasetView, JobRequest, JobView
+from islands_api.dataset_schemas import DatasetView
+from islands_api.schemas import JobRequest, JobView
 from islands_api.web.responses import JSONDocument, dataset_document, job_document, json_text
 from islands_service.domain.job import Job, JobState, ProgressReport
 from support.service import kept, queued
@@ -72,6 +73,7 @@ def test_a_job_document_with_all_values_round_trips_through_its_schema():
         updated=4.125,
         started=2.25,
         finished=4.0,
+        versions={"job": "1.2", "checkpoint": None, "result": "1.3"},
     )
     view = JobView.model_validate_json(json_text(job_document(job)))
     assert view.model_extra == {}

@@ -1,9 +1,10 @@
 """A job in a store without Ray, and the result of the same search in one process."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import pytest
@@ -14,11 +15,14 @@ from islands.io.checkpoints import history_document
 from islands.io.records import read_record
 from islands.io.records.preview import preview
 from islands.io.result_folder import result_document
+from islands_service.coordinator.coordinator import Coordinator
 from islands_service.domain.job import Job, Submission
+from islands_service.liveness import StopRequest
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from support.command_line import write_hysteresis
+from support.coordinators import SerialCoordinator
 from support.stores import ALICE
 
 SETTINGS = {
@@ -84,3 +88,23 @@ def job(store: Store, blobs: Blobs, record: Path) -> Job:
     columns = {"inputs": ["u_V"], "output": "y_um"}
     spec = {"dataset": dataset.id, **columns, "preset": "hysteresis", "seed": SEED, "settings": SETTINGS}
     return store.jobs.submit(Submission(ALICE, spec))[0]
+
+
+@pytest.fixture
+def coordinator(settings: ServiceSettings) -> Iterator[Callable[..., Thread]]:
+    """Run a coordinator in a thread, and stop it after the test."""
+    stopping = StopRequest()
+    threads = []
+
+    def run(kind: type[Coordinator] = SerialCoordinator, name: str = "me") -> Thread:
+        thread = Thread(target=kind(settings, name, stopping).run)
+        thread.stop = stopping.request  # type: ignore[attr-defined]
+        thread.start()
+        threads.append(thread)
+        return thread
+
+    yield run
+    stopping.request()
+    for thread in threads:
+        thread.join(10.0)
+        assert not thread.is_alive()

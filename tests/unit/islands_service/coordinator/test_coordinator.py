@@ -1,20 +1,15 @@
 """`Coordinator`: every job ends or is released, whatever error occurs."""
 
 import errno
-import json
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from threading import Thread
-from types import MappingProxyType
 from typing import Any
 
 import pytest
 
-from islands.errors import IslandsError, RecordError
-from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import coordinator as coordinator_module
-from islands_service.coordinator.coordinator import Coordinator
 from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
@@ -29,57 +24,20 @@ from islands_service.liveness import StopRequest
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.store.blobs import BlobNotFoundError, Blobs
+from islands_service.store.blobs import Blobs
 from islands_service.store.database import StorageFullError, StoreUnavailableError
+from support.coordinators import (
+    DONE,
+    SerialCoordinator,
+    replace_runner,
+    run_until_check_raises,
+    wait_until_finished,
+)
 from support.processes import eventually
 from support.service import held
 from support.stores import ALICE, child
 
 Found = tuple[list[Any], list[Any]]
-
-
-class SerialCoordinator(Coordinator):
-    """A coordinator without Ray: its engine is serial."""
-
-    def _wait_for_ray(self, *_: object) -> None:
-        pass
-
-    def _make_engine(self, _: Lease) -> SerialEngine:  # type: ignore[override]
-        return SerialEngine()
-
-
-@pytest.fixture
-def coordinator(settings: ServiceSettings) -> Iterator[Callable[..., Thread]]:
-    """Run a coordinator in a thread, and stop it after the test."""
-    stopping = StopRequest()
-    threads = []
-
-    def run(kind: type[Coordinator] = SerialCoordinator, name: str = "me") -> Thread:
-        thread = Thread(target=kind(settings, name, stopping).run)
-        thread.stop = stopping.request  # type: ignore[attr-defined]
-        thread.start()
-        threads.append(thread)
-        return thread
-
-    yield run
-    stopping.request()
-    for thread in threads:
-        thread.join(10.0)
-        assert not thread.is_alive()
-
-
-def wait_until_finished(store: Store, job: Job) -> Job:
-    eventually(lambda: store.jobs.get(ALICE, job.id).finished is not None, seconds=30.0)
-    return store.jobs.get(ALICE, job.id)
-
-
-def replace_runner(monkeypatch: pytest.MonkeyPatch, how: Callable[..., JobOutcome]) -> None:
-    """Replace the runner of identification jobs."""
-    monkeypatch.setattr(coordinator_module, "JOB_RUNNERS", MappingProxyType({"identification": how}))
-    monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.02)
-
-
-DONE = JobOutcome(JobState.SUCCEEDED, {}, (), {"done": True})
 
 
 @pytest.mark.ci
@@ -106,49 +64,6 @@ def test_coordinator_runs_jobs_of_every_kind(
     assert failed.problem is not None
     assert failed.problem["type"] == "invalid-record"
     assert "99 samples, and a diagnosis needs " in failed.problem["detail"]
-
-
-@pytest.mark.parametrize(
-    ("error", "kind", "detail"),
-    [
-        (RecordError("line 7 is wrong"), "invalid-record", "line 7 is wrong"),
-        (BlobNotFoundError("the blob is gone"), "no-such-blob", "the blob is gone"),
-        (IslandsError("something else"), "job-failed", "something else"),
-        (ZeroDivisionError("by zero"), "defect", "ZeroDivisionError: by zero. Please report it"),
-    ],
-)
-def test_failed_job_has_a_typed_problem_and_does_not_block_others(
-    store: Store,
-    job: Job,
-    coordinator: Callable[..., Thread],
-    monkeypatch: pytest.MonkeyPatch,
-    error: Exception,
-    kind: str,
-    detail: str,
-) -> None:
-    def fail_first(lease: Lease, *_: object) -> JobOutcome:
-        if lease.job.id == job.id:
-            raise error
-        return DONE
-
-    replace_runner(monkeypatch, fail_first)
-    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
-    coordinator()
-    failed = wait_until_finished(store, job)
-    assert failed.state == JobState.FAILED
-    assert failed.problem is not None
-    assert failed.problem["type"] == kind
-    assert failed.problem["detail"].startswith(detail)
-    assert "Traceback" not in json.dumps(failed.problem)
-    assert wait_until_finished(store, second).state == JobState.SUCCEEDED
-
-
-def run_until_check_raises(
-    _lease: Lease, _store: Store, _blobs: Blobs, _engine: object, check: Any, _s: float
-) -> JobOutcome:
-    while True:
-        check()
-        time.sleep(0.01)
 
 
 def test_stopping_coordinator_releases_its_job_without_an_attempt(

@@ -12,9 +12,9 @@ from islands.discrepancy.inference import noise_floor
 from islands.errors import RecordError, SettingsError
 from islands.evolution.engine import SerialEngine
 from islands.io.records.preview import preview
-from islands_service.coordinator.coordinator import make_problem_document
 from islands_service.coordinator.diagnosis_job import run_diagnosis_job
 from islands_service.coordinator.heartbeat import JobCancelled
+from islands_service.coordinator.job_failures import make_problem_document
 from islands_service.domain.job import (
     DISCREPANCY,
     EXTENDED,

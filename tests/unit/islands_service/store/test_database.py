@@ -11,7 +11,8 @@ import pytest
 from sqlalchemy import event, text
 from sqlalchemy.exc import DBAPIError, IntegrityError, ProgrammingError
 
-from islands_service.store import Store, connections
+from islands_service.store import Store
+from islands_service.store.backends import connections
 from islands_service.store.database import (
     CommitUnknownError,
     Database,

@@ -12,6 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[4]))
 
+from islands_service.domain.job import Requester
 from islands_service.store import Store
 from islands_service.store.migrations.upgrade import HEAD
 from support.stores import ALICE, BLOB, BOB, FAILED, FOUND, brought_on, claimed, submitted
@@ -31,6 +32,9 @@ def fill(store: Store) -> None:
         store.leases.finish(lease, outcome)
         store.results.keep(lease.job.id, {"pareto.svg": BLOB})
     store.jobs.cancel(ALICE, submitted(store).id)
+    deleted = submitted(store, idempotency_key="deleted")
+    store.jobs.cancel(ALICE, deleted.id, Requester("192.0.2.1", "0123456789abcdef"))
+    store.jobs.delete(ALICE, deleted.id, Requester("command line"))
     submitted(store, priority=-7)
     store.leases.report(claimed(store), brought_on(5))
     submitted(store, BOB, priority=100, spec={"value": 0.1 + 0.2})

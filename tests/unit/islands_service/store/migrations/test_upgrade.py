@@ -58,6 +58,8 @@ def rows(connection, columns=None):
     """Return the rows of all tables by name, reduced to some columns if given."""
     found = {}
     for name, table in tables_of(connection).items():
+        if columns is not None and name not in columns:
+            continue
         names = sorted(set(table.c.keys()) & set(columns[name]) if columns else table.c.keys())
         taken = connection.execute(select(*(table.c[each] for each in names))).mappings()
         found[name] = sorted((dict(row) for row in taken), key=repr)

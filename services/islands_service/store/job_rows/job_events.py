@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import Connection, Row, insert, update
 
 from islands_service.domain.job import Job, JobState
-from islands_service.store.dialect import now
+from islands_service.store.backends.dialect import now
 from islands_service.store.tables import events, jobs
 
 
@@ -47,6 +47,11 @@ def job_from_row(row: Row[Any]) -> Job:
         row.updated,
         row.started,
         row.finished,
+        {
+            "job": row.islands_version,
+            "checkpoint": row.checkpoint_version,
+            "result": row.result_version,
+        },
     )
 
 

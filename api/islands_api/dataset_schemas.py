@@ -1,0 +1,103 @@
+"""Wire models of data sets: their columns and the facts about their records."""
+
+from datetime import datetime
+from typing import Any
+
+from pydantic import Field
+
+from islands_api.schemas import DATASET_ID, ResponseModel
+
+
+class Column(ResponseModel):
+    """Column of a data set."""
+
+    name: str
+    unit: str
+    samples: int | None = Field(description="None if the column cannot be read.")
+    minimum: float | None = None
+    maximum: float | None = None
+    mean: float | None = None
+    deviation: float | None = Field(default=None, description="Standard deviation.")
+    problem: str = Field(
+        default="", description="Why the column can be neither input nor output. Empty if it can."
+    )
+
+
+class RecordFact(ResponseModel):
+    """Measured property of a record."""
+
+    name: str = Field(description="Property, for example `dead-time`.", examples=["dead-time"])
+    signal: str = Field(description="Column that it describes. Empty for the whole record.")
+    value: bool | float | None = Field(description="None if the record does not determine it.")
+    unit: str
+    interval: tuple[float, float] | None = Field(default=None, description="95 % interval of the value.")
+    confidence: float | None = Field(default=None, description="Probability that the value is right.")
+    sentence: str = Field(description="The fact in one sentence.")
+
+
+class ChosenColumns(ResponseModel):
+    """Inputs and output that the facts describe."""
+
+    inputs: tuple[str, ...]
+    output: str
+    confidence: float | None = Field(
+        default=None, description="Probability that the choice is right. None if it was given."
+    )
+    reason: str
+
+
+class Inspection(ResponseModel):
+    """Facts about the record in a file."""
+
+    rows: str | None = Field(
+        default=None, description="`START:STOP`, the samples that were measured. None if all were."
+    )
+    choice: ChosenColumns
+    facts: tuple[RecordFact, ...]
+
+
+class Preview(ResponseModel):
+    """Content of a file."""
+
+    samples: int | None
+    columns: tuple[Column, ...]
+    time: str | None = Field(default=None, description="Name of the time column.")
+    dt: float | None = Field(default=None, description="Sampling time in seconds. None if it is unknown.")
+    warnings: tuple[str, ...] = ()
+    reading: dict[str, Any] = Field(default_factory=dict, description="Options of reading.")
+    inspection: Inspection | None = Field(
+        default=None, description="Facts about the record. None if no two columns form one."
+    )
+
+
+class DatasetView(ResponseModel):
+    """Uploaded record."""
+
+    id: str = Field(examples=[DATASET_ID])
+    name: str
+    sha256: str
+    bytes: int
+    created: datetime
+    preview: Preview
+
+
+class DatasetSummary(ResponseModel):
+    """Uploaded record in a list."""
+
+    id: str = Field(examples=[DATASET_ID])
+    name: str
+    sha256: str
+    bytes: int
+    created: datetime
+    samples: int | None
+    columns: int = Field(description="Number of columns. The data set itself lists them.")
+    time: str | None = Field(description="Name of the time column.")
+    dt: float | None = Field(description="Sampling time in seconds. None if it is unknown.")
+    warnings: int = Field(description="Number of warnings.")
+
+
+class DatasetPage(ResponseModel):
+    """Page of data sets, newest first."""
+
+    items: tuple[DatasetSummary, ...]
+    next: str | None = Field(default=None, description="Cursor of the next page. None on the last page.")

@@ -1,0 +1,1 @@
+"""Database backends: connections to SQLite and PostgreSQL, and the differences of their SQL."""

@@ -1,0 +1,1 @@
+"""Rows of jobs, within a transaction: updates with their events, claims, checks of submissions."""

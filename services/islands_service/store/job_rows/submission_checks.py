@@ -1,0 +1,100 @@
+"""Checks inside the transaction that queues a job: idempotency key, data sets and quota."""
+
+import hashlib
+
+from sqlalchemy import Connection, func, select
+
+from islands_service.domain.job import (
+    ACTIVE,
+    DatasetDeletedError,
+    IdempotencyError,
+    Job,
+    JobDeletedError,
+    QuotaError,
+    Submission,
+)
+from islands_service.store.job_rows.job_events import job_from_row
+from islands_service.store.tables import datasets, jobs, retired_keys
+
+
+def request_digest(submission: Submission) -> str:
+    """Return the SHA-256 of a request, which identifies it."""
+    return hashlib.sha256(submission.request.encode()).hexdigest()
+
+
+def find_accepted_job(connection: Connection, submission: Submission) -> Job | None:
+    """Return the job that has the idempotency key of a submission; None if there is no such job.
+
+    Raises
+    ------
+    IdempotencyError
+        The key belongs to a different request.
+    JobDeletedError
+        The job of the key was deleted.
+    """
+    key = submission.idempotency_key
+    if key is None:
+        return None
+    query = select(jobs).where(jobs.c.owner == submission.owner, jobs.c.idempotency_key == key)
+    job = connection.execute(query).one_or_none()
+    if job is None:
+        _check_retired_key(connection, submission, key)
+        return None
+    _check_request(job.id, job.request_sha256, submission, key)
+    return job_from_row(job)
+
+
+def _check_retired_key(connection: Connection, submission: Submission, key: str) -> None:
+    retired = connection.execute(
+        select(retired_keys).where(
+            retired_keys.c.owner == submission.owner, retired_keys.c.idempotency_key == key
+        )
+    ).one_or_none()
+    if retired is not None:
+        _check_request(retired.job_id, retired.request_sha256, submission, key)
+        raise JobDeletedError(
+            f"the job {retired.job_id} of the idempotency key {key!r} was deleted: to run it again, take a "
+            "new key"
+        )
+
+
+def _check_request(job: str, digest: str, submission: Submission, key: str) -> None:
+    if digest != request_digest(submission):
+        raise IdempotencyError(
+            f"the idempotency key {key!r} belongs to job {job}, which was submitted with a different "
+            "request: take a new key"
+        )
+
+
+def check_datasets(connection: Connection, job: Job) -> None:
+    """Raise an error if a data set of a job was deleted.
+
+    Raises
+    ------
+    DatasetDeletedError
+    """
+    query = select(datasets.c.id).where(
+        datasets.c.owner == job.owner, datasets.c.id.in_(job.datasets), datasets.c.deleted.is_(None)
+    )
+    missing = set(job.datasets) - set(connection.execute(query).scalars())
+    if missing:
+        raise DatasetDeletedError(
+            f"the data set {min(missing)} of job {job.id} was deleted: upload the same file again with the "
+            "same options of reading, then resume the job"
+        )
+
+
+def check_quota(connection: Connection, owner: str, most: int) -> None:
+    """Raise an error if an owner already has ``most`` active jobs.
+
+    Raises
+    ------
+    QuotaError
+    """
+    active = connection.execute(
+        select(func.count()).select_from(jobs).where(jobs.c.owner == owner, jobs.c.state.in_(ACTIVE))
+    ).scalar_one()
+    if active >= most:
+        raise QuotaError(
+            f"{active} jobs are waiting or running, and {most} is the most: wait for some, or cancel some"
+        )

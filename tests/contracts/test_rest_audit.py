@@ -1,0 +1,63 @@
+"""Audit trail of REST requests: every accepted change has one entry, with its key and address."""
+
+from islands_service.domain.job import JobState
+from islands_service.store.audit import Action
+from support.service import csv, held, kept, spec
+from support.stores import job_in
+
+#: Changes by method and route.
+CHANGES = {
+    ("POST", "/v1/datasets"): Action.UPLOAD,
+    ("DELETE", "/v1/datasets/{dataset}"): Action.DELETE_DATASET,
+    ("POST", "/v1/jobs"): Action.SUBMIT,
+    ("POST", "/v1/discrepancies"): Action.SUBMIT,
+    ("POST", "/v1/jobs/{job}/cancel"): Action.CANCEL,
+    ("POST", "/v1/jobs/{job}/resume"): Action.RESUME,
+    ("DELETE", "/v1/jobs/{job}"): Action.DELETE,
+}
+
+
+def test_every_changing_route_has_an_action(service):
+    paths = service.client.get("/openapi.json").json()["paths"]
+    routes = {(method.upper(), path) for path, entry in paths.items() for method in entry}
+    assert {route for route in routes if route[0] != "GET"} == set(CHANGES)
+    assert {*CHANGES.values(), Action.CREATE_KEY, Action.REVOKE_KEY} == set(Action)
+
+
+def test_every_change_is_recorded_with_its_key_and_address(service):
+    header = service.key("read", "write", owner="me")
+    (key,) = service.store.keys.all()
+    used, unused = kept(service.store, "me"), kept(service.store, "me", b"2")
+    failed = job_in(service.store, JobState.FAILED, "me", spec=spec(used)).id
+    requests = [
+        ("POST", "/v1/datasets", {"files": {"file": ("a.csv", csv())}}),
+        ("DELETE", "/v1/datasets/{dataset}", {}),
+        ("POST", "/v1/jobs", {"json": spec(used)}),
+        ("POST", "/v1/discrepancies", {"json": held(used)}),
+        ("POST", "/v1/jobs/{job}/resume", {}),
+        ("POST", "/v1/jobs/{job}/cancel", {}),
+        ("DELETE", "/v1/jobs/{job}", {}),
+    ]
+    assert {(method, route) for method, route, _ in requests} == set(CHANGES)
+    for method, route, body in requests:
+        path = route.format(job=failed, dataset=unused)
+        answer = service.client.request(method, path, headers=header, **body)
+        assert answer.is_success, (route, answer.text)
+        subject = {"dataset}": unused}.get(route.rpartition("{")[2], failed)
+        if "{" not in route:
+            subject = answer.json()["id"]
+        (entry,) = service.store.audit.entries("me", limit=1)
+        assert (entry.action, entry.subject) == (CHANGES[method, route], subject)
+        assert (entry.owner, entry.key_id, entry.address) == ("me", key.id, "127.0.0.1")
+    assert len(service.store.audit.entries()) == len(requests)
+
+
+def test_refused_and_repeated_requests_are_not_recorded(service):
+    order = spec(kept(service.store))
+    first = service.submit({"Idempotency-Key": "k"}, **order)
+    before = service.store.audit.entries()
+    assert [entry.key_id for entry in before] == [None]
+    assert service.submit({"Idempotency-Key": "k"}, **order).status_code == 202
+    service.submit(**{**order, "dataset": "gone-csv"})
+    assert service.client.delete(first.headers["location"]).status_code == 409
+    assert service.store.audit.entries() == before

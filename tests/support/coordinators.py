@@ -1,0 +1,49 @@
+"""Coordinators without Ray, in a thread of the test."""
+
+import time
+from collections.abc import Callable
+from types import MappingProxyType
+from typing import Any
+
+import pytest
+
+from islands.evolution.engine import SerialEngine
+from islands_service.coordinator import coordinator as coordinator_module
+from islands_service.coordinator.coordinator import Coordinator
+from islands_service.domain.job import Job, JobOutcome, JobState, Lease
+from islands_service.store import Store
+from islands_service.store.blobs import Blobs
+from support.processes import eventually
+from support.stores import ALICE
+
+
+class SerialCoordinator(Coordinator):
+    """A coordinator without Ray: its engine is serial."""
+
+    def _wait_for_ray(self, *_: object) -> None:
+        pass
+
+    def _make_engine(self, _: Lease) -> SerialEngine:  # type: ignore[override]
+        return SerialEngine()
+
+
+def wait_until_finished(store: Store, job: Job) -> Job:
+    eventually(lambda: store.jobs.get(ALICE, job.id).finished is not None, seconds=30.0)
+    return store.jobs.get(ALICE, job.id)
+
+
+def replace_runner(monkeypatch: pytest.MonkeyPatch, how: Callable[..., JobOutcome]) -> None:
+    """Replace the runner of identification jobs."""
+    monkeypatch.setattr(coordinator_module, "JOB_RUNNERS", MappingProxyType({"identification": how}))
+    monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.02)
+
+
+DONE = JobOutcome(JobState.SUCCEEDED, {}, (), {"done": True})
+
+
+def run_until_check_raises(
+    _lease: Lease, _store: Store, _blobs: Blobs, _engine: object, check: Any, _s: float
+) -> JobOutcome:
+    while True:
+        check()
+        time.sleep(0.01)

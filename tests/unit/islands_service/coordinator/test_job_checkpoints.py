@@ -1,0 +1,115 @@
+"""Checkpoints of identification jobs: a lost one costs only time, a superseded one is deleted."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import update
+
+from islands.evolution.engine import SerialEngine
+from islands_service.coordinator import identification_job as work
+from islands_service.coordinator.identification_job import run_identification_job
+from islands_service.coordinator.job_checkpoints import RESTARTED
+from islands_service.coordinator.job_failures import JobDeclinedError
+from islands_service.domain.job import ISLANDS_VERSION, Job, Lease, LeaseLostError
+from islands_service.store import Store
+from islands_service.store.blobs import Blobs
+from islands_service.store.tables import jobs
+from support.stores import ALICE
+
+Found = tuple[list[Any], list[Any]]
+
+
+class ProcessEndedError(Exception):
+    """The process ended."""
+
+
+def claim(store: Store) -> Lease:
+    lease = store.leases.claim("me", 60.0)
+    assert lease is not None
+    return lease
+
+
+def interrupt(store: Store, blobs: Blobs, at: int = 3) -> Path:
+    """Run a job until a generation; return the path of its checkpoint."""
+    lease = claim(store)
+
+    def check() -> None:
+        progress = store.jobs.get(ALICE, lease.job.id).progress or {}
+        if progress.get("generation", -1) >= at:
+            raise ProcessEndedError
+
+    with pytest.raises(ProcessEndedError):
+        run_identification_job(lease, store, blobs, SerialEngine(), check, 1e-9)
+    blob = store.jobs.get(ALICE, lease.job.id).checkpoint
+    assert blob is not None
+    return blobs.path(blob)
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-40])
+
+
+@pytest.fixture(autouse=True)
+def frequent_reports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    "harm",
+    [Path.unlink, truncate, lambda path: path.write_bytes(b"{}"), lambda path: path.write_bytes(b"")],
+    ids=["lost", "truncated", "replaced", "empty"],
+)
+def test_job_without_its_checkpoint_starts_again_with_the_same_result(
+    store: Store, blobs: Blobs, job: Job, undisturbed: Found, harm: Callable[[Path], object]
+) -> None:
+    harm(interrupt(store, blobs))
+    lease = claim(store)
+    outcome = run_identification_job(lease, store, blobs, SerialEngine(), lambda: None, 1e-9)
+    assert [json.loads(json.dumps(document)) for document, _ in outcome.models] == undisturbed[0]
+    assert store.results.history(job.id) == undisturbed[1]
+    ended = store.jobs.get(ALICE, job.id)
+    assert ended.progress is not None
+    assert outcome.summary is not None
+    assert ended.progress["note"] == outcome.summary["note"] == RESTARTED
+
+
+def test_checkpoint_of_a_newer_version_is_left_to_its_coordinators(
+    store: Store, blobs: Blobs, job: Job
+) -> None:
+    path = interrupt(store, blobs)
+    assert store.jobs.get(ALICE, job.id).versions["checkpoint"] == ISLANDS_VERSION
+    path.write_bytes(b"another format")
+    newer = update(jobs).values(checkpoint_version="999.0")
+    store.database.write(lambda connection: connection.execute(newer))
+    with pytest.raises(JobDeclinedError, match=r"islands 999\.0, which wrote the checkpoint"):
+        run_identification_job(claim(store), store, blobs, SerialEngine(), lambda: None, 1e-9)
+
+
+def test_superseded_checkpoint_is_deleted_at_once(
+    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "CHECKPOINT_SHARE", 1e9)
+    before = set(dict(blobs.all()))
+    seen = set()
+
+    def look() -> None:
+        named = store.jobs.get(ALICE, job.id).checkpoint
+        seen.add(named)
+        assert set(dict(blobs.all())) - before == ({named} if named else set())
+
+    run_identification_job(claim(store), store, blobs, SerialEngine(), look, 1e-9)
+    assert len(seen) > 5
+
+
+def test_lost_lease_deletes_no_checkpoint_of_its_successor(store: Store, blobs: Blobs, job: Job) -> None:
+    interrupt(store, blobs)
+    old, new = claim(store), claim(store)
+    kept = store.jobs.get(ALICE, job.id).checkpoint
+    with pytest.raises(LeaseLostError):
+        run_identification_job(old, store, blobs, SerialEngine(), lambda: None, 1e-9)
+    assert store.jobs.get(ALICE, job.id).checkpoint == kept == new.job.checkpoint
+    assert kept in dict(blobs.all())

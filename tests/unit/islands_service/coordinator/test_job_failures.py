@@ -1,0 +1,230 @@
+"""Failures of jobs: transient ones are tried again, others end the job, and no message contains a path."""
+
+import errno
+import json
+from collections.abc import Callable
+from threading import Thread
+from typing import Any
+
+import pytest
+from sqlalchemy import select, update
+
+from islands.errors import IslandsError, RecordError, SettingsError
+from islands_service.coordinator import coordinator as coordinator_module
+from islands_service.coordinator.job_failures import describe_interruption, is_newer, make_problem_document
+from islands_service.domain.job import ISLANDS_VERSION, Job, JobOutcome, JobState, Lease, Submission
+from islands_service.settings import ServiceSettings
+from islands_service.store import Store
+from islands_service.store.blobs import BlobNotFoundError
+from islands_service.store.job_rows.job_claims import ATTEMPTS
+from islands_service.store.tables import jobs
+from support.coordinators import DONE, replace_runner, wait_until_finished
+from support.processes import eventually
+from support.stores import ALICE, contents
+
+Coordinators = Callable[..., Thread]
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "detail"),
+    [
+        (RecordError("line 7 is wrong"), "invalid-record", "line 7 is wrong"),
+        (BlobNotFoundError("the blob is gone"), "no-such-blob", str(BlobNotFoundError.__doc__)),
+        (IslandsError("something else"), "job-failed", "something else"),
+        (ZeroDivisionError("by zero"), "defect", "ZeroDivisionError: the log of the service has"),
+    ],
+)
+def test_failed_job_has_a_typed_problem_and_does_not_block_others(
+    store: Store,
+    job: Job,
+    coordinator: Callable[..., Thread],
+    monkeypatch: pytest.MonkeyPatch,
+    error: Exception,
+    kind: str,
+    detail: str,
+) -> None:
+    def fail_first(lease: Lease, *_: object) -> JobOutcome:
+        if lease.job.id == job.id:
+            raise error
+        return DONE
+
+    replace_runner(monkeypatch, fail_first)
+    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
+    coordinator()
+    failed = wait_until_finished(store, job)
+    assert failed.state == JobState.FAILED
+    assert failed.problem is not None
+    assert failed.problem["type"] == kind
+    assert failed.problem["detail"].startswith(detail)
+    assert "Traceback" not in json.dumps(failed.problem)
+    assert wait_until_finished(store, second).state == JobState.SUCCEEDED
+
+
+@pytest.mark.parametrize(
+    "error",
+    [OSError(errno.ESTALE, "Stale file handle", "/data/blobs/ab"), MemoryError(), ConnectionResetError()],
+)
+def test_job_is_tried_again_after_a_transient_error(
+    store: Store, job: Job, coordinator: Coordinators, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    failures = [error] * (ATTEMPTS - 1)
+
+    def fail(*_: object) -> JobOutcome:
+        if failures:
+            raise failures.pop()
+        return DONE
+
+    replace_runner(monkeypatch, fail)
+    monkeypatch.setattr(coordinator_module, "RETRY_BACKOFF", 0.005)
+    coordinator()
+    ended = wait_until_finished(store, job)
+    assert (ended.state, ended.attempt) == (JobState.SUCCEEDED, ATTEMPTS)
+    notes = [event.data["note"] for event in store.jobs.events(job.id) if "note" in event.data]
+    assert notes == [describe_interruption(error)] * (ATTEMPTS - 1)
+    assert "/data" not in notes[0]
+
+
+def test_repeated_transient_errors_fail_the_job_with_their_reason(
+    store: Store, job: Job, coordinator: Coordinators, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> JobOutcome:
+        raise MemoryError
+
+    replace_runner(monkeypatch, fail)
+    monkeypatch.setattr(coordinator_module, "RETRY_BACKOFF", 0.005)
+    coordinator()
+    ended = wait_until_finished(store, job)
+    assert (ended.state, ended.attempt) == (JobState.FAILED, ATTEMPTS)
+    assert ended.problem is not None
+    assert ended.problem["type"] == "no-progress"
+    assert "(MemoryError)" in ended.problem["detail"]
+
+
+def test_attempts_after_transient_errors_wait_twice_as_long_each_time(store: Store, job: Job) -> None:
+    waits = []
+    for attempt in range(1, 4):
+        lease = store.leases.claim("me", 60.0)
+        assert lease is not None
+        assert lease.job.attempt == attempt
+        store.leases.postpone(lease, "the disk is away", 100.0)
+        assert store.leases.claim("me", 60.0) is None
+
+        def read_wait(connection: Any) -> float:
+            row = connection.execute(select(jobs.c.not_before, jobs.c.updated)).one()
+            connection.execute(update(jobs).values(not_before=0.0))
+            return float(row.not_before - row.updated)
+
+        waits.append(store.database.write(read_wait))
+    assert waits == pytest.approx([100.0, 200.0, 400.0], abs=1.0)
+    assert store.jobs.get(ALICE, job.id).progress == {"phase": "waiting", "note": "the disk is away"}
+
+
+def accepted_by(store: Store, version: str) -> None:
+    """Change the version of islands that accepted all jobs."""
+    store.database.write(lambda connection: connection.execute(update(jobs).values(islands_version=version)))
+
+
+@pytest.mark.parametrize("error", [SettingsError("unknown"), RecordError("odd"), KeyError("kind")])
+def test_job_of_a_newer_version_waits_for_a_coordinator_of_it(
+    store: Store, job: Job, coordinator: Coordinators, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def fail_first(lease: Lease, *_: object) -> JobOutcome:
+        if lease.job.id == job.id:
+            raise error
+        return DONE
+
+    replace_runner(monkeypatch, fail_first)
+    accepted_by(store, "999.1")
+    thread = coordinator()
+    eventually(lambda: len(store.jobs.events(job.id)) == 3)
+    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
+    assert wait_until_finished(store, second).state == JobState.SUCCEEDED
+    thread.stop()  # type: ignore[attr-defined]
+    thread.join()
+    waiting = store.jobs.get(ALICE, job.id)
+    # It was claimed once, and other jobs are not delayed.
+    assert (waiting.state, waiting.attempt, waiting.version) == (JobState.QUEUED, 0, 3)
+    assert waiting.progress is not None
+    assert "waiting for a coordinator of islands 999.1" in waiting.progress["note"]
+    assert store.leases.claim("old", 60.0) is None
+    lease = store.leases.claim("new", 60.0, "999.1")
+    assert lease is not None
+    assert lease.job.id == job.id
+
+
+def test_coordinators_of_two_old_versions_decline_a_job_once_each(store: Store, job: Job) -> None:
+    for version in ("1.1", "1.2"):
+        lease = store.leases.claim("me", 60.0, version)
+        assert lease is not None
+        store.leases.decline(lease, "no", version)
+    assert store.leases.claim("me", 60.0, "1.1") is None
+    assert store.leases.claim("me", 60.0, "1.2") is None
+    assert store.leases.claim("me", 60.0, "1.11") is not None
+
+
+def test_job_of_this_version_fails_and_a_job_without_a_version_too(
+    store: Store, job: Job, coordinator: Coordinators, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> JobOutcome:
+        raise SettingsError("unknown")
+
+    replace_runner(monkeypatch, fail)
+    accepted_by(store, "0.0.1")
+    coordinator()
+    assert wait_until_finished(store, job).state == JobState.FAILED
+
+
+@pytest.mark.parametrize(
+    ("other", "newer"),
+    [(None, False), ("", False), ("0.0.9", False), (ISLANDS_VERSION, False), ("999.0", True), ("999", True)],
+)
+def test_versions_are_compared_by_their_numbers(other: str | None, newer: bool) -> None:
+    assert is_newer(other) == newer
+    assert is_newer(f"{ISLANDS_VERSION}.1")
+    assert not is_newer(f"{ISLANDS_VERSION}rc1")
+
+
+def damage(settings: ServiceSettings) -> None:
+    """Replace all blobs by garbage."""
+    for path in settings.blobs.glob("??/*"):
+        path.write_bytes(b"garbage,\0\xff")
+
+
+def remove(settings: ServiceSettings) -> None:
+    for path in settings.blobs.glob("??/*"):
+        path.unlink()
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("kind", ["identification", "discrepancy", "unknown"])
+@pytest.mark.parametrize("harm", [damage, remove, lambda _: None])
+def test_no_message_of_a_failed_job_contains_a_path(
+    store: Store,
+    job: Job,
+    settings: ServiceSettings,
+    coordinator: Coordinators,
+    kind: str,
+    harm: Callable[[ServiceSettings], None],
+) -> None:
+    store.jobs.cancel(ALICE, job.id)
+    part = {"dataset": job.spec["dataset"], "rows": "0:20"}
+    spec = {
+        "identification": {**job.spec, **part},
+        "discrepancy": {**part, "input": "u_V", "output": "y_um", "simulation": {"kind": "bouc-wen-piezo"}},
+    }.get(kind, {})
+    failing = store.jobs.submit(Submission(ALICE, spec, kind))[0]
+    harm(settings)
+    coordinator()
+    assert wait_until_finished(store, failing).state == JobState.FAILED
+    said = json.dumps([contents(store)["jobs"], contents(store)["events"]])
+    assert str(settings.data_dir) not in said
+    assert "/tmp" not in said
+
+
+@pytest.mark.parametrize(
+    "error",
+    [RuntimeError("/data/blobs"), BlobNotFoundError("not in /data/blobs"), OSError(2, "gone", "/data/blobs")],
+)
+def test_unexpected_errors_are_described_without_their_message(error: Exception) -> None:
+    assert "/data" not in json.dumps(make_problem_document(error))
+    assert "/data" not in describe_interruption(error)
