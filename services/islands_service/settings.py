@@ -3,10 +3,10 @@
 import os
 from ipaddress import ip_network
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from platformdirs import user_data_path
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from islands.errors import SettingsError
@@ -39,6 +39,8 @@ class ServiceSettings(BaseSettings):
         Folder of uploads and results, and of the database unless ``database`` is given.
     database
         ``postgresql+psycopg://USER:PASSWORD@HOST/NAME``; by default SQLite in the data folder.
+    database_file
+        File that contains the ``database`` instead, for example a mounted secret.
     host, port
         Address that the service listens on.
     trusted_proxies
@@ -103,6 +105,7 @@ class ServiceSettings(BaseSettings):
 
     data_dir: Path = Field(default_factory=lambda: user_data_path("islands"))
     database: str = ""
+    database_file: Path | None = None
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
     trusted_proxies: Annotated[str, AfterValidator(_check_networks)] = ""
@@ -137,6 +140,18 @@ class ServiceSettings(BaseSettings):
     telemetry: str = ""
     lifeline: int | None = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _read_database_file(cls, values: dict[str, Any]) -> dict[str, Any]:
+        if not (path := values.get("database_file")):
+            return values
+        if values.get("database"):
+            raise ValueError("give either ISLANDS_DATABASE or ISLANDS_DATABASE_FILE")
+        try:
+            return {**values, "database": Path(path).read_text(encoding="utf-8").strip()}
+        except (OSError, ValueError) as error:
+            raise ValueError(f"cannot read the file of ISLANDS_DATABASE_FILE, {path}: {error}") from error
+
     @property
     def url(self) -> str:
         """URL of the database."""
@@ -163,10 +178,14 @@ class ServiceSettings(BaseSettings):
         return self.require_keys or not self.on_loopback
 
     def environment(self) -> dict[str, str]:
-        """Return environment variables that give a child process the same settings."""
+        """Return environment variables that give a child process the same settings.
+
+        Arguments would be visible to all users of the machine.
+        """
+        hidden = {"lifeline"} if self.database_file is None else {"lifeline", "database"}
         settings = {
             f"ISLANDS_{name.upper()}": str(value)
-            for name, value in self.model_dump(mode="json", exclude={"lifeline"}).items()
+            for name, value in self.model_dump(mode="json", exclude=hidden).items()
             if value is not None
         }
         return {**os.environ, **settings}
@@ -185,4 +204,7 @@ def service_settings(**given: object) -> ServiceSettings:
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
         name = ".".join(map(str, problem["loc"]))
-        raise SettingsError(f"setting {name} (ISLANDS_{name.upper()}): {problem['msg']}") from error
+        message = problem["msg"].removeprefix("Value error, ")
+        raise SettingsError(
+            f"setting {name} (ISLANDS_{name.upper()}): {message}" if name else message
+        ) from error

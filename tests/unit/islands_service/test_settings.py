@@ -40,6 +40,7 @@ def test_arguments_precede_the_environment_and_that_precedes_defaults(monkeypatc
         ("rate", "-1"),
         ("burst", "0"),
         ("retention", "-1"),
+        ("audit_retention", "-1"),
         ("coordinators", "65"),
         ("log_format", "xml"),
         ("require_keys", "perhaps"),
@@ -68,6 +69,28 @@ def test_child_process_has_the_same_settings(monkeypatch, tmp_path):
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
     assert service_settings() == given.model_copy(update={"lifeline": None})
+
+
+def test_database_is_read_from_a_file_which_child_processes_read_again(monkeypatch, tmp_path):
+    path = tmp_path / "database"
+    path.write_text("postgresql+psycopg://me:secret@host/islands\n")
+    monkeypatch.setenv("ISLANDS_DATABASE_FILE", str(path))
+    given = service_settings(data_dir=tmp_path)
+    assert given.url == "postgresql+psycopg://me:secret@host/islands"
+    environment = given.environment()
+    assert "secret" not in repr(environment)
+    monkeypatch.setattr(os, "environ", environment)
+    assert service_settings() == given
+
+
+def test_database_and_its_file_are_not_both_given(monkeypatch, tmp_path):
+    (tmp_path / "database").write_text("sqlite://")
+    monkeypatch.setenv("ISLANDS_DATABASE_FILE", str(tmp_path / "database"))
+    with pytest.raises(SettingsError, match="give either ISLANDS_DATABASE or ISLANDS_DATABASE_FILE"):
+        service_settings(database="sqlite:///other.db")
+    monkeypatch.setenv("ISLANDS_DATABASE_FILE", str(tmp_path / "missing"))
+    with pytest.raises(SettingsError, match=r"cannot read the file of ISLANDS_DATABASE_FILE.*missing"):
+        service_settings()
 
 
 def test_child_process_inherits_the_rest_of_the_environment(monkeypatch, tmp_path):

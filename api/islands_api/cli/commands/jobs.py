@@ -8,12 +8,12 @@ import typer
 
 from islands.errors import SettingsError
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands_api.cli import job_views as views
 from islands_api.cli import options
 from islands_api.cli.console import errors, output
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, Seed, with_search_options
+from islands_api.cli.service import job_views as views
 from islands_api.client import Client, JobFailedError
 from islands_api.client.diagnosis_calls import parse_simulation
 from islands_api.client.recording_parts import make_part

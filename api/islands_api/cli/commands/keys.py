@@ -1,7 +1,6 @@
 """``islands keys``: create, list and revoke the API keys of a service, in its database."""
 
 from math import inf
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,27 +9,15 @@ from rich.text import Text
 
 from islands.errors import SettingsError
 from islands_api.cli.console import output
-from islands_service.settings import service_settings
-from islands_service.store import Store
+from islands_api.cli.service.store_options import COMMAND_LINE, Database, DataDir, open_store
 from islands_service.store.keys import SCOPES
 
 keys = typer.Typer(
     help="API keys of a service: create, list, revoke.", no_args_is_help=True, add_completion=False
 )
 
-DataDir = Annotated[Path | None, typer.Option("--data-dir", help="The service's data folder.")]
-Database = Annotated[
-    str | None, typer.Option("--database", help="The service's database, if it is not in the data folder.")
-]
-
 #: Seconds of a day.
 _DAY_SECONDS = 86_400.0
-
-
-def _open_store(data_dir: Path | None, database: str | None) -> Store:
-    settings = service_settings(data_dir=data_dir, database=database)
-    settings.data_dir.mkdir(parents=True, exist_ok=True, mode=0o700)
-    return Store(settings.url)
 
 
 @keys.command()
@@ -50,9 +37,9 @@ def create(
     """Create a key. It is shown once: only its hash is stored."""
     if days is not None and not 0.0 < days < inf:
         raise SettingsError(f"--days is a number of days above 0, got {days:g}")
-    with _open_store(data_dir, database) as store:
+    with open_store(data_dir, database) as store:
         key, secret = store.keys.create(
-            name, frozenset(scopes), owner, None if days is None else days * _DAY_SECONDS
+            name, frozenset(scopes), owner, None if days is None else days * _DAY_SECONDS, COMMAND_LINE
         )
     output.print(secret, markup=False)
     output.print(f"key {key.id} of owner {key.owner}: {', '.join(sorted(key.scopes))}", markup=False)
@@ -61,7 +48,7 @@ def create(
 @keys.command("list")
 def list_keys(data_dir: DataDir = None, database: Database = None) -> None:
     """List the keys, without their secrets."""
-    with _open_store(data_dir, database) as store:
+    with open_store(data_dir, database) as store:
         # Ids are never truncated; other columns wrap in a narrow terminal.
         table = Table(
             Column("key", no_wrap=True),
@@ -82,6 +69,6 @@ def revoke(
     database: Database = None,
 ) -> None:
     """Revoke a key. The service rejects it within a second."""
-    with _open_store(data_dir, database) as store:
-        store.keys.revoke(key)
+    with open_store(data_dir, database) as store:
+        store.keys.revoke(key, COMMAND_LINE)
     output.print(f"key {key} is revoked", markup=False)

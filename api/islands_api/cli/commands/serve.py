@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from islands_api.cli.console import errors
+from islands_api.cli.service.store_options import refuse_password
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.supervisor import Role, folder_lock, supervise
 
@@ -32,7 +33,12 @@ def serve(
     ] = None,
     port: Annotated[int | None, typer.Option("--port", help="8000 by default.")] = None,
     database: Annotated[
-        str | None, typer.Option("--database", help="postgresql+psycopg://...; SQLite by default.")
+        str | None,
+        typer.Option(
+            "--database",
+            callback=refuse_password,
+            help="postgresql+psycopg://... without a password; SQLite by default.",
+        ),
     ] = None,
     ray_address: Annotated[
         str | None,

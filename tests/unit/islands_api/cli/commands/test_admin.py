@@ -1,0 +1,112 @@
+"""``islands admin`` in this process, on the database of a service."""
+
+import json
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import pytest
+from sqlalchemy import update
+
+from islands_service.domain.job import Requester
+from islands_service.settings import ServiceSettings
+from islands_service.store import Store
+from islands_service.store.tables import audit
+from support.stores import submitted
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def folder(prepared_sqlite: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "islands.db").write_bytes(prepared_sqlite.read_bytes())
+    monkeypatch.setenv("ISLANDS_DATA_DIR", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def run(folder: Path, command_line: Run) -> Run:
+    return partial(command_line, "admin", "audit")
+
+
+@pytest.fixture
+def subjects(folder: Path) -> list[str]:
+    """Make three changes, a day apart; return their subjects, the newest first."""
+    with Store(ServiceSettings(data_dir=folder).url) as store:
+        job = submitted(store, "alice").id
+        store.jobs.cancel("alice", job, Requester("192.0.2.7", "0123456789abcdef"))
+        key, _ = store.keys.create("lab", frozenset({"read"}), "bob", by=Requester("command line"))
+        store.jobs.delete("alice", job, Requester("2001:db8::1"))
+        moment = 86_400.0 * (20_000 + audit.c.number)
+        store.database.write(lambda connection: connection.execute(update(audit).values(at=moment)))
+    return [job, key.id, job]
+
+
+def read(run: Run, *words: str) -> list[dict[str, object]]:
+    code, out, err = run("--json", *words)
+    assert (code, err) == (0, "")
+    return [json.loads(line) for line in out.splitlines()]
+
+
+def test_audit_lists_changes_newest_first(run: Run, subjects: list[str]) -> None:
+    found = read(run)
+    assert [entry["subject"] for entry in found] == subjects
+    assert found[2] == {
+        "at": "2024-10-05T00:00:00Z",
+        "action": "cancel-job",
+        "owner": "alice",
+        "subject": subjects[2],
+        "key_id": "0123456789abcdef",
+        "address": "192.0.2.7",
+    }
+    code, out, _ = run()
+    assert code == 0
+    assert out.index("bob") < out.index("192.0.2.7")
+
+
+def test_audit_is_limited_to_an_owner_a_time_and_a_number(run: Run, subjects: list[str]) -> None:
+    assert [entry["action"] for entry in read(run, "--owner", "bob")] == ["create-key"]
+    assert len(read(run, "--since", "2024-10-06")) == 2
+    assert len(read(run, "--since", "2024-10-06T00:00:01")) == 1
+    assert [entry["subject"] for entry in read(run, "--limit", "1")] == subjects[:1]
+    assert run("--limit", "0")[0] == 2
+
+
+def test_keys_of_the_command_line_are_audited(run: Run, command_line: Run) -> None:
+    assert command_line("keys", "create", "--scope", "read", "--owner", "carol")[0] == 0
+    (created,) = read(run)
+    assert command_line("keys", "revoke", str(created["subject"]))[0] == 0
+    assert [(entry["action"], entry["owner"], entry["address"]) for entry in read(run)] == [
+        ("revoke-key", "carol", "command line"),
+        ("create-key", "carol", "command line"),
+    ]
+
+
+def test_audit_entries_expire(folder: Path, subjects: list[str]) -> None:
+    with Store(ServiceSettings(data_dir=folder).url) as store:
+        store.retention.delete_old_audit(1e12)
+        assert len(store.audit.entries()) == len(subjects)
+        store.retention.delete_old_audit(0.0)
+        assert store.audit.entries() == ()
+
+
+@pytest.mark.parametrize("command", [("keys", "list"), ("admin", "audit"), ("serve",)])
+@pytest.mark.parametrize(
+    "url", ["postgresql+psycopg://me:hidden@h/db", "postgresql+psycopg://h/db?password=hidden"]
+)
+def test_password_on_the_command_line_is_refused(
+    command_line: Run, command: tuple[str, ...], url: str, folder: Path
+) -> None:
+    """The arguments of a process are visible to every user of the machine."""
+    code, out, err = command_line(*command, "--database", url)
+    assert code == 2
+    assert "ISLANDS_DATABASE_FILE" in err
+    assert "hidden" not in out + err
+
+
+def test_password_in_the_options_file_is_accepted(run: Run, command_line: Run, tmp_path: Path) -> None:
+    options = tmp_path / "options.toml"
+    options.write_text('[keys]\ndatabase = "sqlite:///nowhere/islands.db?password=x"\n')
+    code, _, err = command_line("--config", options, "keys", "list")
+    assert code == 2
+    assert "every user of this machine" not in err
