@@ -1,6 +1,6 @@
 """Load of a service: durable job submissions, requests of jobs, event streams.
 
-    python benchmarks/service_load.py [store accept get events] [--repeat 5] [--json FILE]
+    python benchmarks/service_load.py [store claim accept get events] [--repeat 5] [--json FILE]
 
 Results are printed, not asserted; the targets are those of the service's design. The server is `islands
 serve` with SQLite and without a coordinator; the clients are this process with persistent connections.
@@ -22,9 +22,11 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from service_table import Figure, percentile, run
+from sqlalchemy import insert
 
 from islands_service.domain.job import ProgressReport, Submission
 from islands_service.store import Store
+from islands_service.store.tables import jobs
 from support.service_processes import SPEC, Service, serving
 
 #: Number of concurrent clients.
@@ -38,6 +40,9 @@ ALONE = 200
 
 #: Duration of the requests of a job in seconds.
 LOOKING = 5.0
+
+#: Number of queued jobs of a full queue, and of claims that are measured.
+QUEUED, CLAIMS = 10_000, 100
 
 #: Number of connections that request a job.
 CONNECTIONS = 16
@@ -178,6 +183,39 @@ def store(repeat: int) -> Iterator[Figure]:
     )
 
 
+def claim(repeat: int) -> Iterator[Figure]:
+    """Measure claims from a full queue: durable, in order of priority and age."""
+    middle, slow = [], []
+    spec = json.dumps(SPEC)
+    with tempfile.TemporaryDirectory() as folder, Store(f"sqlite:///{folder}/islands.db") as opened:
+        rows = [
+            {
+                "id": f"{number:032x}",
+                "owner": f"owner {number % 50}",
+                "kind": "identification",
+                "name": "",
+                "spec": spec,
+                "request_sha256": "0" * 64,
+                "priority": number % 3,
+                "state": "queued",
+                "created": float(number),
+                "updated": float(number),
+            }
+            for number in range(QUEUED + repeat * CLAIMS)
+        ]
+        opened.database.write(lambda connection: connection.execute(insert(jobs), rows))
+        for turn in range(repeat):
+            taken = []
+            for number in range(CLAIMS):
+                began = time.perf_counter()
+                assert opened.leases.claim(f"{turn}-{number}", 3600.0) is not None
+                taken.append(time.perf_counter() - began)
+            middle.append(1e3 * percentile(taken, 0.5))
+            slow.append(1e3 * percentile(taken, 0.99))
+    yield Figure(f"claim of {QUEUED} queued jobs: p50", "ms", 5.0, tuple(middle))
+    yield Figure(f"claim of {QUEUED} queued jobs: p99", "ms", None, tuple(slow))
+
+
 def get(repeat: int) -> Iterator[Figure]:
     """Measure requests of one job."""
     slow, rate = [], []
@@ -289,7 +327,7 @@ def _progress(number: int) -> dict[str, Any]:
     return {"phase": "search", "generation": number, "best_by_size": dict.fromkeys(map(str, range(10)), 0.1)}
 
 
-MEASURES = {"store": store, "accept": accept, "get": get, "events": events}
+MEASURES = {"store": store, "claim": claim, "accept": accept, "get": get, "events": events}
 
 if __name__ == "__main__":
     sys.exit(run(MEASURES, __doc__))  # type: ignore[arg-type]

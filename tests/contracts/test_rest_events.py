@@ -130,7 +130,7 @@ def test_a_stream_after_the_last_event_returns_204(service, last):
 
 
 def test_a_resumed_job_has_a_stream_again(service):
-    job = queued(service.store).id
+    job = queued(service.store, spec={"seed": 7}).id
     service.store.leases.finish(claimed(service.store), CANCELLED)
     assert [number for number, _, _ in read_events(service, job)] == [1, 2, 3]
     service.store.jobs.resume(LOCAL_OWNER, job)

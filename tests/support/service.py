@@ -302,7 +302,7 @@ def kept(store: Store, owner: str = LOCAL_OWNER, content: bytes = b"") -> str:
 
 def queued(store: Store, owner: str = LOCAL_OWNER, **changes: Any) -> Job:
     """Submit a job directly to the store."""
-    return store.jobs.submit(Submission(owner, spec("0-csv"), **changes))[0]
+    return store.jobs.submit(Submission(owner, **{"spec": spec("0-csv"), **changes}))[0]
 
 
 def ahead(service: Service, owner: str, **changes: Any) -> str:

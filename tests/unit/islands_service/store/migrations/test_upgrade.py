@@ -162,6 +162,24 @@ def test_migrated_database_works_like_a_new_one(old):
         assert (again.id, new) == (failed.id, False)
 
 
+def test_running_process_of_an_earlier_release_can_write_after_the_migration(old):
+    """During a rolling upgrade it inserts rows without the new columns."""
+    url, kept = old
+    with Store(url) as store:
+        (row,) = (each for each in kept["jobs"] if each["state"] == "queued")
+        new = {**row, "id": "e" * 32, "idempotency_key": None, "priority": 100}
+        (dataset,) = kept["datasets"]
+
+        def insert(connection):
+            connection.execute(metadata.tables["jobs"].insert(), new)
+            connection.execute(metadata.tables["datasets"].insert(), {**dataset, "owner": BOB})
+
+        store.database.write(insert)
+        claimed = {store.leases.claim(name, 60.0).job.id for name in ("one", "other")}
+        assert claimed == {row["id"], new["id"]}
+        assert store.datasets.page(BOB)[0][0].preview["columns"] == 1
+
+
 def test_new_database_is_empty(empty_database):
     with Store(empty_database) as store:
         assert not any(contents(store).values())

@@ -16,7 +16,7 @@ from islands_api.cli.commands import jobs as command
 from islands_service.domain.job import JobOutcome
 from support.command_line import COLUMNS, ISLANDS
 from support.processes import eventually
-from support.service import FIGURES, Service, ahead, kept, queued
+from support.service import FIGURES, Service, ahead, kept, queued, spec
 from support.stores import FAILED, at_once, brought_on, taken
 
 Run = Callable[..., tuple[int, str, str]]
@@ -53,7 +53,7 @@ def test_list_may_be_longer_than_a_page(run: Run, service: Service, owner: str) 
 
 
 def test_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: str) -> None:
-    job = ahead(service, owner)
+    job = ahead(service, owner, spec=spec(kept(service.store, owner)))
     assert run("show", job)[:2] == (0, f"job {job}: queued\n")
     assert run("cancel", job)[:2] == (0, f"job {job}: cancelled\n")
     assert run("resume", job)[:2] == (0, f"job {job}: queued\n")
