@@ -1,11 +1,10 @@
 """Main loop of the coordinator: claim a job, run it, store its outcome."""
 
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack, closing, suppress
 from functools import partial
 from time import monotonic, time
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import structlog
