@@ -10,7 +10,7 @@ from islands_api.web.problems import PROBLEMS
 from islands_service.store.blobs import BlobNotFoundError
 from islands_service.store.database import CommitUnknownError
 from support.repository import DOCS
-from support.service import PROBLEM, problem_of, queued
+from support.service import PROBLEM, problem_of, queued, run_identification, spec
 
 FORM = {"type", "title", "status", "detail", "request_id"}
 
@@ -182,7 +182,7 @@ def test_a_truncated_response_is_an_error_for_the_client(service):
     with pytest.raises(httpx.RemoteProtocolError, match="incomplete"):
         service.client.get("/half")
     assert service.client.get("/healthz").status_code == 200
-    assert [entry["event"] for entry in service.logs] == ["request", "defect"]
+    assert [entry["event"] for entry in service.logs] == ["defect", "request"]
 
 
 def test_a_defect_ends_neither_the_connection_nor_the_service(service):
@@ -247,3 +247,24 @@ def test_the_problem_document_is_in_the_openapi_schema(service):
     answer = service.client.get("/nothing")
     assert answer.headers["content-type"] == PROBLEM
     assert answer.json().keys() == FORM
+
+
+@pytest.mark.ci
+def test_no_problem_contains_a_path_of_the_machine(service):
+    """Uploads are read in temporary folders, and blobs are in the data folder."""
+    sent = [(b"", "a.csv"), (b"PK\x03\x04garbage", "a.npz"), (b"\x89HDF\r\n\x1a\n" + b"x" * 99, "a.mat")]
+    answers = [service.upload(content, name) for content, name in [*sent, (b"PAR1xPAR1", "a.parquet")]]
+    job = run_identification(service)
+    dataset = service.client.get(f"/v1/jobs/{job}").json()["spec"]["dataset"]
+    for path in service.settings.blobs.glob("??/*"):
+        path.unlink()
+    answers += [
+        service.submit(**spec(dataset, rows="0:50")),
+        service.client.get(f"/v1/jobs/{job}/report"),
+        service.client.get(f"/v1/jobs/{job}/models/1/simulation"),
+    ]
+    for answer in answers:
+        assert answer.status_code >= 400
+        assert str(service.settings.data_dir) not in answer.text
+        assert "/tmp" not in answer.text
+        assert answer.json()["detail"]

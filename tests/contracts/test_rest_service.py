@@ -10,7 +10,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from islands_api.web import prometheus
 from islands_service.domain.job import JobState, ProgressReport
 from support.service import kept, problem_of, queued, spec
-from support.stores import FOUND, claimed
+from support.stores import FOUND, claimed, job_in
 
 
 @pytest.fixture
@@ -218,16 +218,39 @@ def test_the_service_is_alive_and_ready(service):
 
 
 def test_the_log_has_all_requests_except_health_checks(service):
+    header = service.key("read", owner="me")
     service.logs.clear()
-    service.client.get("/v1/jobs?state=queued", headers={"X-Request-ID": "abc"})
+    answer = service.client.get("/v1/jobs?state=queued", headers={"X-Request-ID": "abc", **header})
     service.client.get("/healthz")
     service.client.get("/readyz")
     (line,) = service.logs
-    assert line["ms"] >= 0.0
-    assert {name: line[name] for name in ("event", "method", "path", "status", "request_id")} == {
+    assert line.pop("ms") >= 0.0
+    assert line == {
         "event": "request",
+        "log_level": "info",
+        "client": "127.0.0.1",
+        "owner": "me",
+        "key": service.store.keys.all()[0].id,
         "method": "GET",
         "path": "/v1/jobs",
         "status": 200,
+        "received": 0,
+        "sent": len(answer.content),
         "request_id": "abc",
     }
+
+
+def test_the_log_has_the_bytes_of_refused_and_anonymous_requests(service):
+    service.logs.clear()
+    answer = service.client.post("/v1/jobs", content=b"{" * 77, headers={"Content-Type": "application/json"})
+    (line,) = service.logs
+    assert (line["status"], line["received"], line["sent"]) == (400, 77, len(answer.content))
+    assert (line["owner"], line["key"]) == ("local", None)
+
+
+def test_the_log_has_the_bytes_of_an_event_stream_when_it_ends(service):
+    job = job_in(service.store, JobState.FAILED, "local").id
+    service.logs.clear()
+    text = service.client.get(f"/v1/jobs/{job}/events").text
+    (line,) = service.logs
+    assert line["sent"] == len(text.encode())

@@ -3,6 +3,7 @@
 import asyncio
 import re
 import secrets
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 from urllib.parse import urlsplit
@@ -12,6 +13,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from islands_api.web.auth import Principal
 from islands_api.web.exception_handlers import METHODS, internal_error, problem_response
 from islands_api.web.problems import CrossOriginError, PayloadTooLargeError, lookup_problem
 from islands_service.settings import LOOPBACK, ServiceSettings
@@ -48,7 +50,8 @@ class RequestLogging:
     """Middleware that logs each request with an id, measures its latency and sets security headers.
 
     An id that the client sends is kept, so that a request can be traced through several services. The latency
-    is the time until the response starts.
+    is the time until the response starts. The line is written when the response ends, with the bytes of both
+    bodies.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -63,45 +66,79 @@ class RequestLogging:
         request_id = given if _REQUEST_ID.fullmatch(given) else secrets.token_hex(8)
         scope.setdefault("state", {})["request_id"] = request_id
         security = {**SECURITY_HEADERS, **(_HSTS_HEADERS if scope["scheme"] == "https" else {})}
-        started = False
+        entry = _Entry()
+
+        async def receive_and_count() -> Message:
+            message = await receive()
+            entry.received += len(message.get("body", b""))
+            return message
 
         async def send_with_headers(message: Message) -> None:
-            nonlocal started
             if message["type"] == "http.response.start":
-                started = True
+                entry.status, entry.seconds = message["status"], perf_counter() - start
+                self._observe(scope, entry)
                 headers = MutableHeaders(scope=message)
                 headers["X-Request-ID"] = request_id
                 for name, value in security.items():
                     headers.setdefault(name, value)
-                self._record(scope, message["status"], perf_counter() - start)
+            elif message["type"] == "http.response.body":
+                entry.sent += len(message.get("body", b""))
+                if not message.get("more_body", False):
+                    self._log(scope, entry)
             await send(message)
 
         with structlog.contextvars.bound_contextvars(request_id=request_id):
             try:
-                await self._app(scope, receive, send_with_headers)
+                await self._app(scope, receive_and_count, send_with_headers)
             except Exception as error:
                 # Handled here, so that this response has the headers too, and the connection stays open.
                 response = internal_error(Request(scope), error)
-                if started:
+                if entry.status is not None:
                     raise
                 await response(scope, receive, send_with_headers)
+            finally:
+                # A stream whose client has left does not end by itself.
+                self._log(scope, entry)
 
-    def _record(self, scope: Scope, status: int, seconds: float) -> None:
-        route = getattr(scope.get("route"), "path", "none")
+    def _observe(self, scope: Scope, entry: "_Entry") -> None:
         state: Any = getattr(scope["app"].state, "islands", None)
         if state is not None:
             method = scope["method"] if scope["method"] in METHODS else "other"
-            state.metrics.latency.labels(method, route, status).observe(seconds)
+            state.metrics.latency.labels(method, _get_route(scope), entry.status).observe(entry.seconds)
+
+    def _log(self, scope: Scope, entry: "_Entry") -> None:
         # Health checks and metrics scrapes would fill the log.
-        if route not in ("/healthz", "/readyz", "/metrics"):
-            log.info(
-                "request",
-                client=scope["client"][0] if scope["client"] else None,
-                method=scope["method"],
-                path=scope["path"],
-                status=status,
-                ms=round(1e3 * seconds, 1),
-            )
+        if entry.status is None or entry.logged or _get_route(scope) in ("/healthz", "/readyz", "/metrics"):
+            return
+        entry.logged = True
+        caller: Principal | None = scope["state"].get("caller")
+        log.info(
+            "request",
+            client=scope["client"][0] if scope["client"] else None,
+            owner=None if caller is None else caller.owner,
+            key=None if caller is None else caller.requester.key,
+            method=scope["method"],
+            path=scope["path"],
+            status=entry.status,
+            ms=round(1e3 * entry.seconds, 1),
+            received=entry.received,
+            sent=entry.sent,
+        )
+
+
+@dataclass(slots=True)
+class _Entry:
+    """State of a request: status, seconds until the response started, bytes of the bodies."""
+
+    status: int | None = None
+    seconds: float = 0.0
+    received: int = 0
+    sent: int = 0
+    logged: bool = False
+
+
+def _get_route(scope: Scope) -> str:
+    return getattr(scope.get("route"), "path", "none")
 
 
 class BodyLimit:

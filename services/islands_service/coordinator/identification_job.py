@@ -100,7 +100,7 @@ def make_outcome(found: SearchResult, note: str = "") -> JobOutcome:
         "models": len(models),
         "rank": recommended["rank"],
         "reasons": recommended["reasons"],
-        "words": "\n".join(describe(found)),
+        "words": "\n".join([*describe(found), *([f"Note: {note}."] if note else [])]),
         "equation": equation(found.recommended.model),
         "size": best["size"],
         "metrics": best["metrics"]["validation"]["free_run"],

@@ -75,6 +75,7 @@ def test_job_without_its_checkpoint_starts_again_with_the_same_result(
     assert ended.progress is not None
     assert outcome.summary is not None
     assert ended.progress["note"] == outcome.summary["note"] == RESTARTED
+    assert outcome.summary["words"].endswith(f"Note: {RESTARTED}.")
 
 
 def test_checkpoint_of_a_newer_version_is_left_to_its_coordinators(

@@ -27,3 +27,11 @@ def test_coordinator_timeout_is_the_lease_or_several_heartbeats(
 def test_lease_shorter_than_a_second_is_rejected(tmp_path: Path, lease: float) -> None:
     with pytest.raises(SettingsError, match=r"setting lease \(ISLANDS_LEASE\): .*greater than or equal to 1"):
         service_settings(data_dir=tmp_path, lease=lease)
+
+
+def test_password_of_the_database_is_no_argument_of_a_process(tmp_path: Path) -> None:
+    """Every user of the machine can read the arguments."""
+    settings = ServiceSettings(data_dir=tmp_path, database="postgresql+psycopg://me:secret@host/islands")
+    commands = [role.command for role in roles(settings)]
+    assert len(commands) == 3
+    assert "secret" not in repr(commands)
