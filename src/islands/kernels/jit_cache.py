@@ -21,12 +21,12 @@ from functools import cache, partial
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numba
 from llvmlite.binding import get_host_cpu_name
 from numba.core import config
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.codegen import get_host_cpu_features
 from platformdirs import user_cache_path
 
@@ -57,7 +57,11 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 @cache
 def cache_folder() -> Path | None:
-    """Return the folder of the compiled kernels; None if it is not writable, so that every start compiles."""
+    """Return the folder of the compiled kernels; None if they cannot be stored, so that every start compiles.
+
+    A complete folder is used even if it is read-only, for example in a container.
+    """
+    folder = None
     try:
         chosen = os.environ.get("ISLANDS_CACHE_DIR")
         base = Path(chosen).expanduser().absolute() if chosen else user_cache_path("islands", appauthor=False)
@@ -66,7 +70,7 @@ def cache_folder() -> Path | None:
         with tempfile.TemporaryFile(dir=folder) as probe:
             probe.write(bytes(4096))  # on a full disk an empty file can still be created
     except (OSError, RuntimeError):  # RuntimeError: the user has no home folder
-        return None
+        return folder if folder is not None and (folder / STAMP).exists() else None
     return folder
 
 
@@ -105,11 +109,26 @@ def ready(compile_all: Callable[[], None], tell: Callable[[str], None]) -> bool:
     return True
 
 
+class _Locator(UserProvidedCacheLocator):
+    """Numba's locator of the chosen folder, which may be read-only."""
+
+    def ensure_cache_path(self) -> None:
+        """Create the folder of a source file, without Numba's test that it can be written."""
+        with suppress(OSError):
+            Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
+
+
+class _CacheFiles(CompileResultCacheImpl):
+    _locator_classes: ClassVar = [_Locator]
+
+
 class _Cache(FunctionCache):
     """Numba's cache of one function, safe against concurrent processes and a deleted folder.
 
     A kernel that cannot be loaded or saved (deleted folder, full disk) is compiled for this process only.
     """
+
+    _impl_class = _CacheFiles
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         with suppress(OSError):

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numba import njit
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
+from islands.kernels.jit_cache import kernel
 from islands.systems.signals import Seed, filtered_noise, sine
 
 #: Sampling time and integration step in seconds, section 6.1.
@@ -89,7 +89,7 @@ def simulate(
     return piezo.dp * voltage - h
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _integrate(
     rate: NDArray[np.float64],
     dt: float,

@@ -364,6 +364,16 @@ def test_kernels_stay_in_memory_if_the_disk_is_full(start, full):
     assert get_output(start(READY))["compiled"]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit of the file size")
+def test_a_complete_folder_is_used_where_nothing_can_be_written(start, tmp_path):
+    """A container has a read-only image that contains the kernels."""
+    assert get_output(start(READY))["compiled"]
+    code = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n" + READY
+    found = get_output(start(code, "never"))
+    assert (found["compiled"], found["hits"], found["misses"]) == (False, 1, 0)
+    assert found["value"] == 1.5
+
+
 def test_kernel_that_cannot_be_saved_is_still_used(start, tmp_path):
     code = """if True:
         import json, shutil, toys
