@@ -5,7 +5,6 @@ A file that exhausts memory, or makes its reader loop, ends only this subprocess
 
 import asyncio
 import json
-import resource
 import sys
 from asyncio.subprocess import PIPE
 from collections.abc import Mapping, Sequence
@@ -14,14 +13,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from islands.errors import RecordError, SettingsError
-from islands_service.intake.confinement import confine
+from islands_service.intake.confined_process import (
+    ENVIRONMENT,
+    check_status,
+    enter,
+    make_command,
+    make_message,
+    refuse,
+    timeout_error,
+)
 
 if TYPE_CHECKING:
     from islands.io.records import Preview
     from islands.io.records.reading_options import ReadingOptions
-
-#: Environment of the process, without any secret.
-_ENVIRONMENT = {"PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 
 #: Largest number of columns of a record: their descriptions are stored, and shown in every list.
 _MAX_COLUMNS = 1000
@@ -31,12 +35,6 @@ _MAX_NAME = 200
 
 #: Characters of a longer name in a message.
 _SHOWN = 40
-
-#: Largest number of open files.
-_MAX_FILES = 64
-
-#: Exit status if the file is unusable and the reason is on standard output.
-_REFUSED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,43 +79,26 @@ async def inspect_file(
         The file or the requested columns cannot be read.
     """
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-P", "-m", "islands_service.intake.file_inspection"),
-        stdin=PIPE,
-        stdout=PIPE,
-        stderr=PIPE,
-        env=_ENVIRONMENT,
+        *make_command("file_inspection"), stdin=PIPE, stdout=PIPE, stderr=PIPE, env=ENVIRONMENT
     )
-    message = {"path": str(path), "memory": memory, "seconds": seconds, "asked": asdict(request)}
     try:
         async with asyncio.timeout(seconds):
-            answer, complaint = await process.communicate(json.dumps(message).encode())
+            answer, complaint = await process.communicate(
+                make_message(path, memory, seconds, asdict(request))
+            )
     except TimeoutError:
-        raise RecordError(
-            f"{path.name} takes longer than {seconds:.0f} s to read: give a shorter record, or NPZ "
-            "instead of text"
-        ) from None
+        raise timeout_error(path.name, seconds) from None
     finally:
         if process.returncode is None:
             process.kill()
             await process.wait()
-    if process.returncode == _REFUSED:
-        raise RecordError(json.loads(answer)["error"])
-    if process.returncode != 0:
-        reason = (
-            complaint.decode(errors="replace").strip().rpartition("\n")[2] or f"exit {process.returncode}"
-        )
-        raise RecordError(
-            f"{path.name} cannot be read within {memory / 1e9:.1f} GB of memory and {seconds:.0f} s "
-            f"({reason}): it is damaged, or unpacks to more than this service accepts"
-        )
+    check_status(process.returncode, answer, complaint, path.name, memory, seconds)
     return dict(json.loads(answer))
 
 
 def main() -> None:
     """Inspect the file named on standard input, and write the result to standard output."""
-    message = json.load(sys.stdin)
-    _limit(message["memory"], message["seconds"])
-    confine([Path(message["path"]).resolve()])
+    path, asked = enter()
     # Import after the limits are set, so that the imported code is subject to them.
     from islands.io.records import read_dataset  # noqa: PLC0415
     from islands.io.records.preview import preview_table  # noqa: PLC0415
@@ -125,23 +106,22 @@ def main() -> None:
     from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
     from islands.io.records.row_range import parse_rows  # noqa: PLC0415
 
-    request = InspectionRequest(**message["asked"])
+    request = InspectionRequest(**asked)
     try:
         options = ReadingOptions(**request.reading)
-        table, name = open_record(message["path"], options), Path(message["path"]).name
+        table, name = open_record(path, options), Path(path).name
         _check_columns([column for column in table.names if column], name)
         found = preview_table(table, name, options)
         # Check this first: a message about missing columns lists the existing ones.
         _check_readable(found, name)
         if request.inputs and request.output is not None:
             rows = parse_rows(request.rows)
-            read_dataset(message["path"], request.inputs, request.output, request.dt, rows, options=options)
+            read_dataset(path, request.inputs, request.output, request.dt, rows, options=options)
         elif options.gaps is None:
             _check_usable({column.name: column.problem for column in found.columns}, request)
     except (RecordError, SettingsError) as error:
-        json.dump({"error": str(error)}, sys.stdout)
-        sys.exit(_REFUSED)
-    measured = _measure(found, message["path"], request, options)
+        refuse(error)
+    measured = _measure(found, path, request, options)
     if options.resample is not None:
         found = replace(found, dt=options.resample)
     document = {**asdict(found), "inspection": measured, "reading": options.changes()}
@@ -204,18 +184,6 @@ def _check_usable(problems: Mapping[str, str], request: InspectionRequest) -> No
             raise RecordError(f"the record has no column {name}; it has {', '.join(problems)}")
         if problems[source]:
             raise RecordError(problems[source])
-
-
-def _limit(memory: int, seconds: float) -> None:
-    whole = int(seconds) + 1
-    for kind, most in (
-        (resource.RLIMIT_AS, memory),
-        (resource.RLIMIT_CPU, whole),
-        (resource.RLIMIT_FSIZE, 0),
-        (resource.RLIMIT_NOFILE, _MAX_FILES),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        resource.setrlimit(kind, (most, most))
 
 
 if __name__ == "__main__":

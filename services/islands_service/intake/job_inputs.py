@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset, join
-from islands.io.records import read_dataset
-from islands.io.records.reading_options import ReadingOptions
-from islands.io.records.row_range import parse_rows
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
+from islands_service.intake.record_reading import RecordRequest, read_confined
+from islands_service.settings import service_settings
 from islands_service.store.blobs import Blobs, translate_disk_full
 from islands_service.store.datasets import StoredDataset
 
@@ -53,13 +52,12 @@ def _read_part(
     spec: Identification | Discrepancy, part: Part, datasets: dict[str, StoredDataset], blobs: Blobs
 ) -> Dataset:
     stored = datasets[part.dataset]
+    reading = stored.preview.get("reading", {})
+    request = RecordRequest(spec.inputs, spec.output, spec.dt, part.rows, reading)
+    settings = service_settings()
+    memory, seconds = settings.inspection_memory, settings.inspection_seconds
     with link_blob(blobs.path(stored.blob), stored.name) as path:
-        rows, options = parse_rows(part.rows), _reading_options(stored)
-        return read_dataset(path, spec.inputs, spec.output, spec.dt, rows, options=options)
-
-
-def _reading_options(stored: StoredDataset) -> ReadingOptions:
-    return ReadingOptions(**stored.preview.get("reading", {}))
+        return read_confined(path, request, memory, seconds)
 
 
 def read_record_and_columns(

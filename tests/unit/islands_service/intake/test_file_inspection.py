@@ -24,8 +24,8 @@ MEMORY, SECONDS = 6_000_000_000, 30.0
 #: Writes files after the limits are set.
 WRITES = """
 import sys
-from islands_service.intake.file_inspection import _limit
-_limit(6_000_000_000, 30.0)
+from islands_service.intake.confined_process import limit_resources
+limit_resources(6_000_000_000, 30.0)
 for path in sys.argv[1:]:
     try:
         with open(path, "w") as stream:
@@ -117,8 +117,8 @@ def test_a_file_that_takes_too_long_ends_the_process(endless):
 
 @pytest.mark.ci
 def test_looping_process_is_ended_by_its_cpu_limit():
-    imports = "from islands_service.intake.file_inspection import _limit"
-    script = f"{imports}\n_limit(6_000_000_000, 0.0)\nwhile True: pass"
+    imports = "from islands_service.intake.confined_process import limit_resources"
+    script = f"{imports}\nlimit_resources(6_000_000_000, 0.0)\nwhile True: pass"
     done = subprocess.run([sys.executable, "-c", script], check=False, timeout=60)
     assert done.returncode < 0
 

@@ -1,0 +1,101 @@
+"""Processes that read an untrusted file with limited resources: how they are started, and how they answer."""
+
+import json
+import resource
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+from islands.errors import IslandsError, RecordError
+from islands_service.intake.confinement import confine
+
+#: Environment of a process, without any secret.
+ENVIRONMENT = {"PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+
+#: Exit status if the file is unusable and the reason is on standard output.
+_REFUSED = 3
+
+#: Largest number of open files.
+_MAX_FILES = 64
+
+
+def make_command(module: str) -> tuple[str, ...]:
+    """Return the command that starts a module of this package, without the current folder in its path."""
+    return sys.executable, "-P", "-m", f"islands_service.intake.{module}"
+
+
+def make_message(path: Path, memory: int, seconds: float, asked: Mapping[str, Any]) -> bytes:
+    """Return the standard input of a process that reads a file."""
+    message = {"path": str(path), "memory": memory, "seconds": seconds, "asked": dict(asked)}
+    return json.dumps(message).encode()
+
+
+def enter(writes: bool = False) -> tuple[str, dict[str, Any]]:
+    """Read the message on standard input, and restrict this process; return the path and what is asked.
+
+    Parameters
+    ----------
+    writes : bool
+        Whether standard output is a file, which may have as many bytes as the process has memory.
+    """
+    message = json.load(sys.stdin)
+    memory = message["memory"]
+    limit_resources(memory, message["seconds"], memory if writes else 0)
+    confine([Path(message["path"]).resolve()])
+    return message["path"], message["asked"]
+
+
+def limit_resources(memory: int, seconds: float, output_bytes: int = 0) -> None:
+    """Limit memory, time, open files and written bytes of this process."""
+    whole = int(seconds) + 1
+    for kind, most in (
+        (resource.RLIMIT_AS, memory),
+        (resource.RLIMIT_CPU, whole),
+        (resource.RLIMIT_FSIZE, output_bytes),
+        (resource.RLIMIT_NOFILE, _MAX_FILES),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        resource.setrlimit(kind, (most, most))
+
+
+def refuse(error: IslandsError) -> NoReturn:
+    """End this process with the reason why the file is unusable."""
+    sys.stdout.write(json.dumps({"error": str(error)}))
+    sys.exit(_REFUSED)
+
+
+def check_status(
+    status: int | None, answer: bytes, complaint: bytes, file: str, memory: int, seconds: float
+) -> None:
+    """Raise the error of a process that has ended.
+
+    Parameters
+    ----------
+    status : int or None
+        Exit status.
+    answer, complaint : bytes
+        Standard output and standard error, or their beginnings.
+    file : str
+        Name of the file, for the message.
+
+    Raises
+    ------
+    RecordError
+        The file is unusable, or its reader has exceeded a limit.
+    """
+    if status == _REFUSED:
+        raise RecordError(json.loads(answer)["error"])
+    if status:
+        reason = complaint.decode(errors="replace").strip().rpartition("\n")[2] or f"exit {status}"
+        raise RecordError(
+            f"{file} cannot be read within {memory / 1e9:.1f} GB of memory and {seconds:.0f} s ({reason}): "
+            "it is damaged, or unpacks to more than this service accepts"
+        )
+
+
+def timeout_error(file: str, seconds: float) -> RecordError:
+    """Return the error of a process that takes too long."""
+    return RecordError(
+        f"{file} takes longer than {seconds:.0f} s to read: give a shorter record, or NPZ instead of text"
+    )

@@ -1,0 +1,145 @@
+"""Reading of the record of a job from an untrusted file, in a confined subprocess.
+
+The subprocess sends names and numbers; this process parses nothing of the file. How a text is read depends on
+the columns and rows of the job, so that a record is read for every job, not once for every upload.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.errors import RecordError, SettingsError
+from islands_service.intake.confined_process import (
+    ENVIRONMENT,
+    check_status,
+    enter,
+    make_command,
+    make_message,
+    refuse,
+    timeout_error,
+)
+
+#: Largest number of bytes of the description of a record, and of an error message.
+_MAX_HEADER = 16_000_000
+
+#: Numbers as they are sent.
+_FLOAT = np.dtype("<f8")
+
+#: Fields of `Dataset` that are sent as JSON.
+_DESCRIBED = (
+    *("dt", "input_names", "output_name", "input_units", "output_unit", "segments", "recordings"),
+    *("start", "sha256", "reading"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordRequest:
+    """Columns, rows and options of reading, as in `islands.io.records.reader.read_dataset`."""
+
+    inputs: Sequence[str]
+    output: str
+    dt: float | None
+    rows: str | None
+    reading: dict[str, object]
+
+
+def read_confined(path: Path, request: RecordRequest, memory: int, seconds: float) -> Dataset:
+    """Read a record in a confined subprocess.
+
+    Parameters
+    ----------
+    memory, seconds
+        Limits of the subprocess: bytes of address space, and time.
+
+    Raises
+    ------
+    RecordError
+        The record cannot be used as it is, or not be read within the limits.
+    MemoryError
+        The subprocess was killed, as the kernel does if the machine has too little memory.
+    """
+    with _open_memory("record") as output, _open_memory("errors") as errors:
+        command = make_command("record_reading")
+        with subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=output, stderr=errors, env=ENVIRONMENT
+        ) as process:
+            try:
+                process.communicate(make_message(path, memory, seconds, asdict(request)), timeout=seconds)
+            except subprocess.TimeoutExpired:
+                raise timeout_error(path.name, seconds) from None
+            finally:
+                process.kill()
+        output.seek(0)
+        errors.seek(0)
+        if process.returncode == -signal.SIGKILL:
+            raise MemoryError(f"the process that reads {path.name} was killed: check the machine's memory")
+        if process.returncode:
+            answer, complaint = output.read(_MAX_HEADER), errors.read(_MAX_HEADER)
+            check_status(process.returncode, answer, complaint, path.name, memory, seconds)
+        return receive_record(output)
+
+
+def _open_memory(name: str) -> IO[bytes]:
+    """Open a file in memory, whose size the limits of the subprocess bound, unlike that of a pipe."""
+    return os.fdopen(os.memfd_create(name), "w+b")
+
+
+def send_record(record: Dataset, stream: IO[bytes]) -> None:
+    """Write a record as a line of JSON and its numbers."""
+    described = {name: getattr(record, name) for name in _DESCRIBED}
+    stream.write(json.dumps({"shape": record.u.shape, **described}).encode() + b"\n")
+    for values in (record.u, record.y):
+        stream.write(values.astype(_FLOAT).tobytes())
+
+
+def receive_record(stream: IO[bytes]) -> Dataset:
+    """Read a record that `send_record` has written.
+
+    Raises
+    ------
+    RecordError
+        The bytes are not those of a record.
+    """
+    try:
+        described = json.loads(stream.readline(_MAX_HEADER))
+        samples, inputs = described["shape"]
+        values = np.frombuffer(stream.read(), _FLOAT)
+        u, y = values[: samples * inputs].reshape(samples, inputs), values[samples * inputs :]
+        fields: dict[str, Any] = {name: _to_tuple(described[name]) for name in _DESCRIBED}
+        return Dataset(u, y, **fields)
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+        raise RecordError(f"the process that reads records has answered nonsense: {error}") from error
+
+
+def _to_tuple(value: object) -> object:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def main() -> None:
+    """Read the file named on standard input, and write the record to standard output."""
+    path, asked = enter(writes=True)
+    # Import after the limits are set, so that the imported code is subject to them.
+    from islands.io.records import read_dataset  # noqa: PLC0415
+    from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
+    from islands.io.records.row_range import parse_rows  # noqa: PLC0415
+
+    request = RecordRequest(**asked)
+    try:
+        options, rows = ReadingOptions(**request.reading), parse_rows(request.rows)  # type: ignore[arg-type]
+        record = read_dataset(path, request.inputs, request.output, request.dt, rows, options=options)
+    except (RecordError, SettingsError) as error:
+        refuse(error)
+    send_record(record, sys.stdout.buffer)
+
+
+if __name__ == "__main__":
+    main()
