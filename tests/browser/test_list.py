@@ -42,6 +42,16 @@ def test_a_new_job_appears_and_changes_its_state(
     assert row(page, job).locator("td").last.text_content() == "1"
 
 
+def test_a_job_that_waits_for_a_reason_shows_it(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500)
+    with stored(desk) as store:
+        store.leases.decline(taken(store, job), "waiting for islands 9.9", "1.0")
+    expect(row(quiet(desk.url).go(), job)).to_contain_text("waiting for islands 9.9")
+    desk.ask("POST", f"/v1/jobs/{job}/cancel")
+
+
 def test_markup_in_a_job_name_is_shown_as_text(quiet: Callable[..., Screen], desk: Service) -> None:
     job = desk.submit(500, name=HOSTILE)
     page = quiet(desk.url).go()

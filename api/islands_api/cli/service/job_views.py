@@ -39,6 +39,8 @@ def show_job(job: JobView, as_json: bool) -> None:
         output.print(
             f"generation {status['generation']}/{status['generations']}, best error {best}", markup=False
         )
+    if status.get("note") and job.state not in TERMINAL:
+        output.print(status["note"], markup=False)
     if job.kind == DISCREPANCY:
         show_diagnosis(job)
     elif job.summary is not None:

@@ -37,6 +37,7 @@ function formatProgress(job) {
   if (isDiagnosis(job) && job.summary) return formatVerdict(job.summary);
   const { phase, note, generation, generations } = job.progress ?? {};
   if (isBetweenEpochs(job)) return note ?? phase;
+  if (job.state === "queued" && note) return note;
   if (job.state === "queued" && generation === undefined) return "waiting";
   if (generation === undefined) return note ?? phase ?? "";
   const at = `${formatCount(generation)} / ${formatCount(generations)}`;
@@ -55,7 +56,8 @@ export function makeProgressBar() {
       // The duration of a diagnosis is unknown.
       if (isDiagnosis(job) && job.state === "running") bar.removeAttribute("value");
       bar.className = getState(job);
-      text.classList.toggle("long", isDiagnosis(job) || isBetweenEpochs(job));
+      const waitsForReason = job.state === "queued" && Boolean(job.progress?.note);
+      text.classList.toggle("long", isDiagnosis(job) || isBetweenEpochs(job) || waitsForReason);
       setText(text, formatProgress(job));
     },
   };

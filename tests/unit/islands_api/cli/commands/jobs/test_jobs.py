@@ -52,6 +52,12 @@ def test_list_may_be_longer_than_a_page(run: Run, service: Service, owner: str) 
     assert set(listed) < set(made)
 
 
+def test_job_that_waits_shows_the_reason(run: Run, service: Service, owner: str) -> None:
+    job = ahead(service, owner)
+    service.store.leases.postpone(taken(service.store, job), "the disk is away", 60.0)
+    assert run("show", job)[:2] == (0, f"job {job}: queued\nthe disk is away\n")
+
+
 def test_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: str) -> None:
     job = ahead(service, owner, spec=spec(kept(service.store, owner)))
     assert run("show", job)[:2] == (0, f"job {job}: queued\n")
