@@ -88,6 +88,8 @@ def check_status(
         raise RecordError(json.loads(answer)["error"])
     if status:
         reason = complaint.decode(errors="replace").strip().rpartition("\n")[2] or f"exit {status}"
+        if "/" in reason:  # a path of this machine, which is not for the owner of the file
+            reason = reason.partition(":")[0]
         raise RecordError(
             f"{file} cannot be read within {memory / 1e9:.1f} GB of memory and {seconds:.0f} s ({reason}): "
             "it is damaged, or unpacks to more than this service accepts"
