@@ -8,6 +8,7 @@ import json
 import sys
 from asyncio.subprocess import PIPE
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,6 +33,9 @@ _MAX_COLUMNS = 1000
 
 #: Longest name of a column: a job cannot contain a longer one (`islands_service.domain.job_spec.Name`).
 _MAX_NAME = 200
+
+#: Largest number of bytes of an answer, which a harmful file may control, and of a part of it.
+_MAX_OUTPUT, _CHUNK = 64_000_000, 65_536
 
 #: Characters of a longer name in a message.
 _SHOWN = 40
@@ -83,17 +87,35 @@ async def inspect_file(
     )
     try:
         async with asyncio.timeout(seconds):
-            answer, complaint = await process.communicate(
-                make_message(path, memory, seconds, asdict(request))
+            assert process.stdin is not None
+            process.stdin.write(make_message(path, memory, seconds, asdict(request)))
+            process.stdin.close()
+            answer, complaint = await asyncio.gather(
+                _read_output(process, process.stdout), _read_output(process, process.stderr)
             )
+            await process.wait()
     except TimeoutError:
         raise timeout_error(path.name, seconds) from None
     finally:
         if process.returncode is None:
             process.kill()
-            await process.wait()
+            # A process ends for asyncio when its pipes are read to their end.
+            await process.communicate()
     check_status(process.returncode, answer, complaint, path.name, memory, seconds)
     return dict(json.loads(answer))
+
+
+async def _read_output(process: asyncio.subprocess.Process, stream: asyncio.StreamReader | None) -> bytes:
+    """Read an answer to its end; end the process if it is too long."""
+    assert stream is not None
+    received = bytearray()
+    while chunk := await stream.read(_CHUNK):
+        if len(received) < _MAX_OUTPUT:
+            received += chunk
+        else:
+            with suppress(ProcessLookupError):
+                process.kill()
+    return bytes(received)
 
 
 def main() -> None:

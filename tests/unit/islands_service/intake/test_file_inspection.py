@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError
+from islands_service.intake import file_inspection
 from islands_service.intake.file_inspection import InspectionRequest, inspect_file
 from support.processes import alive, descendants, eventually
 from support.service import csv
@@ -215,6 +216,14 @@ def test_the_service_and_other_owners_are_not_delayed_by_the_slow_files_of_one(s
         for upload in uploads:
             upload.join()
         assert len(service.client.get("/v1/datasets", headers=slow).json()["items"]) == 3
+
+
+def test_an_endless_answer_is_refused(record, monkeypatch):
+    program = ("python3", "-c", "while True: print('0' * 65536)")
+    monkeypatch.setattr(file_inspection, "make_command", lambda _: program)
+    monkeypatch.setattr(file_inspection, "_MAX_OUTPUT", 1_000_000)
+    with pytest.raises(RecordError, match="it is damaged, or unpacks to more"):
+        inspect(record)
 
 
 @pytest.mark.ci
