@@ -40,6 +40,22 @@ def test_cancelled_job_ends_its_actors_and_resumes_to_the_same_result(
     assert service.found(job) == undisturbed
 
 
+def test_job_whose_checkpoint_was_lost_restarts_to_the_same_result(
+    service: Service, undisturbed: bytes
+) -> None:
+    job = service.submit(LONG)
+    service.under_way(job)
+    service.ask("POST", f"/v1/jobs/{job}/cancel")
+    assert service.ended(job)["versions"]["checkpoint"] is not None
+    compressed = [path for path in service.folder.glob("blobs/??/*") if path.read_bytes()[:2] == b"\x1f\x8b"]
+    assert len(compressed) <= 2  # superseded checkpoints are deleted
+    for path in compressed:
+        path.unlink()
+    assert service.ask("POST", f"/v1/jobs/{job}/resume").status_code == 202
+    assert service.found(job) == undisturbed
+    assert "checkpoint was lost" in service.job(job)["summary"]["note"]
+
+
 def test_queued_job_is_cancelled_at_once_and_runs_when_resumed(service: Service, undisturbed: bytes) -> None:
     first, second = service.submit(LONG), service.submit(LONG)
     answer = service.ask("POST", f"/v1/jobs/{second}/cancel")
