@@ -1,11 +1,12 @@
 """List of jobs on the dashboard."""
 
+import time
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from islands_service.domain.job import JobOutcome, JobState
+from islands_service.domain.job import JobOutcome, JobState, ProgressReport
 from support.played import advance, stored
 from support.screen import Screen
 from support.service_processes import Service
@@ -50,6 +51,41 @@ def test_a_job_that_waits_for_a_reason_shows_it(
         store.leases.decline(taken(store, job), "waiting for islands 9.9", "1.0")
     expect(row(quiet(desk.url).go(), job)).to_contain_text("waiting for islands 9.9")
     desk.ask("POST", f"/v1/jobs/{job}/cancel")
+
+
+def test_a_queued_job_shows_its_place_among_all_jobs(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    with stored(desk) as store:
+        while (lease := store.leases.claim(f"emptied {time.monotonic()}", 3600.0)) is not None:
+            store.leases.finish(lease, JobOutcome(JobState.CANCELLED))
+        first, second = desk.submit(500), desk.submit(500)
+        page = quiet(desk.url).go()
+        expect(row(page, first)).to_contain_text("waiting, number 1")
+        expect(row(page, second)).to_contain_text("waiting, number 2")
+        urgent = desk.submit(500, priority=5)
+        expect(row(page, urgent)).to_contain_text("waiting, number 1")
+        expect(row(page, second)).to_contain_text("waiting, number 3")
+
+
+def test_a_row_shows_that_its_job_waits_for_capacity_and_why_it_failed(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    waits = "waiting for capacity: 0 of 2 island actors are ready, the others need a CPU each"
+    reason = "the record has a gap of 3 s after sample 400: give --gaps split"
+    job = desk.submit(500)
+    page = quiet(desk.url).go()
+    with stored(desk) as store:
+        lease = taken(store, job)
+        store.leases.report(lease, ProgressReport({"phase": "waiting for capacity", "note": waits}))
+        expect(row(page, job).locator(".progress-text")).to_have_text(waits)
+        problem = {"title": "The job failed", "detail": reason}
+        store.leases.finish(lease, JobOutcome(JobState.FAILED, problem=problem))
+    expect(row(page, job).locator(".progress-text")).to_have_text(reason)
+    assert row(page, job).locator(".progress-text").get_attribute("title") == reason
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    expect(page.locator(".failure")).to_contain_text(reason)
+    assert page.get_by_text(reason).count() == 1
 
 
 def test_markup_in_a_job_name_is_shown_as_text(quiet: Callable[..., Screen], desk: Service) -> None:

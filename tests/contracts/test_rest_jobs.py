@@ -35,8 +35,9 @@ def test_an_accepted_job_is_at_the_location_of_the_response(service, order):
     assert answer.headers["retry-after"] == "1"
     assert "idempotent-replayed" not in answer.headers
     looked = service.client.get(answer.headers["location"])
-    assert (looked.json(), looked.headers["etag"]) == (answer.json(), answer.headers["etag"])
     job = looked.json()
+    assert job["progress"] == {"phase": "queued", "position": 1}
+    assert (job, looked.headers["etag"]) == (answer.json(), answer.headers["etag"])
     assert (job["state"], job["name"], job["priority"], job["version"]) == ("queued", "first", 5, 1)
     assert job["spec"] == {key: value for key, value in order.items() if key != "name"}
 
@@ -219,6 +220,19 @@ def test_actions_are_allowed_only_in_certain_states(service, action, state):
         assert (answer.status_code, answer.json()["state"]) == (202, ALLOWED[action][state])
         assert answer.json() == service.client.get(path).json()
         assert answer.json()["cancel_requested"] == (action == "cancel")
+
+
+def test_queued_jobs_show_their_position_among_those_of_all_owners(service, order):
+    first, second = (service.submit(**order, priority=each).json()["id"] for each in (0, 0))
+    urgent = service.submit(service.key(owner="other"), **spec(kept(service.store, "other")), priority=7)
+    assert urgent.status_code == 202
+    listed = {
+        each["id"]: each["progress"]["position"] for each in service.client.get("/v1/jobs").json()["items"]
+    }
+    assert listed == {first: 2, second: 3}
+    assert service.client.get(f"/v1/jobs/{second}").json()["progress"]["position"] == 3
+    assert claimed(service.store).job.owner == "other"
+    assert service.client.get(f"/v1/jobs/{second}").json()["progress"]["position"] == 2
 
 
 def test_cancelling_a_job_twice_is_allowed(service):

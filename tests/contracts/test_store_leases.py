@@ -69,8 +69,12 @@ def test_claims_follow_priority_and_age(store):
         submitted(store, owner, priority=each)
         for each, owner in zip(priorities, itertools.cycle([ALICE, BOB]), strict=False)
     ]
-    taken = [claimed(store).job.id for _ in jobs]
-    assert taken == [job.id for job in in_turn(jobs)]
+    for job in in_turn(jobs):
+        positions = store.leases.queue_positions(jobs)
+        assert min(positions, key=positions.__getitem__) == job.id
+        assert claimed(store).job.id == job.id
+        jobs[jobs.index(job)] = store.jobs.get(job.owner, job.id)
+        assert sorted(positions.values()) == list(range(1, len(positions) + 1))
     assert store.leases.claim("another", LONG) is None
 
 

@@ -23,7 +23,7 @@ class SerialCoordinator(Coordinator):
     def _wait_for_ray(self, *_: object) -> None:
         pass
 
-    def _make_engine(self, _: Lease) -> SerialEngine:  # type: ignore[override]
+    def _make_engine(self, *_: object) -> SerialEngine:  # type: ignore[override]
         return SerialEngine()
 
 
@@ -42,7 +42,7 @@ DONE = JobOutcome(JobState.SUCCEEDED, {}, (), {"done": True})
 
 
 def run_until_check_raises(
-    _lease: Lease, _store: Store, _blobs: Blobs, _engine: object, check: Any, _s: float
+    _lease: Lease, _store: Store, _blobs: Blobs, _engine: object, check: Any, *_: object
 ) -> JobOutcome:
     while True:
         check()

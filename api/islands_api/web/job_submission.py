@@ -1,5 +1,6 @@
 """Job submission, and lookup of jobs and results, for all kinds of jobs."""
 
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 from fastapi import Header
@@ -66,7 +67,22 @@ async def submit_job(
     }
     if not new:
         headers["Idempotent-Replayed"] = "true"
-    return JSONDocument(job_document(job), 202, headers)
+    return JSONDocument(await describe_job(state, job), 202, headers)
+
+
+async def describe_job(state: AppState, job: Job) -> dict[str, Any]:
+    """Return the document of a job, with its position if it is queued."""
+    (document,) = await describe_jobs(state, (job,))
+    return document
+
+
+async def describe_jobs(state: AppState, jobs: Sequence[Job]) -> list[dict[str, Any]]:
+    """Return the documents of jobs, with the positions of those that are queued."""
+    positions: Mapping[str, int] = {}
+    # Most requests are polls of running jobs, which have no position.
+    if any(job.state == JobState.QUEUED for job in jobs):
+        positions = await state.run_blocking(state.store.leases.queue_positions, jobs)
+    return [job_document(job, positions.get(job.id)) for job in jobs]
 
 
 def etag(job: Job) -> str:

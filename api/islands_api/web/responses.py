@@ -7,12 +7,22 @@ from typing import Any
 
 from starlette.responses import JSONResponse
 
-from islands_service.domain.job import Job
+from islands_service.domain.job import Job, JobState
 from islands_service.store.datasets import StoredDataset
 
 
-def job_document(job: Job) -> dict[str, Any]:
-    """Convert a job to a document with the fields of `islands_api.schemas.JobView`."""
+def job_document(job: Job, position: int | None = None) -> dict[str, Any]:
+    """Convert a job to a document with the fields of `islands_api.schemas.JobView`.
+
+    Parameters
+    ----------
+    position : int, optional
+        Position of a queued job in the queue, if it is known.
+    """
+    progress = job.progress
+    if job.state == JobState.QUEUED:
+        place = {} if position is None else {"position": position}
+        progress = {**(progress or {}), "phase": "queued", **place}
     return {
         "id": job.id,
         "kind": job.kind,
@@ -27,7 +37,7 @@ def job_document(job: Job) -> dict[str, Any]:
         "started": _format_time(job.started),
         "finished": _format_time(job.finished),
         "spec": job.spec,
-        "progress": job.progress,
+        "progress": progress,
         "summary": job.summary,
         "problem": job.problem,
         "versions": job.versions,

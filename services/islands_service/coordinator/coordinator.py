@@ -19,6 +19,7 @@ from islands_service.coordinator.job_failures import (
     describe_interruption,
     make_problem_document,
 )
+from islands_service.coordinator.job_notes import JobNotes
 from islands_service.coordinator.job_runners import JOB_RUNNERS
 from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
 from islands_service.liveness import StopRequest, stop_on_signals
@@ -166,13 +167,15 @@ class Coordinator:
         try:
             heartbeat.check()
             self._wait_for_ray(lease, heartbeat)
+            notes = JobNotes(lease, self._store)
             return JOB_RUNNERS[lease.job.kind](
                 lease,
                 self._store,
                 self._blobs,
-                HangGuard(self._make_engine(lease), heartbeat),
+                HangGuard(self._make_engine(lease, notes), heartbeat),
                 partial(self._check, heartbeat),
                 self._settings.checkpoint_every,
+                notes,
             )
         except JobCancelled:
             return JobOutcome(JobState.CANCELLED)
@@ -250,10 +253,10 @@ class Coordinator:
         log.info("connected to Ray", address=self._find_address())
         warm_up(lambda line: log.info("kernels", note=line))
 
-    def _make_engine(self, lease: Lease) -> "Engine":
+    def _make_engine(self, lease: Lease, notes: JobNotes) -> "Engine":
         from islands_service.coordinator.job_engine import make_job_engine  # noqa: PLC0415
 
-        return make_job_engine(lease)
+        return make_job_engine(lease, notes.add)
 
     def _sweep_if_due(self) -> None:
         if monotonic() > self._sweep_at:

@@ -12,6 +12,7 @@ from islands.facade.explain_residual import explain_residual
 from islands.io.diagnosis_json import diagnosis_document
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
+from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import parse_discrepancy
 from islands_service.intake.job_inputs import read_record_and_columns
@@ -31,6 +32,7 @@ def run_diagnosis_job(
     _engine: Engine,
     check: Callable[[], None],
     _every: float,
+    _notes: JobNotes | None = None,
     map_cases: ParallelMap | None = None,
 ) -> JobOutcome:
     """Run a discrepancy job.

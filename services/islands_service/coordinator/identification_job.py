@@ -22,6 +22,7 @@ from islands.io.result_folder import result_document
 from islands.io.result_text.model_description import describe
 from islands.model.equations import equation
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
+from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
@@ -39,7 +40,13 @@ CHECKPOINT_SHARE = 0.05
 
 
 def run_identification_job(
-    lease: Lease, store: Store, blobs: Blobs, engine: Engine, check: Callable[[], None], every: float
+    lease: Lease,
+    store: Store,
+    blobs: Blobs,
+    engine: Engine,
+    check: Callable[[], None],
+    every: float,
+    notes: JobNotes | None = None,
 ) -> JobOutcome:
     """Run an identification job from its last checkpoint.
 
@@ -49,6 +56,8 @@ def run_identification_job(
         Raises the reason if the job must end early.
     every : float
         Least number of seconds between two checkpoints.
+    notes : JobNotes, optional
+        Messages that the progress of the job contains.
 
     Raises
     ------
@@ -61,7 +70,8 @@ def run_identification_job(
     record, validation = read_record_and_validation(spec, datasets, blobs)
     checkpoints = JobCheckpoints(job, blobs)
     start = checkpoints.read()
-    reporter = _ProgressReporter(lease, store, checkpoints, check, every, start)
+    notes = notes or JobNotes(lease, store)
+    reporter = _ProgressReporter(lease, store, checkpoints, check, every, start, notes)
 
     def stop() -> bool:
         check()
@@ -125,8 +135,9 @@ class _ProgressReporter:
         check: Callable[[], None],
         every: float,
         start: JobStart,
+        notes: JobNotes,
     ) -> None:
-        self._lease, self._store, self._checkpoints = lease, store, checkpoints
+        self._lease, self._store, self._checkpoints, self._notes = lease, store, checkpoints, notes
         self._check, self._every = check, every
         self._started_at = monotonic() - start.spent
         state = start.state
@@ -156,7 +167,8 @@ class _ProgressReporter:
         self._check()
         reached = self._progress(*self._last) if self._last else self._reached_before()
         try:
-            self._store.leases.report(self._lease, ProgressReport({**reached, "phase": message}))
+            progress = self._notes.complete({**reached, "phase": message})
+            self._store.leases.report(self._lease, ProgressReport(progress))
         except StoreError as error:
             # Continue the search. The next report has the progress.
             log.warning("report failed", job=self._lease.job.id, reason=str(error))
@@ -177,7 +189,8 @@ class _ProgressReporter:
         """Store the progress of the search; return whether the store accepted it."""
         started = monotonic()
         points, after = self._points(state)
-        report = ProgressReport(self._progress(state, settings), points, after=after)
+        progress = self._notes.complete(self._progress(state, settings))
+        report = ProgressReport(progress, points, after=after)
         try:
             if started >= self._checkpoint_at:
                 blob = self._checkpoints.write(state, self.spent, self.choice)

@@ -5,6 +5,7 @@ from sys import maxsize
 import structlog
 
 from islands.evolution.engine import Engine
+from islands.evolution.progress import ProgressCallback
 from islands_service.domain.job import IDENTIFICATION, Job, Lease
 from islands_service.domain.job_memory import estimate_memory, machine_memory
 from islands_service.domain.job_spec import parse_identification, resolve_job_settings
@@ -15,8 +16,13 @@ from islands_service.runtime.ray_engine import RayEngine
 log = structlog.get_logger()
 
 
-def make_job_engine(lease: Lease) -> Engine:
+def make_job_engine(lease: Lease, progress: ProgressCallback) -> Engine:
     """Return an engine for a job, and end the actors of its earlier leases.
+
+    Parameters
+    ----------
+    progress : ProgressCallback
+        Receives a message if an actor is lost or must wait for a CPU.
 
     Raises
     ------
@@ -26,11 +32,7 @@ def make_job_engine(lease: Lease) -> Engine:
     check_memory(lease.job)
     if ended := kill_stale_actors(lease.job.id, lease.epoch):
         log.warning("actors of a lost lease ended", actors=ended)
-
-    def warn(message: str, _fraction: float | None = None, /) -> None:
-        log.warning("islands", note=message)
-
-    return RayEngine(warn, f"{lease.job.id}.{lease.epoch}")
+    return RayEngine(progress, f"{lease.job.id}.{lease.epoch}")
 
 
 def check_memory(job: Job) -> None:

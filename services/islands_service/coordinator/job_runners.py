@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
+from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, JobOutcome, Lease
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -23,6 +24,7 @@ class JobRunner(Protocol):
         engine: "Engine",
         check: Callable[[], None],
         every: float,
+        notes: JobNotes,
         /,
     ) -> JobOutcome:
         """Run a job and return its outcome.
@@ -33,6 +35,8 @@ class JobRunner(Protocol):
             Raises the reason if the job must end early.
         every : float
             Least number of seconds between two checkpoints.
+        notes : JobNotes
+            Messages that the progress of the job contains.
         """
 
 

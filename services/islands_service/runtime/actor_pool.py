@@ -24,6 +24,9 @@ STARTUP_TIMEOUT = 10.0
 #: Seconds after which the user is informed that actors are not ready; starting one takes one or two.
 WAITING_NOTICE_AFTER = 5.0
 
+#: Seconds after which this information is repeated.
+WAITING_NOTICE_EVERY = 30.0
+
 #: Slot of the standby actor, which replaces a lost one until that is restarted. A restart takes two seconds.
 STANDBY = -1
 
@@ -72,7 +75,7 @@ class IslandActorPool:
         self._updated_at = self._measured_at = -_RESIZE_SECONDS
         self._started_at = inf
         self._vacant: set[int] = set()  # slots whose lost actors are not replaced yet
-        self._last_report = ""
+        self._last_report, self._reported_at = "", 0.0
         self._losses = 0
 
     def maintain(self, at_once: bool = False) -> bool:
@@ -193,9 +196,9 @@ class IslandActorPool:
                 f"waiting for capacity: {self._size - waiting} of {self._size} island actors are ready, the "
                 "others need a CPU each"
             )
-            if line != self._last_report:
+            if line != self._last_report or now - self._reported_at > WAITING_NOTICE_EVERY:
+                self._last_report, self._reported_at = line, now
                 self._report(line)
-            self._last_report = line
 
 
 def _put(problem: Problem) -> "ray.ObjectRef[Problem]":

@@ -6,6 +6,7 @@ A coordinator that resumes after its lease was taken over therefore does no harm
 """
 
 import json
+from collections.abc import Iterable
 from typing import Any
 
 from sqlalchemy import Connection, Row, case, delete, insert, select, update
@@ -21,7 +22,7 @@ from islands_service.domain.job import (
 )
 from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.job_rows.job_claims import claim_job
+from islands_service.store.job_rows.job_claims import claim_job, count_earlier_claims
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document
 from islands_service.store.tables import artefacts, events, jobs, models, points, results
 
@@ -74,6 +75,15 @@ class Leases:
             return bool(found.cancel_requested)
 
         return self._database.write(operation)
+
+    def queue_positions(self, found: Iterable[Job]) -> dict[str, int]:
+        """Return the positions of the queued ones of some jobs in the order of claims; 1 is claimed next."""
+        with self._database.read() as connection:
+            return {
+                job.id: 1 + count_earlier_claims(connection, job)
+                for job in found
+                if job.state == JobState.QUEUED
+            }
 
     def is_cancel_requested(self, lease: Lease) -> bool:
         """Return whether cancellation of a job is requested; the lease is neither checked nor extended."""

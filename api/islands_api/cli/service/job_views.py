@@ -18,7 +18,7 @@ from islands.io.simulator_spec.specification import EXTENDED_FILE
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
-from islands_service.domain.job import DISCREPANCY, TERMINAL
+from islands_service.domain.job import DISCREPANCY, TERMINAL, JobState
 
 #: Largest number of islands that have a line each.
 _SHOWN_ISLANDS = 16
@@ -39,6 +39,8 @@ def show_job(job: JobView, as_json: bool) -> None:
         output.print(
             f"generation {status['generation']}/{status['generations']}, best error {best}", markup=False
         )
+    if job.state == JobState.QUEUED:
+        output.print(_describe_phase(job), markup=False)
     if status.get("note") and job.state not in TERMINAL:
         output.print(status["note"], markup=False)
     if job.kind == DISCREPANCY:
@@ -55,7 +57,7 @@ def show_diagnosis(job: JobView) -> None:
     """Show the verdict of a discrepancy job as text, or the phase of a running one."""
     if job.summary is not None:
         output.print(job.summary["words"], markup=False)
-    elif job.progress is not None and job.state not in TERMINAL:
+    elif job.progress is not None and job.state == JobState.RUNNING:
         output.print(job.progress["phase"], markup=False)
 
 
@@ -136,14 +138,24 @@ def job_progress_bar() -> Iterator[Callable[[JobView], None]]:
             # The other phases of a search are the stages before and after its epochs.
             searching = job.state in TERMINAL or status.get("phase", "search") == "search"
             if job.kind == DISCREPANCY or not searching:
-                text = f"{job.state}, {status.get('phase', 'waiting')}"
+                text = f"{job.state}, {_describe_phase(job)}"
             islands = [
                 f"  island {index:3d}  RMSE {_format_number(error)}"
                 for index, error in enumerate(status.get("islands", ())[:_SHOWN_ISLANDS])
             ]
-            show(text, done / last if job.state not in TERMINAL else 1.0, islands)
+            fraction = status.get("fraction", done / last)
+            show(text, fraction if job.state not in TERMINAL else 1.0, islands)
 
         yield update
+
+
+def _describe_phase(job: JobView) -> str:
+    """Return the phase of a job, its position in the queue, or its last note."""
+    status = job.progress or {}
+    if job.state == JobState.QUEUED:
+        place = status.get("position")
+        return "waiting" if place is None else f"number {place} in the queue"
+    return str(status.get("note") or status.get("phase", "waiting"))
 
 
 def download(client: Client, job: str, document: dict[str, Any], folder: Path) -> None:

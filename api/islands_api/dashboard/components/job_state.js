@@ -27,25 +27,34 @@ export function makeBadge() {
   };
 }
 
-/** Return whether a search runs a stage before or after its epochs, such as the final estimation. */
+/** Return whether a search runs a stage before or after its epochs, or waits for capacity before them. */
 function isBetweenEpochs(job) {
   const { phase = "search" } = job.progress ?? {};
   return job.state === "running" && phase !== "search";
 }
 
-function formatProgress(job) {
-  if (isDiagnosis(job) && job.summary) return formatVerdict(job.summary);
-  const { phase, note, generation, generations } = job.progress ?? {};
-  if (isBetweenEpochs(job)) return note ?? phase;
-  if (job.state === "queued" && note) return note;
-  if (job.state === "queued" && generation === undefined) return "waiting";
-  if (generation === undefined) return note ?? phase ?? "";
-  const at = `${formatCount(generation)} / ${formatCount(generations)}`;
-  return job.state === "queued" ? `waiting to resume at ${at}` : at;
+function formatQueue({ note, position, generation, generations }) {
+  if (note) return note;
+  const place = position ? `, number ${formatCount(position)}` : "";
+  if (generation === undefined) return `waiting${place}`;
+  return `waiting to resume at ${formatCount(generation)} / ${formatCount(generations)}${place}`;
 }
 
-/** Make a progress bar with a text. It is full if a search succeeded, even before its last generation. */
-export function makeProgressBar() {
+function formatProgress(job) {
+  if (isDiagnosis(job) && job.summary) return formatVerdict(job.summary);
+  const progress = job.progress ?? {};
+  const { phase, note, generation, generations } = progress;
+  if (isBetweenEpochs(job)) return note ?? phase;
+  if (job.state === "queued") return formatQueue(progress);
+  if (generation === undefined) return note ?? phase ?? "";
+  return `${formatCount(generation)} / ${formatCount(generations)}`;
+}
+
+/**
+ * Make a progress bar with a text. It is full if a search succeeded, even before its last generation.
+ * With `showsReason`, the text of a failed job is the reason.
+ */
+export function makeProgressBar({ showsReason = false } = {}) {
   const bar = el("progress", { max: "1", value: "0", "aria-label": "Progress" });
   const text = el("span", { class: "progress-text" });
   return {
@@ -56,9 +65,12 @@ export function makeProgressBar() {
       // The duration of a diagnosis is unknown.
       if (isDiagnosis(job) && job.state === "running") bar.removeAttribute("value");
       bar.className = getState(job);
-      const waitsForReason = job.state === "queued" && Boolean(job.progress?.note);
-      text.classList.toggle("long", isDiagnosis(job) || isBetweenEpochs(job) || waitsForReason);
-      setText(text, formatProgress(job));
+      const reason = showsReason && job.state === "failed" ? job.problem?.detail : null;
+      text.classList.toggle("reason", Boolean(reason));
+      text.title = reason ?? "";
+      const isSentence = Boolean(reason) || (job.state === "queued" && Boolean(job.progress?.note));
+      text.classList.toggle("long", isSentence || isDiagnosis(job) || isBetweenEpochs(job));
+      setText(text, reason ?? formatProgress(job));
     },
   };
 }

@@ -96,6 +96,7 @@ function makeJobFacts(job, unit) {
     ["Evaluations", progress.evaluations === undefined ? null : formatCount(progress.evaluations)],
     ["Per second", running && rate ? formatCount(rate) : null],
     ["Time left", running && Number.isFinite(left) ? `about ${formatDuration(left)}` : null],
+    ["Note", running && progress.note ? progress.note : null],
     ["Duration", job.finished && job.started ? formatDuration(getSeconds(job)) : null],
     ["Stopped by", job.summary?.ended_by],
     ["Attempt", job.attempt > 1 ? String(job.attempt) : null],

@@ -34,7 +34,7 @@ function makeFilters(state) {
 /** Make the row of a job; `show(job)` updates it and announces a change of state to screen readers. */
 function makeRow(job) {
   const state = makeBadge();
-  const bar = makeProgressBar();
+  const bar = makeProgressBar({ showsReason: true });
   const best = el("td", { class: "figure", "data-label": "best" });
   const attempt = el("td", { class: "figure", "data-label": "attempt" });
   const link = el("a", { href: `#/jobs/${job.id}` });

@@ -11,6 +11,8 @@ from islands_api.web.job_submission import (
     ACCEPTED_RESPONSES,
     ETAG,
     IdempotencyKey,
+    describe_job,
+    describe_jobs,
     etag,
     get_job_of_kind,
     submit_job,
@@ -72,9 +74,8 @@ async def jobs(
     page = await state.run_blocking(
         state.store.jobs.page, caller.owner, job_state, decode_cursor(cursor), limit
     )
-    return JSONDocument(
-        {"items": [job_document(job) for job in page.jobs], "next": encode_cursor(page.after)}
-    )
+    items = await describe_jobs(state, page.jobs)
+    return JSONDocument({"items": items, "next": encode_cursor(page.after)})
 
 
 @router.get("/{job}", response_model=JobView, responses=_JOB_RESPONSES)
@@ -89,7 +90,10 @@ async def job(
         str | None, Header(max_length=1000, description="The `ETag` of the last response.")
     ] = None,
 ) -> Any:
-    """Return a job. With `If-None-Match`, the status is 304 if the job has not changed."""
+    """Return a job. With `If-None-Match`, the status is 304 if the job has not changed.
+
+    `progress.position` of a queued job changes with other jobs: read it without `If-None-Match`.
+    """
     found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
     if wait and _matches_etag(if_none_match, found) and found.state not in TERMINAL:
         found = await _wait_for_change(state, found, wait)
@@ -98,7 +102,7 @@ async def job(
         headers["Retry-After"] = "1"
     if _matches_etag(if_none_match, found):
         return Response(status_code=304, headers=headers)
-    return JSONDocument(job_document(found), headers=headers)
+    return JSONDocument(await describe_job(state, found), headers=headers)
 
 
 @router.post("/{job}/cancel", status_code=202, response_model=JobView)
@@ -114,7 +118,7 @@ async def resume(job: Id, caller: Writer, state: AppStateDep) -> Any:
     resumed = await state.run_blocking(
         state.store.jobs.resume, caller.owner, job, state.settings.max_active, caller.requester
     )
-    return JSONDocument(job_document(resumed), 202)
+    return JSONDocument(await describe_job(state, resumed), 202)
 
 
 @router.delete("/{job}", status_code=204)

@@ -3,9 +3,9 @@
 import json
 from typing import Any
 
-from sqlalchemy import Connection, and_, func, or_, select
+from sqlalchemy import Connection, and_, func, or_, select, tuple_
 
-from islands_service.domain.job import JobState, Lease
+from islands_service.domain.job import Job, JobState, Lease
 from islands_service.store.backends.dialect import now
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document, update_job
 from islands_service.store.tables import jobs
@@ -60,6 +60,18 @@ def claim_job(connection: Connection, owner: str, seconds: float, version: str) 
         append_event(connection, row, "running", json.dumps({"attempt": row.attempt}))
         return Lease(job_from_row(row), row.lease_epoch)
     return None
+
+
+def count_earlier_claims(connection: Connection, job: Job) -> int:
+    """Return the number of queued jobs of all owners that precede a queued job in the order of claims."""
+    # Two counts, each of a range of the index.
+    queued = select(func.count()).where(jobs.c.state == JobState.QUEUED)
+    higher = queued.where(jobs.c.priority > job.priority)
+    older = queued.where(
+        jobs.c.priority == job.priority, tuple_(jobs.c.created, jobs.c.id) < tuple_(job.created, job.id)
+    )
+    counts = select(higher.scalar_subquery(), older.scalar_subquery())
+    return sum(connection.execute(counts).one())
 
 
 def _give_up(connection: Connection, job: Any) -> None:

@@ -68,7 +68,7 @@ def test_progress_yields_increasing_versions_until_the_job_ends(
     assert [states[0].state, states[-1].state] == [JobState.QUEUED, JobState.SUCCEEDED]
     versions = [each.version for each in states]
     assert versions == sorted(set(versions))
-    generations = [each.progress["generation"] for each in states if each.progress]
+    generations = [each.progress["generation"] for each in states if "generation" in (each.progress or {})]
     assert generations == sorted(generations)
     assert len(set(generations)) >= 2  # states of the running job were seen
 

@@ -294,7 +294,7 @@ class Engine:
         yield
 class SerialCoordinator(Coordinator):
     def _wait_for_ray(self, *_): pass
-    def _make_engine(self, _): return Engine()
+    def _make_engine(self, *_): return Engine()
 SerialCoordinator(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", StopRequest()).run()
 """
 

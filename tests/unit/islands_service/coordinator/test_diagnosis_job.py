@@ -77,7 +77,7 @@ def claim(store: Store) -> Lease:
 
 
 def run_job(lease: Lease, store: Any, blobs: Blobs, check: Callable[[], None] = lambda: None) -> JobOutcome:
-    return run_diagnosis_job(lease, store, blobs, SerialEngine(), check, 1.0, map)
+    return run_diagnosis_job(lease, store, blobs, SerialEngine(), check, 1.0, map_cases=map)
 
 
 def phases(store: Store, job: Job) -> list[str]:

@@ -1,0 +1,50 @@
+"""Messages about the actors of a job, for the log and for its owner."""
+
+from collections.abc import Mapping
+from time import monotonic
+from typing import Any
+
+import structlog
+
+from islands_service.domain.job import Lease, ProgressReport
+from islands_service.store import Store
+from islands_service.store.database import StoreError
+
+log = structlog.get_logger()
+
+#: Seconds for which the progress of a job contains a message.
+SHOWN_SECONDS = 60.0
+
+#: Beginning of the message that actors wait for CPUs; see `islands_service.runtime.actor_pool`.
+WAITING = "waiting for capacity"
+
+
+class JobNotes:
+    """Adds messages of the engine to the progress of a job.
+
+    Parameters
+    ----------
+    lease : Lease
+    store : Store
+    """
+
+    def __init__(self, lease: Lease, store: Store) -> None:
+        self._lease, self._store = lease, store
+        self._progress: Mapping[str, Any] = lease.job.progress or {}
+        self._message, self._until = "", 0.0
+
+    def add(self, message: str, _fraction: float | None = None, /) -> None:
+        """Log a message and store it; a progress callback."""
+        log.warning("islands", note=message)
+        self._message, self._until = message, monotonic() + SHOWN_SECONDS
+        phase = {"phase": WAITING} if message.startswith(WAITING) else {}
+        try:
+            self._store.leases.report(self._lease, ProgressReport({**self.complete(self._progress), **phase}))
+        except StoreError as error:
+            # The next report of the search contains the message.
+            log.warning("report failed", job=self._lease.job.id, reason=str(error))
+
+    def complete(self, progress: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a new progress of the job with the last message, unless that is old."""
+        self._progress = progress
+        return {**progress, "note": self._message} if monotonic() < self._until else dict(progress)
