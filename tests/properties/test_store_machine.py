@@ -26,6 +26,7 @@ from islands_service.domain.job import (
     RESUMABLE,
     TERMINAL,
     IdempotencyError,
+    JobDeletedError,
     JobNotFoundError,
     JobState,
     JobStateError,
@@ -33,7 +34,7 @@ from islands_service.domain.job import (
     QuotaError,
 )
 from islands_service.store import Store
-from islands_service.store import leases as leases_module
+from islands_service.store.job_rows import job_claims
 from support.databases import emptied
 from support.stores import ALICE, BOB, CANCELLED, EXPIRED, FAILED, FOUND, LONG, asked, brought_on
 
@@ -56,6 +57,7 @@ class Known:
     holder: str | None = None
     expired: bool = False
     cancel: bool = False
+    declined: set[str] = field(default_factory=set)
     checkpoint: str | None = None
     generations: list[int] = field(default_factory=list)
     models: int = 0
@@ -70,12 +72,14 @@ class Machine(RuleBasedStateMachine):
     leases = Bundle("leases")
     owners = st.sampled_from([ALICE, BOB])
     lasting = st.sampled_from([LONG, EXPIRED])
+    versions = st.sampled_from(["1.0", "2.0"])
 
     def __init__(self, url):
         super().__init__()
         self.url = url
         self.stores = [Store(url), Store(url)]
         self.jobs = {}
+        self.retired = {}  # priorities of deleted jobs, by owner and idempotency key
         self.turn = count()
 
     @property
@@ -102,9 +106,12 @@ class Machine(RuleBasedStateMachine):
     def submit(self, owner, priority, key, quota):
         submission = asked(owner, priority=priority, idempotency_key=key)
         before = [name for name, each in self.jobs.items() if key and (each.owner, each.key) == (owner, key)]
+        accepted = self.jobs[before[0]].priority if before else self.retired.get((owner, key), priority)
         refused = (
             IdempotencyError
-            if before and self.jobs[before[0]].priority != priority
+            if accepted != priority
+            else JobDeletedError
+            if (owner, key) in self.retired
             else QuotaError
             if not before and quota is not None and len(self.of(owner, *ACTIVE)) >= quota
             else None
@@ -120,13 +127,13 @@ class Machine(RuleBasedStateMachine):
         else:
             assert job.id == before[0]
 
-    @rule(target=leases, name=st.sampled_from("xyz"), seconds=lasting)
-    def claim(self, name, seconds):
-        lease = self.store.leases.claim(name, seconds)
+    @rule(target=leases, name=st.sampled_from("xyz"), seconds=lasting, version=versions)
+    def claim(self, name, seconds, version):
+        lease = self.store.leases.claim(name, seconds, version)
         waiting = [
             (-each.priority, each.created, job)
             for job, each in self.jobs.items()
-            if each.state == JobState.QUEUED
+            if (each.state == JobState.QUEUED and version not in each.declined)
             or (each.state == JobState.RUNNING and (each.expired or each.holder == name))
         ]
         for *_, job in sorted(waiting):
@@ -172,12 +179,26 @@ class Machine(RuleBasedStateMachine):
 
     @rule(lease=leases, attempted=st.booleans())
     def release(self, lease, attempted):
-        _, known = self.held(lease, lambda: self.store.leases.release(lease, attempted))
+        self.give_back(lease, attempted, lambda: self.store.leases.release(lease, attempted))
+
+    @rule(lease=leases)
+    def postpone(self, lease):
+        self.give_back(lease, True, lambda: self.store.leases.postpone(lease, "a note", 0.0))
+
+    @rule(lease=leases, version=versions)
+    def decline(self, lease, version):
+        known = self.give_back(lease, False, lambda: self.store.leases.decline(lease, "a note", version))
+        if known is not None:
+            known.declined.add(version)
+
+    def give_back(self, lease, attempted, write):
+        _, known = self.held(lease, write)
         if known is not None:
             known.attempt -= not attempted
             known.stalled = max(known.stalled - (not attempted), 0)
             known.holder = None
             known.becomes(JobState.CANCELLED if known.cancel else JobState.QUEUED)
+        return known
 
     @rule(lease=leases, outcome=st.sampled_from([FOUND, FAILED, CANCELLED]))
     def finish(self, lease, outcome):
@@ -225,8 +246,11 @@ class Machine(RuleBasedStateMachine):
     @rule(owner=owners, data=st.data())
     def delete(self, owner, data):
         job = self.any_job(data)
-        if self.asked(owner, job, self.store.jobs.delete, TERMINAL) is not None:
+        known = self.asked(owner, job, self.store.jobs.delete, TERMINAL)
+        if known is not None:
             del self.jobs[job]
+            if known.key:
+                self.retired[owner, known.key] = known.priority
 
     @precondition(lambda self: len(self.jobs) > 3)
     @rule()
@@ -235,6 +259,7 @@ class Machine(RuleBasedStateMachine):
         assert self.store.retention.delete_expired(-1.0) == len(gone)
         for job in gone:
             del self.jobs[job]
+        self.retired.clear()
 
     @rule()
     def restart(self):
@@ -271,7 +296,7 @@ class Machine(RuleBasedStateMachine):
 
 
 def play(url, monkeypatch, examples, steps):
-    monkeypatch.setattr(leases_module, "ATTEMPTS", ATTEMPTS)
+    monkeypatch.setattr(job_claims, "ATTEMPTS", ATTEMPTS)
     run_state_machine_as_test(
         lambda: Machine(url()),
         settings=settings(
