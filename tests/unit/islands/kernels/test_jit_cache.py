@@ -336,14 +336,6 @@ def test_kernels_stay_in_memory_if_the_folder_cannot_be_created(start, tmp_path)
     assert not stored_kernels(tmp_path)
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
-def test_kernels_stay_in_memory_if_the_folder_is_read_only(start, tmp_path):
-    (tmp_path / "cache").mkdir(mode=0o500)
-    found = get_output(start(READY))
-    assert found["folder"] is None
-    assert (found["compiled"], found["value"]) == (True, 1.5)
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of the file size")
 @pytest.mark.parametrize("full", ["at first", "later"])
 def test_kernels_stay_in_memory_if_the_disk_is_full(start, full):
@@ -366,12 +358,10 @@ def test_kernels_stay_in_memory_if_the_disk_is_full(start, full):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of the file size")
 def test_a_complete_folder_is_used_where_nothing_can_be_written(start, tmp_path):
-    """A container has a read-only image that contains the kernels."""
     assert get_output(start(READY))["compiled"]
     code = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n" + READY
     found = get_output(start(code, "never"))
-    assert (found["compiled"], found["hits"], found["misses"]) == (False, 1, 0)
-    assert found["value"] == 1.5
+    assert (found["compiled"], found["hits"], found["value"]) == (False, 1, 1.5)
 
 
 def test_kernel_that_cannot_be_saved_is_still_used(start, tmp_path):
