@@ -13,8 +13,9 @@ import os
 import platform
 import struct
 import sys
+import zoneinfo
 from collections.abc import Iterable
-from errno import EINVAL, ENOSYS, EOPNOTSUPP, EPERM
+from errno import EINVAL, ENOSYS, EPERM
 from pathlib import Path
 
 _PR_SET_NO_NEW_PRIVS, _PR_SET_SECCOMP, _SECCOMP_MODE_FILTER = 38, 22, 2
@@ -33,17 +34,11 @@ _WITH_NETWORK, _WITH_SCOPES = 4, 6
 
 #: Folders and files of the system that libraries read.
 _SYSTEM = (
-    *(
-        "/lib",
-        "/lib64",
-        "/usr/lib",
-        "/usr/lib64",
-        "/usr/local/lib",
-        "/etc/ld.so.cache",
-        "/usr/share/zoneinfo",
-    ),
-    *("/etc/localtime", "/proc/self", "/proc/cpuinfo", "/proc/meminfo", "/sys/devices/system/cpu"),
-    *("/dev/null", "/dev/urandom"),
+    *("/lib", "/lib64", "/usr/lib", "/usr/lib64", "/usr/local/lib", "/nix/store", "/gnu/store"),
+    *("/etc/ld.so.cache", "/etc/localtime", "/proc/self", "/proc/cpuinfo", "/proc/meminfo"),
+    *("/sys/devices/system/cpu", "/dev/null", "/dev/urandom"),
+    *zoneinfo.TZPATH,
+    *mimetypes.knownfiles,
 )
 
 #: Identifiers of architectures for seccomp, and the column of their numbers in `_FORBIDDEN`.
@@ -126,16 +121,14 @@ def _list_software() -> set[Path]:
     import islands  # noqa: PLC0415
 
     own = (Path(islands.__file__).parents[1], Path(__file__).parents[2])
-    folders = (sys.prefix, sys.base_prefix, *filter(None, sys.path), *own, *_SYSTEM, *mimetypes.knownfiles)
+    folders = (sys.prefix, sys.base_prefix, *filter(None, sys.path), *own, *_SYSTEM)
     return {path for path in map(Path, folders) if path.exists()}
 
 
 def _restrict_files(readable: Iterable[Path]) -> None:
     version = _libc.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), 1)
-    if version < 1:
-        if ctypes.get_errno() in (ENOSYS, EOPNOTSUPP):
-            return
-        _check(version)
+    if version < 1:  # not supported, or forbidden by the filter of an old container engine
+        return
     rights = _RIGHTS[min(version, len(_RIGHTS)) - 1]
     attributes = (rights, 3 * (version >= _WITH_NETWORK), 3 * (version >= _WITH_SCOPES))
     known = attributes[: 1 + (version >= _WITH_NETWORK) + (version >= _WITH_SCOPES)]
