@@ -53,7 +53,7 @@ def test_a_full_disk_rejects_writes_until_space_is_freed(disk, serve):
             assert answer.headers["retry-after"] == "30"
         assert service.client.get(f"/v1/jobs/{job['id']}").json() == job
         assert service.client.get(f"/v1/datasets/{dataset}").status_code == 200
-        assert service.client.get("/readyz").status_code == 200
+        problem_of(service.client.get("/readyz"), 507, "storage-full")
         accepted = {answer.json()["id"] for answer in refused if answer.status_code == 202} | {job["id"]}
         filler.unlink()
         assert service.upload(make_large_record(b"y_mm")).status_code == 201
