@@ -44,8 +44,15 @@ def test_the_page_of_a_diagnosis_shows_progress_and_result(
     page = quiet(desk.url).go(f"#/jobs/{job}")
     with stored(desk) as store:
         lease = taken(store, job)
-        store.leases.report(lease, ProgressReport({"phase": "looking for each of 32 effects"}))
+        store.leases.report(
+            lease,
+            ProgressReport(
+                {"phase": "looking for each of 32 effects", "fraction": 0.3, "seconds_left": 14.0}
+            ),
+        )
         expect(page.locator(".status .progress-text")).to_have_text("looking for each of 32 effects")
+        assert page.locator(".status progress").evaluate("bar => bar.value") == pytest.approx(0.3)
+        expect(page.locator(".status .facts")).to_contain_text("about 14 s")
         store.leases.finish(lease, make_outcome(desk))
     expect(page.locator(".status .progress-text")).to_have_text("named: thermal-drift")
     findings = page.locator(".findings")

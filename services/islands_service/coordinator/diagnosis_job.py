@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from time import monotonic
 
-import structlog
-
 from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula, diagnose
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.evolution.engine import Engine
@@ -12,17 +10,15 @@ from islands.facade.explain_residual import explain_residual
 from islands.io.diagnosis_json import diagnosis_document
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
+from islands_service.coordinator.diagnosis_progress import DiagnosisProgress
 from islands_service.coordinator.job_notes import JobNotes
-from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, Lease, ProgressReport
+from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, Lease
 from islands_service.domain.job_spec import parse_discrepancy
 from islands_service.intake.job_inputs import read_record_and_columns
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise
 from islands_service.runtime.parallel_map import ray_map
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
-from islands_service.store.database import StoreError
-
-log = structlog.get_logger()
 
 
 def run_diagnosis_job(
@@ -52,27 +48,20 @@ def run_diagnosis_job(
         The record or the simulation is unusable, or any error that ``check`` raises.
     """
     started = monotonic()
-
-    def report(message: str, _fraction: float | None = None, /) -> None:
-        check()
-        try:
-            store.leases.report(lease, ProgressReport({"phase": message}))
-        except StoreError as error:
-            # Continue the analysis. The next message reports the progress.
-            log.warning("report failed", job=lease.job.id, reason=str(error))
-
+    report = DiagnosisProgress(lease, store, check)
     spec = parse_discrepancy(lease.job.spec)
     datasets = {
         part.dataset: store.datasets.get(lease.job.owner, part.dataset, deleted=True) for part in spec.parts
     }
-    report("reading the record")
+    report("reading the record", 0.0)
     record, columns = read_record_and_columns(spec, datasets, blobs)
     simulator = make_simulator(spec.simulation, record, columns)
-    found = diagnose(record, simulator, spec.tolerance, spec.seed, report, map_cases or ray_map(check=check))
-    report("a formula for the unexplained residual")
+    fits = map_cases or ray_map(check=check)
+    found = diagnose(record, simulator, spec.tolerance, spec.seed, report, report.count(fits))
+    report("a formula for the unexplained residual", 0.95)
     formula = explain_residual(found, spec.seed)
     wall_s = monotonic() - started
-    report("writing the report")
+    report("writing the report", 0.98)
     names = ", ".join(datasets[part.dataset].name for part in spec.parts)
     artefacts = {REPORT: blobs.write(diagnosis_report(names, found, proposal=formula))}
     if found.gain is not None:

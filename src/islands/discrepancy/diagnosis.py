@@ -144,7 +144,8 @@ def diagnose(
     seed : int
         Seed of the random generator.
     progress : ProgressCallback
-        Takes a message at the start of each step.
+        Takes a message at the start of each step, and the fraction of a typical diagnosis before it. It
+        decreases if a search is repeated.
     parallel_map : ParallelMap
         Calibrates the effects. The result does not depend on it.
     catalogue : sequence of Effect
@@ -166,13 +167,13 @@ def diagnose(
     simulation = ExtendedSimulator(simulator, (), context)
     estimation_part = np.arange(record.samples) < fitted
     target = Target(record.y, estimation_part, None, prior_std, segments=record.segments)
-    progress("calibrating the simulation")
+    progress("calibrating the simulation", 0.0)
     base = calibrate(simulation, target, simulation.nominal)
     simulator = select_intersample(base, target)
     effects = select_effects(simulator, context, prior_std, catalogue)
     for _ in range(MAX_ROUNDS):
         base = calibrate(replace(simulation, simulator=simulator), target, base.values)
-        progress(f"screening {len(effects)} effects")
+        progress(f"screening {len(effects)} effects", 0.02)
         screened = screen_effects(base, target, effects, parallel_map)
         selected = select_intersample(best_single(base, screened), target)
         if same_discretisation(selected, simulator):
@@ -185,7 +186,7 @@ def diagnose(
         simulator = selected
     else:
         outcome = search_with_ar_noise(base, screened, target, effects, progress, parallel_map)
-    progress("analysing the residual")
+    progress("analysing the residual", 0.9)
     outcome = assess_evidence(outcome, fitted, rng)
     if outcome.verdict == Verdict.UNKNOWN or (
         outcome.verdict == Verdict.NOTHING and outcome.hypothesis.fit.noise.order
@@ -224,7 +225,7 @@ def _make_diagnosis(
     findings: tuple[Finding, ...] = ()
     equivalents: tuple[ScreenedEffect, ...] = ()
     if gain is not None:
-        progress("screening alternative causes")
+        progress("screening alternative causes", 0.92)
         findings, equivalents = describe_effects(
             hypothesis, outcome.base, outcome.screened, target, effects, floor, parallel_map
         )

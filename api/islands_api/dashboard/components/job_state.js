@@ -62,8 +62,11 @@ export function makeProgressBar({ showsReason = false } = {}) {
     show(job) {
       const { generation = 0, generations = 1 } = job.progress ?? {};
       bar.value = job.state === "succeeded" ? 1 : generation / Math.max(1, generations);
-      // The duration of a diagnosis is unknown.
-      if (isDiagnosis(job) && job.state === "running") bar.removeAttribute("value");
+      if (isDiagnosis(job) && job.state === "running") {
+        const { fraction } = job.progress ?? {};
+        if (Number.isFinite(fraction)) bar.value = fraction;
+        else bar.removeAttribute("value");
+      }
       bar.className = getState(job);
       const reason = showsReason && job.state === "failed" ? job.problem?.detail : null;
       text.classList.toggle("reason", Boolean(reason));

@@ -69,7 +69,8 @@ def stepwise_search(
     while beam and _count_causes(beam[0]) < max_effects:
         is_first = not beam[0].effects
         if not is_first:
-            progress(f"effects in addition to {' and '.join(effect.name for effect in beam[0].effects)}")
+            names = [effect.name for effect in beam[0].effects]
+            progress(f"effects in addition to {' and '.join(names)}", min(0.1 + 0.2 * len(names), 0.7))
         min_gain = MIN_GAIN if is_first else _get_min_further_gain(target, effects)
         width = PAIR_SEEDS if is_first and pairs else BEAM_WIDTH
         extended: dict[frozenset[str], Hypothesis] = {}
@@ -134,7 +135,7 @@ def refine_by_swaps(
         alternatives: tuple[Alternatives, ...] = ()
         candidates = []
         if len(hypothesis.effects) > 1:
-            progress("screening alternative causes")
+            progress("screening alternative causes", 0.7)
             alternatives = find_alternatives(hypothesis, target, effects, parallel_map)
             candidates = [
                 with_effect(each.without, screened) for each in alternatives for screened in each.screened[:1]

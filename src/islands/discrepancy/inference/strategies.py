@@ -92,7 +92,7 @@ def search_with_ar_noise(
     noise = best_single(base, screened).noise
     if noise.order:
         # Ordinary least squares would fit the coloured noise as well.
-        progress("the noise is coloured: repeating with whitened residuals")
+        progress("the noise is coloured: repeating with whitened residuals", 0.1)
         target = replace(target, noise=noise)
         base = calibrate(base.simulation, target, base.values)
         screened = screen_effects(base, target, effects, parallel_map)
@@ -108,7 +108,7 @@ def search_with_model_error(
     parallel_map: ParallelMap,
 ) -> SearchOutcome:
     """Search for effects under the assumption that the residual is model error."""
-    progress("the residual is model error: repeating with unweighted residuals")
+    progress("the residual is model error: repeating with unweighted residuals", 0.4)
     screened: Sequence[ScreenedEffect] = ()
     hypothesis = Hypothesis(base, base.score, ())
     # The effective sample size changes the score of a fit, but not the fit: both passes share results.

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +82,9 @@ def run_job(lease: Lease, store: Any, blobs: Blobs, check: Callable[[], None] = 
 
 
 def phases(store: Store, job: Job) -> list[str]:
-    return [each.data["phase"] for each in store.jobs.events(job.id) if each.kind == "progress"]
+    """Return the phases of a job; one with several reports counts once."""
+    reported = [each.data["phase"] for each in store.jobs.events(job.id) if each.kind == "progress"]
+    return [phase for phase, _ in groupby(reported)]
 
 
 def without_time(outcome: JobOutcome) -> JobOutcome:
