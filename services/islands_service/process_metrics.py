@@ -3,9 +3,12 @@
 import platform
 from importlib.metadata import version
 
-from prometheus_client import CollectorRegistry, Info, ProcessCollector, start_http_server
+from prometheus_client import CollectorRegistry, Histogram, Info, ProcessCollector, start_http_server
 
 from islands.errors import SettingsError
+
+#: Upper bounds in seconds of the buckets of durable writes.
+WRITE_BUCKETS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0)
 
 
 def make_registry(role: str) -> CollectorRegistry:
@@ -21,6 +24,16 @@ def make_registry(role: str) -> CollectorRegistry:
     build = Info("islands_build", "Version of islands and of Python.", registry=registry)
     build.info({"version": version("islands"), "python": platform.python_version(), "role": role})
     return registry
+
+
+def make_commit_histogram(registry: CollectorRegistry) -> Histogram:
+    """Return the metric of the transactions of this process, for `Database.observe_commit`."""
+    return Histogram(
+        "islands_store_commit_seconds",
+        "Time of a transaction of the store, which may contain several operations.",
+        buckets=WRITE_BUCKETS,
+        registry=registry,
+    )
 
 
 def serve_metrics(registry: CollectorRegistry, host: str, port: int) -> None:

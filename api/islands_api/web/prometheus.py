@@ -10,7 +10,7 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from islands_service.domain.job import JobState
-from islands_service.process_metrics import make_registry
+from islands_service.process_metrics import make_commit_histogram, make_registry
 from islands_service.store import Store
 
 #: Largest number of owners with metrics of their jobs: each is a time series.
@@ -41,13 +41,7 @@ class ServiceMetrics:
             "islands_dataset_bytes_received", "Bytes of data sets received.", registry=self.registry
         )
         self.streams = Gauge("islands_event_streams", "Open event streams.", registry=self.registry)
-        commits = Histogram(
-            "islands_store_commit_seconds",
-            "Time of a transaction of the store, which may contain several operations.",
-            buckets=(0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0),
-            registry=self.registry,
-        )
-        store.database.observe_commit = commits.observe
+        store.database.observe_commit = make_commit_histogram(self.registry).observe
         self.registry.register(_JobCollector(store))
         self.registry.register(_DiskCollector(folder))
 

@@ -9,10 +9,11 @@ from functools import partial
 
 from islands.errors import IslandsError
 from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.coordinator_metrics import CoordinatorMetrics
 from islands_service.coordinator.process_restart import restart_process
 from islands_service.liveness import StopRequest, stop_on_signals, watch_supervisor
 from islands_service.logging_config import configure_logs
-from islands_service.process_metrics import make_registry, serve_metrics
+from islands_service.process_metrics import serve_metrics
 from islands_service.settings import service_settings
 
 
@@ -34,11 +35,12 @@ def main() -> int:
         settings = service_settings()
         configure_logs(settings.log_format, "coordinator")
         stop_on_signals(stopping)
+        metrics = CoordinatorMetrics()
         if port := arguments.metrics_port or settings.metrics_port:
-            serve_metrics(make_registry("coordinator"), settings.metrics_host, port)
+            serve_metrics(metrics.registry, settings.metrics_host, port)
         with watch_supervisor(settings.lifeline):
             abandon = partial(restart_process, settings.lifeline)
-            Coordinator(settings, arguments.name, stopping, abandon).run()
+            Coordinator(settings, arguments.name, stopping, abandon, metrics).run()
     except IslandsError as error:
         print(f"coordinator: {error}", file=sys.stderr)
         return 1

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import structlog
 
 from islands.errors import IslandsError
+from islands_service.coordinator.coordinator_metrics import CoordinatorMetrics
 from islands_service.coordinator.heartbeat import CoordinatorStopping, HangGuard, Heartbeat, JobCancelled
 from islands_service.coordinator.job_failures import (
     RETRY_BACKOFF,
@@ -63,6 +64,7 @@ class Coordinator:
         Ends the loop. The current job is released with its last checkpoint.
     abandon : callable
         See `Heartbeat`.
+    metrics : CoordinatorMetrics, optional
     """
 
     def __init__(
@@ -71,10 +73,14 @@ class Coordinator:
         name: str,
         stopping: StopRequest,
         abandon: Callable[[], None] = lambda: None,
+        metrics: CoordinatorMetrics | None = None,
     ) -> None:
         self._settings, self._name, self._stopping, self._abandon = settings, name, stopping, abandon
+        self._metrics = metrics or CoordinatorMetrics()
         self._store = Store(settings.url)
+        self._store.database.observe_commit = self._metrics.commits.observe
         self._blobs = Blobs(settings.blobs)
+        self._blobs.observe_write = self._metrics.blob_writes.observe
         self._traces = Traces(settings.telemetry, "coordinator")
         self._ray = ExitStack()
         self._connected = self._store_away = False
@@ -133,8 +139,10 @@ class Coordinator:
         with (
             structlog.contextvars.bound_contextvars(**attributes),
             self._traces.span(lease.job.kind, **attributes),
+            self._metrics.running.track_inprogress(),
         ):
             log.info("job claimed", kind=lease.job.kind)
+            self._metrics.attempts.labels(lease.job.kind).inc()
             started = monotonic()
             try:
                 with Heartbeat(
@@ -142,24 +150,31 @@ class Coordinator:
                 ) as heartbeat:
                     outcome = self._run_job(lease, heartbeat)
                     self._finish(lease, outcome, heartbeat)
+                self._metrics.finished.labels(lease.job.kind, outcome.state).inc()
                 log.info("job finished", state=outcome.state, seconds=round(monotonic() - started, 3))
             except LeaseLostError as error:
                 log.warning("lease lost", reason=str(error))
+                self._metrics.given_back.labels("lease-lost").inc()
             except JobDeclinedError as error:
                 log.warning("job declined", reason=str(error))
+                self._metrics.given_back.labels("declined").inc()
                 self._give_back(self._store.leases.decline, lease, str(error))
             except TRANSIENT_ERRORS as error:
                 log.error("job interrupted", trace=traceback.format_exc())
+                self._metrics.given_back.labels("interrupted").inc()
                 reason = describe_interruption(error)
                 self._give_back(self._store.leases.postpone, lease, reason, RETRY_BACKOFF)
             except CoordinatorStopping:
+                self._metrics.given_back.labels("stopping").inc()
                 self._release(lease)
             except StoreError as error:
                 log.warning("job given back", reason=str(error))
+                self._metrics.given_back.labels("store").inc()
                 self._release(lease)
                 self._stopping.wait(RETRY_SECONDS)
             except ClusterError as error:
                 log.error("cluster lost", reason=str(error))
+                self._metrics.given_back.labels("cluster").inc()
                 self._release(lease, attempted=self._connected)
                 raise
 

@@ -3,10 +3,11 @@
 import hashlib
 import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from errno import EDQUOT, ENOSPC
 from pathlib import Path
+from time import monotonic
 from typing import IO
 
 from islands.errors import IslandsError
@@ -31,6 +32,8 @@ class Blobs:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        #: Called with the seconds until a blob was on the disk.
+        self.observe_write: Callable[[float], None] = _ignore_write
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
 
     def path(self, blob: str) -> Path:
@@ -102,6 +105,7 @@ class Blobs:
         ------
         StorageFullError
         """
+        began = monotonic()
         with translate_disk_full():
             stream.flush()
             os.fsync(stream.fileno())
@@ -112,6 +116,7 @@ class Blobs:
             Path(stream.name).replace(path)
             for folder in (path.parent, self._folder):
                 _sync(folder)
+        self.observe_write(monotonic() - began)
         return blob
 
     def check_writable(self) -> None:
@@ -173,6 +178,10 @@ def translate_disk_full() -> Iterator[None]:
         raise StorageFullError(
             f"the disk of the data folder is full ({error.strerror}): make room"
         ) from error
+
+
+def _ignore_write(_seconds: float) -> None:
+    """Do nothing with the duration of a write."""
 
 
 def _sync(folder: Path) -> None:

@@ -1,0 +1,52 @@
+"""Prometheus metrics of a coordinator: attempts, outcomes, lost leases, and the time of durable writes."""
+
+from prometheus_client import Counter, Gauge, Histogram
+
+from islands_service.process_metrics import WRITE_BUCKETS, make_commit_histogram, make_registry
+
+
+class CoordinatorMetrics:
+    """Metrics of one coordinator, since the start of its process.
+
+    Attributes
+    ----------
+    registry : CollectorRegistry
+    attempts : Counter
+        Claimed jobs by kind.
+    finished : Counter
+        Stored outcomes by kind and state.
+    given_back : Counter
+        Attempts without an outcome by reason.
+    running : Gauge
+        Whether a job runs.
+    commits, blob_writes : Histogram
+        Seconds of transactions, and of blobs until they are on the disk. A checkpoint is one of each.
+    """
+
+    def __init__(self) -> None:
+        self.registry = make_registry("coordinator")
+        self.attempts = Counter(
+            "islands_attempts", "Jobs claimed by this coordinator.", ["kind"], registry=self.registry
+        )
+        self.finished = Counter(
+            "islands_jobs_finished",
+            "Jobs that ended in this coordinator.",
+            ["kind", "state"],
+            registry=self.registry,
+        )
+        self.given_back = Counter(
+            "islands_attempts_given_back",
+            "Attempts without an outcome: lease-lost, stopping, declined, interrupted, store, cluster.",
+            ["reason"],
+            registry=self.registry,
+        )
+        self.running = Gauge(
+            "islands_coordinator_busy", "1 while a job runs in this coordinator.", registry=self.registry
+        )
+        self.commits = make_commit_histogram(self.registry)
+        self.blob_writes = Histogram(
+            "islands_blob_write_seconds",
+            "Time until a blob, for example a checkpoint, is on the disk.",
+            buckets=WRITE_BUCKETS,
+            registry=self.registry,
+        )

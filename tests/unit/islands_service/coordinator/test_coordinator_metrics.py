@@ -1,0 +1,43 @@
+"""Metrics of a coordinator: attempts, outcomes and durable writes of real jobs."""
+
+from threading import Thread
+from typing import Any
+
+import pytest
+
+from islands_service.domain.job import IDENTIFICATION, Job, JobOutcome, JobState
+from islands_service.liveness import StopRequest
+from islands_service.settings import ServiceSettings
+from islands_service.store import Store
+from support.coordinators import DONE, SerialCoordinator, replace_runner, wait_until_finished
+
+
+def test_metrics_count_attempts_outcomes_and_writes(
+    store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    attempts: list[Any] = []
+
+    def fail_once(_lease: object, _store: object, blobs: Any, *_: object) -> JobOutcome:
+        attempts.append(blobs.write(b"a checkpoint"))
+        if len(attempts) == 1:
+            raise OSError("the network was away")
+        return DONE
+
+    replace_runner(monkeypatch, fail_once)
+    monkeypatch.setattr("islands_service.coordinator.coordinator.RETRY_BACKOFF", 0.01)
+    stopping = StopRequest()
+    coordinator = SerialCoordinator(settings, "me", stopping)
+    thread = Thread(target=coordinator.run)
+    thread.start()
+    try:
+        assert wait_until_finished(store, job).state == JobState.SUCCEEDED
+    finally:
+        stopping.request()
+        thread.join()
+    read = coordinator._metrics.registry.get_sample_value
+    assert read("islands_attempts_total", {"kind": IDENTIFICATION}) == 2.0
+    assert read("islands_jobs_finished_total", {"kind": IDENTIFICATION, "state": "succeeded"}) == 1.0
+    assert read("islands_attempts_given_back_total", {"reason": "interrupted"}) == 1.0
+    assert read("islands_coordinator_busy") == 0.0
+    assert read("islands_blob_write_seconds_count") == 2.0
+    assert (read("islands_store_commit_seconds_count") or 0.0) >= 4.0  # two claims, a return and an outcome
