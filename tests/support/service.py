@@ -238,7 +238,8 @@ def run_diagnosis(service: Service, content: bytes, /, **changes: Any) -> str:
     assert lease is not None
     assert lease.job.id == job["id"]
     blobs = Blobs(service.settings.blobs)
-    outcome = run_diagnosis_job(lease, service.store, blobs, SerialEngine(), lambda: None, 600.0, map)
+    arguments = (lease, service.store, blobs, SerialEngine(), lambda: None, 600.0)
+    outcome = run_diagnosis_job(*arguments, map_cases=map)
     service.store.leases.finish(lease, outcome)
     return str(job["id"])
 
