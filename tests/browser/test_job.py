@@ -75,7 +75,7 @@ def test_a_queued_job_is_cancelled_resumed_and_deleted_if_confirmed(
     # The button is hidden, but the keyboard focus does not return to the start of the page.
     expect(page.get_by_role("heading", level=1)).to_be_focused()
     assert desk.job(job)["state"] == "cancelled"
-    expect(page.get_by_role("status")).to_have_text("piezo: cancelled")
+    expect(page.get_by_role("status")).to_have_text("\u2068piezo\u2069: cancelled")
     page.get_by_role("button", name="Resume").click()
     expect(state).to_have_text("queued")
     page.get_by_role("button", name="Cancel").click()

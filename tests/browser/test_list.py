@@ -39,8 +39,19 @@ def test_a_new_job_appears_and_changes_its_state(
         assert row(page, job).locator("td").nth(2).text_content() == f"{best:#.3g}"
         store.leases.finish(lease, JobOutcome(JobState.FAILED, problem={"title": "t", "detail": "d"}))
     expect(state).to_have_text("failed")
-    expect(page.get_by_role("status")).to_have_text("tank, level 3: failed")
+    expect(page.get_by_role("status")).to_have_text("\u2068tank, level 3\u2069: failed")
     assert row(page, job).locator("td").last.text_content() == "1"
+
+
+def test_a_name_cannot_reverse_the_text_around_it(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    """A right-to-left override would turn "report\u202efdp.exe" into "reportexe.pdf" and all that follows."""
+    job = desk.submit(500, name="report\u202efdp")
+    link = row(quiet(desk.url).go(), job).get_by_role("link")
+    expect(link.locator("bdi")).to_have_text("report\u202efdp")
+    assert link.locator("bdi").evaluate("node => getComputedStyle(node).unicodeBidi") == "isolate"
+    desk.ask("POST", f"/v1/jobs/{job}/cancel")
 
 
 def test_a_job_that_waits_for_a_reason_shows_it(

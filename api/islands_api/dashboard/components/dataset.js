@@ -27,7 +27,7 @@ function makeColumnTable({ preview }, spec) {
       ...(hasRemarks ? ["Remark"] : []),
     ],
     preview.columns.map((column) => [
-      el("code", {}, column.name),
+      el("code", {}, el("bdi", {}, column.name)),
       column.unit,
       role(column.name),
       formatNumber(column.minimum),
@@ -61,7 +61,7 @@ function describeDataset(dataset, spec) {
   const { preview } = dataset;
   return [
     makeFacts([
-      ["File", dataset.name],
+      ["File", el("bdi", {}, dataset.name)],
       ["Size", formatBytes(dataset.bytes)],
       ["Samples", formatCount(preview.samples)],
       ["Sampling time", preview.dt === null ? null : `${formatShort(preview.dt)} s`],

@@ -12,8 +12,11 @@ export const isEnded = (job) => ["succeeded", "failed", "cancelled"].includes(jo
 /** Return the state of a job for display. */
 export const getState = (job) => (job.cancel_requested && !isEnded(job) ? "cancelling" : job.state);
 
-/** Return the name of a job. */
+/** Return the name of a job, for an element `bdi`: some characters reverse the text that follows. */
 export const getName = (job) => job.name || `Job ${job.id.slice(0, 8)}`;
+
+/** Return the name of a job for a sentence, between characters that isolate its direction. */
+export const getIsolatedName = (job) => `\u2068${getName(job)}\u2069`;
 
 /** Make a badge with the state; `show(job)` updates it. */
 export function makeBadge() {

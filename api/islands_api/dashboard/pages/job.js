@@ -5,7 +5,7 @@ import { askConfirmation } from "../components/confirm.js";
 import { makeConvergencePanel } from "../components/convergence.js";
 import { makeDatasetPanel, makeSettingsPanel } from "../components/dataset.js";
 import { isDiagnosis, makeFindingsPanel } from "../components/diagnosis.js";
-import { getName, getState, isEnded, makeBadge, makeProgressBar } from "../components/job_state.js";
+import { getIsolatedName, getName, getState, isEnded, makeBadge, makeProgressBar } from "../components/job_state.js";
 import { makeModelsPanel } from "../components/models.js";
 import { download, getJson, sendRequest } from "../lib/api.js";
 import { formatUtc, makeAge } from "../lib/clock.js";
@@ -17,7 +17,7 @@ const getPath = (id) => `v1/jobs/${encodeURIComponent(id)}`;
 
 async function deleteJob(job) {
   const contents = isDiagnosis(job) ? "findings and report" : "models, figures and history";
-  const text = `${getName(job)} is deleted with its ${contents}. This cannot be undone.`;
+  const text = `${getIsolatedName(job)} is deleted with its ${contents}. This cannot be undone.`;
   if (!(await askConfirmation("Delete this job?", text, "Delete it"))) return null;
   await sendRequest(getPath(job.id), { method: "DELETE" });
   location.hash = "#/jobs";
@@ -116,7 +116,8 @@ function makeFailureCard(job) {
 
 /** Show a job in a host until the signal aborts; `update({rank})` shows another model. */
 export function mountJob(host, { id, rank }, signal) {
-  const heading = el("h1", { tabindex: "-1" }, "Job");
+  const name = el("bdi", {}, "Job");
+  const heading = el("h1", { tabindex: "-1" }, name);
   const state = makeBadge();
   const bar = makeProgressBar();
   const factsHost = el("div");
@@ -153,10 +154,10 @@ export function mountJob(host, { id, rank }, signal) {
 
   function show(job) {
     if (current === null) build(job);
-    else if (getState(job) !== getState(current)) announce(`${getName(job)}: ${getState(job)}`);
+    else if (getState(job) !== getState(current)) announce(`${getIsolatedName(job)}: ${getState(job)}`);
     current = job;
     document.title = `${getName(job)} · islands`;
-    setText(heading, getName(job));
+    setText(name, getName(job));
     state.show(job);
     bar.show(job);
     buttons.show(job);

@@ -3,7 +3,7 @@
  * A page to submit jobs would be a module `submit.js` here, with a route in islands.js and a link below.
  */
 
-import { STATES, getName, getState, isEnded, makeBadge, makeProgressBar } from "../components/job_state.js";
+import { STATES, getIsolatedName, getName, getState, isEnded, makeBadge, makeProgressBar } from "../components/job_state.js";
 import { getJson } from "../lib/api.js";
 import { makeAge } from "../lib/clock.js";
 import { announce, el, setText } from "../lib/dom.js";
@@ -37,7 +37,8 @@ function makeRow(job) {
   const bar = makeProgressBar({ showsReason: true });
   const best = el("td", { class: "figure", "data-label": "best" });
   const attempt = el("td", { class: "figure", "data-label": "attempt" });
-  const link = el("a", { href: `#/jobs/${job.id}` });
+  const name = el("bdi");
+  const link = el("a", { href: `#/jobs/${job.id}` }, name);
   let lastState = null;
   const node = el(
     "tr",
@@ -52,11 +53,11 @@ function makeRow(job) {
   function show(newJob) {
     state.show(newJob);
     bar.show(newJob);
-    setText(link, getName(newJob));
+    setText(name, getName(newJob));
     setText(best, formatNumber(newJob.progress?.best_error));
     setText(attempt, newJob.attempt ? String(newJob.attempt) : NONE);
     const newState = getState(newJob);
-    if (lastState !== null && lastState !== newState) announce(`${getName(newJob)}: ${newState}`);
+    if (lastState !== null && lastState !== newState) announce(`${getIsolatedName(newJob)}: ${newState}`);
     lastState = newState;
   }
   show(job);
