@@ -80,7 +80,7 @@ def test_a_queued_job_is_cancelled_resumed_and_deleted_if_confirmed(
     expect(state).to_have_text("queued")
     page.get_by_role("button", name="Cancel").click()
     page.get_by_role("button", name="Delete").click()
-    expect(dialog).to_contain_text("piezo is deleted with its models")
+    expect(dialog).to_contain_text("\u2068piezo\u2069 is deleted with its models")
     page.keyboard.press("Enter")
     expect(dialog).to_have_count(0)
     page.get_by_role("button", name="Delete").click()
