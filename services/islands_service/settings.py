@@ -51,6 +51,9 @@ class ServiceSettings(BaseSettings):
         ``Location``.
     ray_address
         ``HOST:PORT`` of a Ray cluster; by default a Ray head is started on this machine.
+    autoscaling
+        Whether the cluster starts machines for islands that wait for a CPU, such as one of KubeRay with an
+        autoscaler. A job then requests a CPU for each island, even if the cluster has fewer.
     coordinators
         Number of jobs that run at the same time.
     lease
@@ -111,6 +114,7 @@ class ServiceSettings(BaseSettings):
     trusted_proxies: Annotated[str, AfterValidator(_check_networks)] = ""
     root_path: Annotated[str, Field(pattern=r"^(/[A-Za-z0-9._~-]+)*$")] = ""
     ray_address: str | None = None
+    autoscaling: bool = False
     coordinators: Annotated[int, Field(ge=0, le=64)] = 1
     lease: Annotated[float, Field(ge=1.0)] = 5.0
     checkpoint_every: Positive = 5.0

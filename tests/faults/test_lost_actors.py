@@ -15,6 +15,7 @@ from islands.evolution.problem import Problem
 from islands_service.engines import ENGINES
 from islands_service.runtime import actor_pool
 from islands_service.runtime.cluster import LOSS_ERRORS, ClusterError
+from islands_service.runtime.ray_engine import RayEngine
 from support.processes import actors, alive, eventually, kill
 from support.searches import SMALL, exactly, record
 
@@ -167,3 +168,31 @@ def test_existing_ray_connection_is_left_alone(engine):
     with pytest.raises(ClusterError, match="already connected to Ray"), ENGINES["ray"](None, print):
         pass
     assert ray.is_initialized()
+
+
+@pytest.mark.ci
+def test_a_cluster_with_an_autoscaler_is_asked_for_a_cpu_for_each_island(
+    posed, undisturbed, ray_address, engine, monkeypatch
+):
+    """Without an autoscaler an actor without a CPU would wait for ever, and is not requested."""
+    from ray._raylet import GcsClient
+    from ray.autoscaler.v2.sdk import get_cluster_resource_state
+
+    def requested():
+        state = get_cluster_resource_state(GcsClient(address=ray_address))
+        return sum(each.count for each in state.pending_resource_requests)
+
+    missing = 3
+    islands = len(os.sched_getaffinity(0)) + missing
+    for autoscaling, expected in ((False, 0), (True, missing)):
+        pool = actor_pool.IslandActorPool(posed, islands, lambda *_: None, autoscaling=autoscaling)
+        try:
+            eventually(lambda pool=pool: pool.maintain(at_once=True) or pool.slots)
+            eventually(lambda expected=expected: requested() == expected, seconds=20.0)
+        finally:
+            pool.shutdown()
+            eventually(lambda: not actors())
+    # The search begins with the actors that are ready.
+    monkeypatch.setattr(actor_pool, "STARTUP_TIMEOUT", 1.0)
+    grown = RayEngine(autoscaling=True).run(posed, empty_archipelago(3, SEED), never)
+    assert [exactly(epoch.archipelago) for epoch in grown] == undisturbed

@@ -271,7 +271,7 @@ class Coordinator:
     def _make_engine(self, lease: Lease, notes: JobNotes) -> "Engine":
         from islands_service.coordinator.job_engine import make_job_engine  # noqa: PLC0415
 
-        return make_job_engine(lease, notes.add)
+        return make_job_engine(lease, notes.add, self._settings.autoscaling)
 
     def _sweep_if_due(self) -> None:
         if monotonic() > self._sweep_at:

@@ -16,23 +16,27 @@ from islands_service.runtime.ray_engine import RayEngine
 log = structlog.get_logger()
 
 
-def make_job_engine(lease: Lease, progress: ProgressCallback) -> Engine:
+def make_job_engine(lease: Lease, progress: ProgressCallback, autoscaling: bool = False) -> Engine:
     """Return an engine for a job, and end the actors of its earlier leases.
 
     Parameters
     ----------
     progress : ProgressCallback
         Receives a message if an actor is lost or must wait for a CPU.
+    autoscaling : bool
+        Whether the cluster starts machines for actors that wait for a CPU. Its present memory is then no
+        limit.
 
     Raises
     ------
     JobMemoryError
         The cluster, or the machine of this process, has not enough memory for the job.
     """
-    check_memory(lease.job)
+    if not autoscaling:
+        check_memory(lease.job)
     if ended := kill_stale_actors(lease.job.id, lease.epoch):
         log.warning("actors of a lost lease ended", actors=ended)
-    return RayEngine(progress, f"{lease.job.id}.{lease.epoch}")
+    return RayEngine(progress, f"{lease.job.id}.{lease.epoch}", autoscaling)
 
 
 def check_memory(job: Job) -> None:

@@ -61,10 +61,20 @@ class IslandActorPool:
     title : str
         Prefix of the names of the actors; empty for unnamed ones. The coordinator that takes over a
         job finds by it the actors of a hanging one (`kill_stale_actors`), which would keep their CPUs.
+    autoscaling : bool
+        Request an actor for each island, even beyond the CPUs of the cluster, since it starts machines for
+        actors that wait.
     """
 
-    def __init__(self, problem: Problem, islands: int, progress: ProgressCallback, title: str = "") -> None:
-        self._problem = _put(problem)
+    def __init__(
+        self,
+        problem: Problem,
+        islands: int,
+        progress: ProgressCallback,
+        title: str = "",
+        autoscaling: bool = False,
+    ) -> None:
+        self._problem, self._autoscaling = _put(problem), autoscaling
         self._islands, self._report, self._title, self._actor_count = islands, progress, title, 0
         self._size = 0
         # By slot: the actor, and a reference that resolves when the actor is prepared (joining) or dies
@@ -135,7 +145,7 @@ class IslandActorPool:
     def _update_members(self, now: float) -> None:
         if now - self._measured_at > _RESIZE_SECONDS:
             self._measured_at = now
-            cpus = int(ray.cluster_resources().get("CPU", 0))
+            cpus = self._islands if self._autoscaling else int(ray.cluster_resources().get("CPU", 0))
             self._size = max(self._size, min(self._islands, max(1, cpus)))
         for slot in _find_ended(self._members):
             self._handle_loss(slot, self._members.pop(slot)[0])

@@ -35,17 +35,22 @@ class RayEngine:
         Receives a message for the user if an actor is lost or must wait for a CPU.
     title : str
         Prefix of the names of the actors, ``<job>.<lease epoch>``; empty for unnamed ones.
+    autoscaling : bool
+        Whether the cluster starts machines for actors that wait for a CPU.
     """
 
-    def __init__(self, progress: ProgressCallback = ignore_progress, title: str = "") -> None:
-        self._progress, self._title = progress, title
+    def __init__(
+        self, progress: ProgressCallback = ignore_progress, title: str = "", autoscaling: bool = False
+    ) -> None:
+        self._progress, self._title, self._autoscaling = progress, title, autoscaling
 
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Yield the epochs of a search; see `islands.evolution.engine.Engine`."""
         scheduler = EpochScheduler(problem, start, pack_epoch)
         if scheduler.finished:
             return
-        pool = IslandActorPool(problem, len(start.islands), self._progress, self._title)
+        islands = len(start.islands)
+        pool = IslandActorPool(problem, islands, self._progress, self._title, self._autoscaling)
         try:
             deadlines = EpochDeadlines(len(start.islands), problem.settings.population)
             yield from _run_epochs(scheduler, pool, deadlines, problem.settings.primitive_table, stop)

@@ -19,6 +19,7 @@ from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from islands.errors import IslandsError
+from islands_service.store.backends import dialect
 from islands_service.store.backends.connections import make_engine
 
 T = TypeVar("T")
@@ -135,6 +136,19 @@ class Database:
                 self._writer = writer
             self._waiting.put((operation, done))
         return done.result()
+
+    @contextmanager
+    def snapshot(self) -> Iterator[Connection]:
+        """Open a connection for reading whose statements all see one state of the database.
+
+        Raises
+        ------
+        StoreUnavailableError
+        """
+        self._check_open()
+        with translate_db_errors(), self.engine.begin() as connection:
+            dialect.begin_snapshot(connection)
+            yield connection
 
     @contextmanager
     def exclusive(self) -> Iterator[Connection]:

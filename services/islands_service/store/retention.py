@@ -43,10 +43,15 @@ class Retention:
 
     def named_blobs(self) -> frozenset[str]:
         """Return all blobs that a row references."""
+        with self._database.read() as connection:
+            return self.named_blobs_of(connection)
+
+    @staticmethod
+    def named_blobs_of(connection: Connection) -> frozenset[str]:
+        """Return all blobs that a row references, as a connection sees the rows."""
         query = union(
             select(datasets.c.blob),
             select(artefacts.c.blob),
             select(jobs.c.checkpoint).where(jobs.c.checkpoint.is_not(None)),
         )
-        with self._database.read() as connection:
-            return frozenset(connection.execute(query).scalars())
+        return frozenset(connection.execute(query).scalars())

@@ -1,22 +1,32 @@
-"""``islands admin``: operation of a service, in its database."""
+"""``islands admin``: operation of a service, in its database: audit trail, backup, restoration."""
 
 import json
+from contextlib import closing
 from dataclasses import asdict
 from datetime import UTC, datetime
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 from rich.table import Column, Table
 
-from islands_api.cli.console import output
+from islands_api.cli.console import errors, output
 from islands_api.cli.service.store_options import Database, DataDir, open_store
+from islands_service.settings import service_settings
+from islands_service.store.blobs import Blobs
+from islands_service.store.database import Database as StoreDatabase
+from islands_service.supervisor import folder_lock
 
-admin = typer.Typer(help="Operation of a service: audit.", no_args_is_help=True, add_completion=False)
+admin = typer.Typer(
+    help="Operation of a service: audit, backup, restore.", no_args_is_help=True, add_completion=False
+)
+
+Folder = Annotated[Path, typer.Argument(help="Folder of the backup.")]
 
 
 @admin.callback()
 def _admin() -> None:
-    """Operation of a service: audit."""
+    """Operation of a service: audit, backup, restore."""
 
 
 @admin.command()
@@ -46,6 +56,49 @@ def audit(
         texts = (entry.action, entry.owner, entry.subject, entry.key_id or "", entry.address)
         table.add_row(_format_time(entry.at), *texts)
     output.print(table, markup=False)
+
+
+@admin.command()
+def backup(folder: Folder, data_dir: DataDir = None, database: Database = None) -> None:
+    """Write a backup of database and files into a new folder. The service may run meanwhile."""
+    from islands_service.backup import create_backup  # noqa: PLC0415
+
+    settings = service_settings(data_dir=data_dir, database=database)
+    with open_store(data_dir, database) as store:
+        manifest = create_backup(store.database, Blobs(settings.blobs), folder, _report)
+    _print_manifest("written", folder, manifest)
+
+
+@admin.command()
+def verify(folder: Folder) -> None:
+    """Read a whole backup and check it."""
+    from islands_service.backup import verify_backup  # noqa: PLC0415
+
+    _print_manifest("complete", folder, verify_backup(folder, _report))
+
+
+@admin.command()
+def restore(folder: Folder, data_dir: DataDir = None, database: Database = None) -> None:
+    """Restore a backup into a new data folder and an empty database. Start the service afterwards."""
+    from islands_service.backup import restore_backup  # noqa: PLC0415
+
+    settings = service_settings(data_dir=data_dir, database=database)
+    with folder_lock(settings.data_dir), closing(StoreDatabase(settings.url)) as opened:
+        manifest = restore_backup(folder, opened, Blobs(settings.blobs), _report)
+    _print_manifest("restored", folder, manifest)
+
+
+def _report(line: str) -> None:
+    errors.print(line, markup=False)
+
+
+def _print_manifest(done: str, folder: Path, manifest: dict[str, Any]) -> None:
+    rows = {name: about["rows"] for name, about in manifest["tables"].items()}
+    output.print(
+        f"{folder} is {done}: {rows['jobs']} jobs, {rows['datasets']} data sets, {manifest['blobs']} files, "
+        f"of islands {manifest['islands']}",
+        markup=False,
+    )
 
 
 def _format_time(seconds: float) -> str:

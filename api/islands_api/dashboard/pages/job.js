@@ -5,7 +5,14 @@ import { askConfirmation } from "../components/confirm.js";
 import { makeConvergencePanel } from "../components/convergence.js";
 import { makeDatasetPanel, makeSettingsPanel } from "../components/dataset.js";
 import { isDiagnosis, makeFindingsPanel } from "../components/diagnosis.js";
-import { getIsolatedName, getName, getState, isEnded, makeBadge, makeProgressBar } from "../components/job_state.js";
+import {
+  getIsolatedName,
+  getName,
+  getState,
+  isEnded,
+  makeBadge,
+  makeProgressBar,
+} from "../components/job_state.js";
 import { makeModelsPanel } from "../components/models.js";
 import { download, getJson, sendRequest } from "../lib/api.js";
 import { formatUtc, makeAge } from "../lib/clock.js";

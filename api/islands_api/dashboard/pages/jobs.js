@@ -3,7 +3,15 @@
  * A page to submit jobs would be a module `submit.js` here, with a route in islands.js and a link below.
  */
 
-import { STATES, getIsolatedName, getName, getState, isEnded, makeBadge, makeProgressBar } from "../components/job_state.js";
+import {
+  STATES,
+  getIsolatedName,
+  getName,
+  getState,
+  isEnded,
+  makeBadge,
+  makeProgressBar,
+} from "../components/job_state.js";
 import { getJson } from "../lib/api.js";
 import { makeAge } from "../lib/clock.js";
 import { announce, el, setText } from "../lib/dom.js";

@@ -1,4 +1,4 @@
-"""Differences between SQLite and PostgreSQL: the clock of the database, and advisory locks."""
+"""Differences between SQLite and PostgreSQL: the clock of the database, snapshots and advisory locks."""
 
 from typing import Any
 
@@ -23,6 +23,15 @@ def _sqlite(_element: now, _compiler: Any, **_: Any) -> str:
 def _postgresql(_element: now, _compiler: Any, **_: Any) -> str:
     # SQL's own now() is constant within a transaction, and a group commit may take a while.
     return "EXTRACT(EPOCH FROM clock_timestamp())::float8"
+
+
+def begin_snapshot(connection: Connection) -> None:
+    """Let all statements of a new transaction see the state of the first one."""
+    # Readers of SQLite begin no transaction by themselves.
+    postgresql = connection.dialect.name == "postgresql"
+    connection.exec_driver_sql(
+        "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY" if postgresql else "BEGIN"
+    )
 
 
 #: First keys of the advisory locks of PostgreSQL, which separate these from the locks of other programs.
