@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo test ci nightly lint bench docs wheel wheel-matrix clean
+.PHONY: setup demo test ci nightly soak fuzz load lint bench docs wheel wheel-matrix clean
 
 setup: .venv/ready
 
@@ -34,11 +34,23 @@ ci: setup
 # Another order and other kills every day of the year.
 DAY = $(shell date +%j)
 
-# Everything else: the remaining slow tests, the properties with many examples, and 500 random kills of a service.
+# Everything else: the remaining slow tests, the properties with many examples, 500 random kills, and mutated files.
 nightly: setup
 	$(PYTEST) -n 2 --timeout 1200 --random-order --random-order-seed $(DAY) \
 		--hypothesis-profile thorough -m "nightly or hypothesis"
+	$(MAKE) soak fuzz
+
+# 500 random kills of a service: no job may be lost or duplicated, and results must be identical.
+soak: setup
 	$(BIN)/python benchmarks/service_soak.py --kills 500 --seed $(DAY)
+
+# Five minutes of mutated files for all readers of uploads.
+fuzz: setup
+	$(BIN)/python benchmarks/fuzz_readers.py --seconds 300 --seed $(DAY)
+
+# Figures of a service under load, on a machine that should be otherwise idle.
+load: setup
+	$(BIN)/python benchmarks/service_load.py --repeat 5
 
 lint: setup
 	$(BIN)/ruff format --check .

@@ -2,6 +2,7 @@
 
 import csv
 import zipfile
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import date, datetime, time, timedelta
@@ -27,7 +28,9 @@ _DAMAGED = (
     OSError,
     EOFError,
     SyntaxError,
+    NotImplementedError,
     zipfile.BadZipFile,
+    zlib.error,
 )
 
 
@@ -50,8 +53,8 @@ def read_workbook(path: Path, options: ReadingOptions = DEFAULT_READING) -> Deli
         raise RecordError(f"{file}: install islands[excel] to read XLSX, or save the sheet as CSV") from error
     if not zipfile.is_zipfile(path):
         raise RecordError(f"{file} is not a workbook of the format XLSX: save it again as XLSX or as CSV")
-    check_archive(path)
     try:
+        check_archive(path)
         book = load_workbook(path, read_only=True, data_only=True, keep_links=False)
         try:
             names = [sheet.title for sheet in book.worksheets]

@@ -80,6 +80,8 @@ def _iterate_tables(
     columns: dict[str, tuple[str, tuple[int, ...], str]] = {}
     inner = []
     for key in group:
+        if isinstance(key, bytes):
+            raise ValueError(f"the name {key!r} is not UTF-8")
         hard = group.id.links.get_info(key.encode()).type == h5py.h5l.TYPE_HARD
         member = group[key] if hard else None
         place = key if name == "/" else f"{name}/{key}"

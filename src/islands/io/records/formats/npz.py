@@ -2,6 +2,7 @@
 
 import math
 import struct
+import tokenize
 import weakref
 import zipfile
 import zlib
@@ -20,7 +21,10 @@ from islands.io.records.size_limits import RecordArchive, check_samples, check_s
 
 #: Exceptions that NumPy and the standard library raise for damaged archives and for Python objects in valid
 #: ones.
-UNREADABLE = (ValueError, OSError, EOFError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error)
+UNREADABLE = (
+    *(ValueError, OSError, EOFError, RuntimeError),
+    *(struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error),
+)
 
 #: Readers of an array's header by format version. Version 3 is for Unicode field names, which arrays of
 #: numbers do not have.

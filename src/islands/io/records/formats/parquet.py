@@ -64,7 +64,7 @@ def _translated_errors(file: str) -> Iterator[None]:
         ) from error
     try:
         yield
-    except (pyarrow.ArrowException, OSError) as error:
+    except (pyarrow.ArrowException, OSError, ValueError) as error:
         raise RecordError(f"{file} is damaged or not a Parquet file ({error}): write it again") from error
 
 

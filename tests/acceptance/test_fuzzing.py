@@ -1,0 +1,90 @@
+"""Mutated files are read or refused by every reader, and the search for defects finds planted ones."""
+
+import io
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from islands.errors import RecordError
+from islands.io.records import read_record
+from support.fuzzing import corpus, mutate, run_cases
+from support.odd_files import write_workbook
+from support.repository import ROOT
+
+#: The cases are the same at every run; `make fuzz` takes others every day.
+SEED = 1
+
+
+@pytest.mark.ci
+def test_every_reader_survives_mutated_files() -> None:
+    command = [sys.executable, ROOT / "benchmarks/fuzz_readers.py", "--cases", "300", "--seed", str(SEED)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    for suffix in (".csv", ".npz", ".mat", ".h5", ".xlsx", ".parquet", ".tdms"):
+        assert f"{suffix:10} {300:9,} cases" in done.stdout
+
+
+def _header_without_end(path: Path) -> None:
+    stream = io.BytesIO()
+    np.save(stream, np.arange(60.0))
+    with zipfile.ZipFile(path, "w") as archive:
+        for name in ("u_V", "y_um"):
+            archive.writestr(f"{name}.npy", stream.getvalue().replace(b"}", b" "))
+
+
+def _directory_of_a_workbook(path: Path) -> None:
+    write_workbook(path)
+    path.write_bytes(path.read_bytes().replace(b"PK\1\2", b"PK\1\3"))
+
+
+def _name_that_is_not_utf_8(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file[b"\xff\xfe"] = np.arange(60.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("r.npz", _header_without_end),
+        ("r.xlsx", _directory_of_a_workbook),
+        ("r.h5", _name_that_is_not_utf_8),
+    ],
+)
+def test_a_damage_that_libraries_do_not_expect_is_refused(
+    tmp_path: Path, name: str, write: Callable[[Path], None]
+) -> None:
+    """Found by mutations: the library raised another exception than for other damages."""
+    write(tmp_path / name)
+    with pytest.raises(RecordError, match=r"damaged|write it again|save it again"):
+        read_record(tmp_path / name, ["u_V"], "y_um")
+
+
+def test_a_case_is_the_same_at_every_run() -> None:
+    for suffix in (".csv", ".npz", ".xlsx", ".mat"):
+        cases = [mutate(suffix, SEED, case) for case in range(40)]
+        corpus.cache_clear()
+        time.sleep(0.01 if suffix == ".csv" else 1.1)  # formats have the time of writing in seconds
+        assert cases == [mutate(suffix, SEED, case) for case in range(40)]
+        assert len(set(cases)) > 30
+
+
+def test_another_exception_than_a_refusal_is_a_defect(tmp_path: Path) -> None:
+    def read(path: Path) -> None:
+        content = path.read_bytes()
+        if len(content) % 3 == 0:
+            raise RecordError("r.csv is damaged")
+        if len(content) % 3 == 1:
+            raise ValueError("planted")
+
+    found = list(run_cases(read, ".csv", SEED, range(30), tmp_path))
+    sizes = [len(mutate(".csv", SEED, case)) % 3 for case in range(30)]
+    assert [defect is not None for defect in found] == [size == 1 for size in sizes]
+    assert all("planted" in defect.reason for defect in found if defect is not None)
+    assert {0, 1, 2} == set(sizes)
