@@ -197,7 +197,7 @@ def store(repeat: int) -> Iterator[Figure]:
 
 
 def claim(repeat: int) -> Iterator[Figure]:
-    """Measure claims from a full queue: durable, in order of priority and age."""
+    """Measure claims from a full queue: durable, of 50 owners in turn, by priority and age."""
     middle, slow = [], []
     spec = json.dumps(SPEC)
     with tempfile.TemporaryDirectory() as folder, Store(f"sqlite:///{folder}/islands.db") as opened:

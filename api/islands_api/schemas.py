@@ -46,7 +46,9 @@ class JobMetadata(BaseModel):
     priority: Annotated[
         int,
         Field(
-            ge=PRIORITIES.start, le=PRIORITIES.stop - 1, description="Jobs with a higher priority run first."
+            ge=PRIORITIES.start,
+            le=PRIORITIES.stop - 1,
+            description="Of your own jobs, those with a higher priority run first.",
         ),
     ] = 0
 
@@ -149,7 +151,7 @@ class JobView(ResponseModel):
     started: datetime | None = None
     finished: datetime | None = None
     spec: dict[str, Any]
-    progress: dict[str, Any] | None = Field(default=None, description="Phase, and position in the queue.")
+    progress: dict[str, Any] | None = Field(default=None, description="Phase, and estimated position in the queue.")
     summary: dict[str, Any] | None = Field(default=None, description="Summary of the result.")
     problem: dict[str, Any] | None = Field(default=None, description="Why the job failed.")
     versions: dict[str, str | None] = Field(

@@ -75,6 +75,12 @@ class ServiceSettings(BaseSettings):
         Largest total size of the data sets of one owner.
     max_active
         Queued and running jobs of one owner.
+    max_running
+        Running jobs of one owner; further ones stay in the queue.
+    max_streams
+        Open event streams of one owner, of each API process.
+    max_drawings
+        Requests of one owner whose figures are being drawn or wait for it, of each API process.
     max_evaluations
         Individuals that one job may evaluate.
     max_islands
@@ -128,6 +134,9 @@ class ServiceSettings(BaseSettings):
     inspection_seconds: Positive = 120.0
     max_stored: Count = 5_000_000_000
     max_active: Count = 10_000
+    max_running: Count = 1000
+    max_streams: Count = 500
+    max_drawings: Count = 100
     max_evaluations: Count = 10_000_000_000
     max_islands: Count = 256
     max_job_memory: Annotated[int, Field(ge=0)] = 0

@@ -223,16 +223,19 @@ def test_actions_are_allowed_only_in_certain_states(service, action, state):
 
 
 def test_queued_jobs_show_their_position_among_those_of_all_owners(service, order):
-    first, second = (service.submit(**order, priority=each).json()["id"] for each in (0, 0))
+    first, second = (service.submit(**order, priority=each).json()["id"] for each in (1, 0))
     urgent = service.submit(service.key(owner="other"), **spec(kept(service.store, "other")), priority=7)
     assert urgent.status_code == 202
     listed = {
         each["id"]: each["progress"]["position"] for each in service.client.get("/v1/jobs").json()["items"]
     }
-    assert listed == {first: 2, second: 3}
+    # The owners have turns, whatever the priority.
+    assert listed == {first: 1, second: 3}
     assert service.client.get(f"/v1/jobs/{second}").json()["progress"]["position"] == 3
-    assert claimed(service.store).job.owner == "other"
+    assert claimed(service.store).job.id == first
     assert service.client.get(f"/v1/jobs/{second}").json()["progress"]["position"] == 2
+    assert claimed(service.store).job.owner == "other"
+    assert service.client.get(f"/v1/jobs/{second}").json()["progress"]["position"] == 1
 
 
 def test_cancelling_a_job_twice_is_allowed(service):

@@ -10,7 +10,7 @@ from islands_api.web.problems import PROBLEMS
 from islands_service.store.blobs import BlobNotFoundError
 from islands_service.store.database import CommitUnknownError
 from support.repository import DOCS
-from support.service import PROBLEM, problem_of, queued, run_identification, spec
+from support.service import PROBLEM, emptied, problem_of, queued, run_identification, spec
 
 FORM = {"type", "title", "status", "detail", "request_id"}
 
@@ -254,7 +254,7 @@ def test_no_problem_contains_a_path_of_the_machine(service):
     """Uploads are read in temporary folders, and blobs are in the data folder."""
     sent = [(b"", "a.csv"), (b"PK\x03\x04garbage", "a.npz"), (b"\x89HDF\r\n\x1a\n" + b"x" * 99, "a.mat")]
     answers = [service.upload(content, name) for content, name in [*sent, (b"PAR1xPAR1", "a.parquet")]]
-    job = run_identification(service)
+    job = run_identification(emptied(service))
     dataset = service.client.get(f"/v1/jobs/{job}").json()["spec"]["dataset"]
     for path in service.settings.blobs.glob("??/*"):
         path.unlink()

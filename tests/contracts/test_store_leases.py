@@ -1,8 +1,9 @@
 """Contract of the store with coordinators: order of claims, duration of leases, number of attempts."""
 
-import itertools
 import random
+from collections import Counter
 from contextlib import ExitStack
+from uuid import uuid4
 
 import pytest
 
@@ -11,6 +12,7 @@ from islands_service.store.job_rows.job_claims import ATTEMPTS
 from support.stores import (
     ALICE,
     BOB,
+    CANCELLED,
     EXPIRED,
     LONG,
     MANY,
@@ -63,19 +65,73 @@ def test_claimed_job_is_running(store):
     assert store.jobs.events(job.id)[-1].data == {"attempt": 1}
 
 
-def test_claims_follow_priority_and_age(store):
-    priorities = random.Random(4).choices([-100, -1, 0, 0, 3, 100], k=24)
-    jobs = [
-        submitted(store, owner, priority=each)
-        for each, owner in zip(priorities, itertools.cycle([ALICE, BOB]), strict=False)
-    ]
+def test_claims_of_an_owner_follow_priority_and_age(store):
+    priorities = random.Random(4).choices([-100, -1, 0, 0, 3, 100], k=12)
+    jobs = [submitted(store, priority=each) for each in priorities]
     for job in in_turn(jobs):
-        positions = store.leases.queue_positions(jobs)
-        assert min(positions, key=positions.__getitem__) == job.id
         assert claimed(store).job.id == job.id
-        jobs[jobs.index(job)] = store.jobs.get(job.owner, job.id)
-        assert sorted(positions.values()) == list(range(1, len(positions) + 1))
     assert store.leases.claim("another", LONG) is None
+
+
+def test_priority_of_an_owner_does_not_delay_others(store):
+    urgent = in_turn(submitted(store, ALICE, priority=100) for _ in range(3))
+    normal = in_turn(submitted(store, BOB, priority=-100) for _ in range(3))
+    order = [claimed(store).job.id for _ in range(6)]
+    assert order == [job.id for pair in zip(urgent, normal, strict=True) for job in pair]
+
+
+def test_lost_job_continues_first_and_is_not_counted_again(store):
+    """Its owner has had the turn already."""
+    lost = submitted(store, priority=1)
+    first, second = in_turn(submitted(store) for _ in range(2))
+    other = submitted(store, BOB)
+    claimed(store, EXPIRED, "gone")
+    assert claimed(store).job.id == lost.id
+    assert [claimed(store).job.id for _ in range(3)] == [other.id, first.id, second.id]
+
+
+@pytest.mark.parametrize("own", [None, 2])
+def test_owner_with_its_quota_of_running_jobs_waits_and_others_do_not(store, own):
+    """The quota that is set precedes the one of the coordinator."""
+    most = 2 if own is None else 1000
+    jobs = [submitted(store) for _ in range(4)]
+    if own is not None:
+        store.owners.change(ALICE, {"max_running": own})
+    other = submitted(store, BOB)
+
+    def claim():
+        return store.leases.claim(uuid4().hex, LONG, most_running=most)
+
+    leases = [claim() for _ in range(3)]
+    assert sorted(lease.job.owner for lease in leases) == [ALICE, ALICE, BOB]
+    assert claim() is None
+    finished = next(lease for lease in leases if lease.job.owner == ALICE)
+    store.leases.finish(finished, CANCELLED)
+    assert claim().job.id in {job.id for job in jobs}
+    assert claim() is None
+    assert other.id in {lease.job.id for lease in leases}
+
+
+def test_concurrent_claims_serve_owners_equally(database):
+    with open_stores(database) as stores:
+        for owner in (ALICE, BOB):
+            for _ in range(MANY):
+                submitted(stores[0], owner)
+        leases = at_once([lambda store=stores[i % 4]: claimed(store) for i in range(MANY)])
+        assert Counter(lease.job.owner for lease in leases) == {ALICE: MANY // 2, BOB: MANY // 2}
+
+
+def test_concurrent_claims_do_not_exceed_the_quota_of_running_jobs(database):
+    with open_stores(database) as stores:
+        for _ in range(MANY):
+            submitted(stores[0])
+        answers = at_once(
+            [
+                lambda store=stores[i % 4], i=i: store.leases.claim(f"{i}", LONG, most_running=3)
+                for i in range(MANY)
+            ]
+        )
+        assert sum(lease is not None for lease in answers) == 3
 
 
 def test_every_job_is_claimed_once_by_concurrent_claimers(database):
@@ -154,20 +210,6 @@ def test_job_leased_under_the_same_name_is_taken_over_at_once(store):
     assert store.leases.claim("two", LONG) is None
     again = claimed(store, LONG, "one")
     assert (again.job.id, again.epoch) == (job.id, 2)
-
-
-def test_expired_jobs_and_queued_jobs_share_one_order(store):
-    """An expired job is neither delayed nor claimed before a higher priority."""
-    for order in itertools.permutations(range(3)):
-        jobs = {priority: submitted(store, priority=priority) for priority in order}
-        for _ in order:
-            claimed(store, EXPIRED, "gone")
-            store.jobs.cancel(ALICE, submitted(store, priority=-5).id)
-        waiting = submitted(store, priority=1)
-        expected = in_turn([*jobs.values(), waiting])
-        assert [claimed(store, LONG, f"{order} {each}").job.id for each in range(4)] == [
-            job.id for job in expected
-        ]
 
 
 def test_renewal_keeps_a_job(store):

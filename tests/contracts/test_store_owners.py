@@ -60,7 +60,7 @@ def test_operation_is_allowed_only_in_its_states(store, ask, state):
     answer = getattr(store.jobs, ask)(ALICE, job.id)
     following = ALLOWED[ask][state]
     if following is None:
-        assert not any(contents(store).values())
+        assert {table for table, rows in contents(store).items() if rows} <= {"owners"}
     else:
         assert answer == store.jobs.get(ALICE, job.id)
         assert (answer.state, answer.version) == (following, job.version + 1)

@@ -33,8 +33,10 @@ from islands_service.domain.job import (
     LeaseLostError,
     QuotaError,
 )
+from islands_service.domain.owner import DEFAULT_WEIGHT
 from islands_service.store import Store
 from islands_service.store.job_rows import job_claims
+from islands_service.store.job_rows.fair_queue import STRIDE
 from support.databases import emptied
 from support.stores import ALICE, BOB, CANCELLED, EXPIRED, FAILED, FOUND, LONG, asked, brought_on
 
@@ -80,6 +82,7 @@ class Machine(RuleBasedStateMachine):
         self.stores = [Store(url), Store(url)]
         self.jobs = {}
         self.retired = {}  # priorities of deleted jobs, by owner and idempotency key
+        self.tags = {ALICE: -1, BOB: -1}  # start tag of the last claim of each owner
         self.turn = count()
 
     @property
@@ -130,15 +133,11 @@ class Machine(RuleBasedStateMachine):
     @rule(target=leases, name=st.sampled_from("xyz"), seconds=lasting, version=versions)
     def claim(self, name, seconds, version):
         lease = self.store.leases.claim(name, seconds, version)
-        waiting = [
-            (-each.priority, each.created, job)
-            for job, each in self.jobs.items()
-            if (each.state == JobState.QUEUED and version not in each.declined)
-            or (each.state == JobState.RUNNING and (each.expired or each.holder == name))
-        ]
-        for *_, job in sorted(waiting):
+        for job, owner in self.in_turn(name, version):
             known = self.jobs[job]
             if known.stalled < ATTEMPTS:
+                if owner is not None:
+                    self.tags[owner] = max(self.next_tag(owner), *self.tags.values())
                 known.attempt, known.stalled = known.attempt + 1, known.stalled + 1
                 known.epoch, known.holder, known.expired = known.epoch + 1, name, seconds == EXPIRED
                 known.becomes(JobState.RUNNING)
@@ -147,6 +146,23 @@ class Machine(RuleBasedStateMachine):
             known.becomes(JobState.CANCELLED if known.cancel else JobState.FAILED)
         assert lease is None
         return multiple()
+
+    def in_turn(self, name, version):
+        """Return the jobs that can be claimed in order; with their owners, if a claim is one of these."""
+        lost = [
+            (each.created, job)
+            for job, each in self.jobs.items()
+            if each.state == JobState.RUNNING and (each.expired or each.holder == name)
+        ]
+        queued = [
+            (self.next_tag(each.owner), each.owner, -each.priority, each.created, job)
+            for job, each in self.jobs.items()
+            if each.state == JobState.QUEUED and version not in each.declined
+        ]
+        return [(job, None) for _, job in sorted(lost)] + [(each[-1], each[1]) for each in sorted(queued)]
+
+    def next_tag(self, owner):
+        return self.tags[owner] + STRIDE // DEFAULT_WEIGHT if self.tags[owner] >= 0 else 0
 
     def held(self, lease, write):
         """Do something under a lease; return what is known of its job if the lease counts."""

@@ -114,7 +114,9 @@ class Coordinator:
     def _claim_next(self) -> None:
         try:
             self._sweep_if_due()
-            lease = self._store.leases.claim(self._name, self._settings.lease)
+            lease = self._store.leases.claim(
+                self._name, self._settings.lease, most_running=self._settings.max_running
+            )
             if lease is None:
                 self._idle()
         except StoreError as error:

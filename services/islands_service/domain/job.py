@@ -125,7 +125,7 @@ class Submission:
     name : str
         Display name.
     priority : int
-        Jobs of higher priority run first; one of `PRIORITIES`.
+        Of the jobs of an owner, those of higher priority run first; one of `PRIORITIES`.
     idempotency_key : str, optional
         A repeated request with the same key returns the same job.
     """

@@ -26,6 +26,7 @@ class Action(StrEnum):
     DELETE_DATASET = "delete-dataset"
     CREATE_KEY = "create-key"
     REVOKE_KEY = "revoke-key"
+    CHANGE_OWNER = "change-owner"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +40,13 @@ class AuditEntry:
     action : str
         One of `Action`; a newer version may have others.
     owner, subject : str
-        Owner, and id, of the job, the data set or the key.
+        Owner, and id, of the job, the data set or the key; the owner is its own subject.
     key_id : str or None
         Key of the request; None if it needed none.
     address : str
         Address of the client, or ``command line``.
+    details : str or None
+        New values of a changed owner as JSON.
     """
 
     at: float
@@ -52,6 +55,7 @@ class AuditEntry:
     subject: str
     key_id: str | None
     address: str
+    details: str | None = None
 
 
 class AuditTrail:
@@ -76,7 +80,9 @@ class AuditTrail:
             query = query.where(audit.c.at >= since)
         with self._database.read() as connection:
             return tuple(
-                AuditEntry(row.at, row.action, row.owner, row.subject, row.key_id, row.address)
+                AuditEntry(
+                    row.at, row.action, row.owner, row.subject, row.key_id, row.address, row.details
+                )
                 for row in connection.execute(query)
             )
 
@@ -89,7 +95,12 @@ _MAX_ADDRESS = 64
 
 
 def record_change(
-    connection: Connection, action: Action, owner: str, subject: str, by: Requester | None
+    connection: Connection,
+    action: Action,
+    owner: str,
+    subject: str,
+    by: Requester | None,
+    details: str | None = None,
 ) -> None:
     """Add an entry in the transaction of the change. None is a change by the service itself."""
     if by is None:
@@ -100,5 +111,6 @@ def record_change(
         "subject": subject,
         "key_id": by.key,
         "address": by.address[:_MAX_ADDRESS],
+        "details": details,
     }
     connection.execute(_INSERT_ENTRY, values)

@@ -15,7 +15,7 @@ from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
 from islands_service.store.job_rows.job_deletion import delete_unused_datasets
-from islands_service.store.tables import datasets, jobs
+from islands_service.store.tables import datasets, jobs, owners
 
 
 class DatasetNotFoundError(IslandsError):
@@ -83,7 +83,7 @@ class Datasets:
         Raises
         ------
         QuotaError
-            The data sets of the owner would exceed ``most_bytes``.
+            The data sets of the owner would exceed its quota, ``most_bytes`` unless another one is set.
         """
         identity = dataset_id(blob, suffix, preview.get("reading"))
 
@@ -247,6 +247,8 @@ def _sum_bytes(connection: Connection, owner: str) -> tuple[int, int]:
 def _check_quota(connection: Connection, owner: str, size: int, most: int) -> None:
     listed, kept = _sum_bytes(connection, owner)
     used = listed + kept
+    own = connection.execute(select(owners.c.max_stored).where(owners.c.name == owner)).scalar()
+    most = most if own is None else own
     if used + size > most:
         advice = "delete some"
         if kept:

@@ -80,7 +80,7 @@ class Jobs:
         JobDeletedError
             The job of the key was deleted.
         QuotaError
-            The owner has ``most_active`` unfinished jobs.
+            The owner has as many unfinished jobs as its quota, ``most_active`` unless another one is set.
         StoreUnavailableError, StorageFullError
             The job was not accepted.
         """
@@ -195,7 +195,7 @@ class Jobs:
         DatasetDeletedError
             A data set of the job was deleted.
         QuotaError
-            The owner has ``most_active`` unfinished jobs.
+            See `submit`.
         """
 
         def operation(connection: Connection) -> Job:

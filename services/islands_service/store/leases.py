@@ -22,7 +22,8 @@ from islands_service.domain.job import (
 )
 from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.job_rows.job_claims import claim_job, count_earlier_claims
+from islands_service.store.job_rows.fair_queue import estimate_positions
+from islands_service.store.job_rows.job_claims import claim_job
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document
 from islands_service.store.tables import artefacts, events, jobs, models, points, results
 
@@ -41,23 +42,35 @@ class Leases:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def claim(self, owner: str, seconds: float, version: str = ISLANDS_VERSION) -> Lease | None:
-        """Claim the oldest job of the highest priority; None if no job can be claimed.
+    def claim(
+        self,
+        coordinator: str,
+        seconds: float,
+        version: str = ISLANDS_VERSION,
+        most_running: int | None = None,
+    ) -> Lease | None:
+        """Claim a job; None if no job can be claimed.
 
-        A running job can be claimed if its lease has expired, or if its owner has the same name: only one
-        process at a time has a name, so the previous one must have ended. A queued job cannot be claimed
-        while it waits for a repeated attempt, or if a coordinator of this version has declined it.
+        First come running jobs whose lease has expired, or whose coordinator has the same name: only one
+        process at a time has a name, so the previous one must have ended. Then the owners with queued jobs
+        are served in turn, in proportion to their weights (`job_rows.fair_queue`); of each the oldest job of
+        the highest priority. A queued job cannot be claimed while it waits for a repeated attempt, or if a
+        coordinator of this version has declined it.
 
         Parameters
         ----------
-        owner : str
+        coordinator : str
             Name of the coordinator.
         seconds : float
             Duration of the lease; `renew` extends it.
         version : str
             Version of islands of the coordinator.
+        most_running : int, optional
+            Quota of running jobs of an owner for which none was set; unlimited by default.
         """
-        return self._database.write(lambda connection: claim_job(connection, owner, seconds, version))
+        return self._database.write(
+            lambda connection: claim_job(connection, coordinator, seconds, version, most_running)
+        )
 
     def renew(self, lease: Lease, seconds: float) -> bool:
         """Extend a lease; return whether cancellation of the job is requested.
@@ -77,13 +90,12 @@ class Leases:
         return self._database.write(operation)
 
     def queue_positions(self, found: Iterable[Job]) -> dict[str, int]:
-        """Return the positions of the queued ones of some jobs in the order of claims; 1 is claimed next."""
+        """Estimate the positions of the queued ones of some jobs in the order of claims; 1 is claimed next.
+
+        They hold if every queued job can be claimed, and no other one arrives.
+        """
         with self._database.read() as connection:
-            return {
-                job.id: 1 + count_earlier_claims(connection, job)
-                for job in found
-                if job.state == JobState.QUEUED
-            }
+            return estimate_positions(connection, found)
 
     def is_cancel_requested(self, lease: Lease) -> bool:
         """Return whether cancellation of a job is requested; the lease is neither checked nor extended."""

@@ -9,6 +9,7 @@ from islands_service.store.jobs import Jobs
 from islands_service.store.keys import Keys
 from islands_service.store.leases import Leases
 from islands_service.store.migrations.upgrade import prepare
+from islands_service.store.owners import Owners
 from islands_service.store.results import Results
 from islands_service.store.retention import Retention
 
@@ -47,6 +48,7 @@ class Store:
         self.results = Results(self.database)
         self.datasets = Datasets(self.database)
         self.keys = Keys(self.database)
+        self.owners = Owners(self.database)
         self.retention = Retention(self.database)
         self.audit = AuditTrail(self.database)
 

@@ -16,6 +16,8 @@ from sqlalchemy import (
     text,
 )
 
+from islands_service.domain.owner import DEFAULT_WEIGHT, QUOTA_NAMES
+
 #: Constraints are named, because a migration cannot change an unnamed one.
 metadata = MetaData(
     naming_convention={
@@ -73,8 +75,8 @@ jobs = Table(
     Index(None, "owner", "state", "created", "id"),
 )
 
-#: Order of the queue.
-Index("ix_jobs_queue", jobs.c.state, jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
+#: Owners with queued jobs, and the order of the jobs of each.
+Index("ix_jobs_queue", jobs.c.state, jobs.c.owner, jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
 
 #: Events of jobs. The number is the version of the job: without gaps, in the order of the commits.
 events = Table(
@@ -159,6 +161,19 @@ keys = Table(
     Column("revoked", Float),
 )
 
+#: Owners with a weight, a quota or a claimed job. All others have the defaults.
+owners = Table(
+    "owners",
+    metadata,
+    Column("name", String(64), primary_key=True),
+    Column("weight", Integer, nullable=False, default=DEFAULT_WEIGHT),
+    # Start tag of the last claim: see `job_rows.fair_queue`.
+    Column("virtual_time", BigInteger),
+    # Quotas; null is the default of the settings.
+    *(Column(name, BigInteger) for name in QUOTA_NAMES),
+    Index(None, "virtual_time"),
+)
+
 #: Changes that clients and operators have requested.
 audit = Table(
     "audit",
@@ -167,11 +182,13 @@ audit = Table(
     Column("at", Float, nullable=False),
     Column("action", String(32), nullable=False),
     Column("owner", String(64), nullable=False),
-    # Id of the job, the data set or the key.
+    # Id of the job, the data set or the key, or name of the owner.
     Column("subject", String(64), nullable=False),
     # Key of the request; null without one.
     Column("key_id", String(16)),
     Column("address", String(64), nullable=False),
+    # New values of a changed owner.
+    Column("details", Text),
     Index(None, "at"),
     Index(None, "owner", "at"),
 )

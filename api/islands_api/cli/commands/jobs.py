@@ -33,7 +33,7 @@ ApiKey = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Name = Annotated[str, typer.Option("--name", help="Name of the job, for display.")]
-Priority = Annotated[int, typer.Option("--priority", help="Jobs of higher priority run first.")]
+Priority = Annotated[int, typer.Option("--priority", help="Of your own jobs, higher ones run first.")]
 IdempotencyKey = Annotated[
     str | None,
     typer.Option("--idempotency-key", help="Submitting again with the same key returns the same job."),

@@ -1,8 +1,10 @@
-"""Differences between SQLite and PostgreSQL: the clock of the database, snapshots and advisory locks."""
+"""Differences between SQLite and PostgreSQL: clock of the database, snapshots, upserts, advisory locks."""
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from sqlalchemy import Connection, Float, func, select
+from sqlalchemy import Connection, Float, Table, func, select
+from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.functions import FunctionElement
 
@@ -37,6 +39,10 @@ def begin_snapshot(connection: Connection) -> None:
 #: First keys of the advisory locks of PostgreSQL, which separate these from the locks of other programs.
 _MIGRATION_LOCK = 7_241_563
 _OWNER_LOCK = 7_241_564
+_CLAIM_LOCK = 7_241_565
+
+
+_INSERTS: Mapping[str, Callable[[Table], Any]] = {"postgresql": postgresql.insert, "sqlite": sqlite.insert}
 
 
 def lock_migration(connection: Connection) -> None:
@@ -51,6 +57,21 @@ def lock_owner(connection: Connection, owner: str) -> None:
     the quota check, or use the same idempotency key.
     """
     _lock(connection, _OWNER_LOCK, owner)
+
+
+def lock_claims(connection: Connection) -> None:
+    """Hold the lock of claims until the transaction ends.
+
+    Without it two coordinators could serve the same owner in the same turn, or exceed its quota of running
+    jobs. No transaction that holds it waits for another lock for longer than a commit.
+    """
+    _lock(connection, _CLAIM_LOCK, "")
+
+
+def upsert(connection: Connection, table: Table, key: Mapping[str, Any], values: Mapping[str, Any]) -> None:
+    """Update the columns of the row with a primary key, or insert the row."""
+    statement = _INSERTS[connection.dialect.name](table).values(**key, **values)
+    connection.execute(statement.on_conflict_do_update(index_elements=list(key), set_=dict(values)))
 
 
 def _lock(connection: Connection, purpose: int, name: str) -> None:

@@ -1,17 +1,26 @@
-"""Claims of jobs: the order of the queue, and the end of a job without progress."""
+"""Claims of jobs, and the end of a job without progress."""
 
 import json
 from typing import Any
 
-from sqlalchemy import Connection, and_, func, or_, select, tuple_
+from sqlalchemy import Connection, Row, Select, func, or_, select
 
-from islands_service.domain.job import Job, JobState, Lease
+from islands_service.domain.job import JobState, Lease
+from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
+from islands_service.store.job_rows.fair_queue import charge_owner, rank_owners
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document, update_job
 from islands_service.store.tables import jobs
 
 #: Attempts since the last checkpoint after which a job is given up.
 ATTEMPTS = 5
+
+#: A job that no other transaction has locked.
+_CANDIDATE: Select[Any] = (
+    select(jobs.c.id, jobs.c.stalled, jobs.c.cancel_requested, jobs.c.progress)
+    .limit(1)
+    .with_for_update(skip_locked=True)
+)
 
 #: Problem of a job that failed after `ATTEMPTS` attempts.
 GAVE_UP = {
@@ -22,56 +31,56 @@ GAVE_UP = {
 }
 
 
-def claim_job(connection: Connection, owner: str, seconds: float, version: str) -> Lease | None:
-    """Claim the first job of the queue; see `Leases.claim`."""
-    queued = and_(
-        jobs.c.state == JobState.QUEUED,
-        jobs.c.not_before <= now(),
-        ~jobs.c.declined.contains(f",{version},", autoescape=True),
-    )
-    lost = and_(
-        jobs.c.state == JobState.RUNNING, or_(jobs.c.lease_until < now(), jobs.c.lease_owner == owner)
-    )
-    # A condition for both states would sort all queued jobs. That for one state reads them in order from an
-    # index, and lost leases are rare.
-    any_lost = connection.execute(select(jobs.c.id).where(lost).limit(1)).one_or_none() is not None
-    first = (
-        select(jobs.c.id, jobs.c.stalled, jobs.c.cancel_requested, jobs.c.progress)
-        .where(or_(queued, lost) if any_lost else queued)
-        .order_by(jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
-        .limit(1)
-        .with_for_update(skip_locked=True)
-    )
-    while (found := connection.execute(first).one_or_none()) is not None:
-        if found.stalled >= ATTEMPTS:
-            _give_up(connection, found)
-            continue
-        row = update_job(
-            connection,
-            found.id,
-            state=JobState.RUNNING,
-            lease_owner=owner,
-            lease_epoch=jobs.c.lease_epoch + 1,
-            lease_until=now() + seconds,
-            attempt=jobs.c.attempt + 1,
-            stalled=jobs.c.stalled + 1,
-            started=func.coalesce(jobs.c.started, now()),
-        )
-        append_event(connection, row, "running", json.dumps({"attempt": row.attempt}))
-        return Lease(job_from_row(row), row.lease_epoch)
+def claim_job(
+    connection: Connection, coordinator: str, seconds: float, version: str, most_running: int | None
+) -> Lease | None:
+    """Claim a lost job, or the first queued job of the owner whose turn it is; see `Leases.claim`."""
+    while (found := _select_lost(connection, coordinator)) is not None:
+        if found.stalled < ATTEMPTS:
+            return _lease_job(connection, found.id, coordinator, seconds)
+        _give_up(connection, found)
+    dialect.lock_claims(connection)
+    with rank_owners(connection, most_running) as turns:
+        for turn in turns:
+            while (found := _select_queued(connection, turn.name, version)) is not None:
+                if found.stalled < ATTEMPTS:
+                    charge_owner(connection, turn)
+                    return _lease_job(connection, found.id, coordinator, seconds)
+                _give_up(connection, found)
     return None
 
 
-def count_earlier_claims(connection: Connection, job: Job) -> int:
-    """Return the number of queued jobs of all owners that precede a queued job in the order of claims."""
-    # Two counts, each of a range of the index.
-    queued = select(func.count()).where(jobs.c.state == JobState.QUEUED)
-    higher = queued.where(jobs.c.priority > job.priority)
-    older = queued.where(
-        jobs.c.priority == job.priority, tuple_(jobs.c.created, jobs.c.id) < tuple_(job.created, job.id)
+def _select_lost(connection: Connection, coordinator: str) -> Row[Any] | None:
+    """Return a running job whose coordinator has ended. Its owner has had the turn already."""
+    ended = or_(jobs.c.lease_until < now(), jobs.c.lease_owner == coordinator)
+    query = _CANDIDATE.where(jobs.c.state == JobState.RUNNING, ended).order_by(jobs.c.created, jobs.c.id)
+    return connection.execute(query).one_or_none()
+
+
+def _select_queued(connection: Connection, owner: str, version: str) -> Row[Any] | None:
+    query = _CANDIDATE.where(
+        jobs.c.state == JobState.QUEUED,
+        jobs.c.owner == owner,
+        jobs.c.not_before <= now(),
+        ~jobs.c.declined.contains(f",{version},", autoescape=True),
+    ).order_by(jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
+    return connection.execute(query).one_or_none()
+
+
+def _lease_job(connection: Connection, job: str, coordinator: str, seconds: float) -> Lease:
+    row = update_job(
+        connection,
+        job,
+        state=JobState.RUNNING,
+        lease_owner=coordinator,
+        lease_epoch=jobs.c.lease_epoch + 1,
+        lease_until=now() + seconds,
+        attempt=jobs.c.attempt + 1,
+        stalled=jobs.c.stalled + 1,
+        started=func.coalesce(jobs.c.started, now()),
     )
-    counts = select(higher.scalar_subquery(), older.scalar_subquery())
-    return sum(connection.execute(counts).one())
+    append_event(connection, row, "running", json.dumps({"attempt": row.attempt}))
+    return Lease(job_from_row(row), row.lease_epoch)
 
 
 def _give_up(connection: Connection, job: Any) -> None:

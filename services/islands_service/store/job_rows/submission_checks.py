@@ -14,7 +14,7 @@ from islands_service.domain.job import (
     Submission,
 )
 from islands_service.store.job_rows.job_events import job_from_row
-from islands_service.store.tables import datasets, jobs, retired_keys
+from islands_service.store.tables import datasets, jobs, owners, retired_keys
 
 
 def request_digest(submission: Submission) -> str:
@@ -85,15 +85,18 @@ def check_datasets(connection: Connection, job: Job) -> None:
 
 
 def check_quota(connection: Connection, owner: str, most: int) -> None:
-    """Raise an error if an owner already has ``most`` active jobs.
+    """Raise an error if an owner already has as many active jobs as its quota, ``most`` by default.
 
     Raises
     ------
     QuotaError
     """
-    active = connection.execute(
-        select(func.count()).select_from(jobs).where(jobs.c.owner == owner, jobs.c.state.in_(ACTIVE))
-    ).scalar_one()
+    own = select(owners.c.max_active).where(owners.c.name == owner).scalar_subquery()
+    active, most = connection.execute(
+        select(func.count(), func.coalesce(own, most))
+        .select_from(jobs)
+        .where(jobs.c.owner == owner, jobs.c.state.in_(ACTIVE))
+    ).one()
     if active >= most:
         raise QuotaError(
             f"{active} jobs are waiting or running, and {most} is the most: wait for some, or cancel some"

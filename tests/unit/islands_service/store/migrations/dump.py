@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[4]))
 from islands_service.domain.job import Requester
 from islands_service.store import Store
 from islands_service.store.migrations.upgrade import HEAD
-from support.stores import ALICE, BLOB, BOB, FAILED, FOUND, brought_on, claimed, submitted
+from support.stores import ALICE, BLOB, BOB, EXPIRED, FAILED, FOUND, brought_on, claimed, submitted
 
 FOLDER = Path(__file__).parent
 
@@ -36,7 +36,7 @@ def fill(store: Store) -> None:
     store.jobs.cancel(ALICE, deleted.id, Requester("192.0.2.1", "0123456789abcdef"))
     store.jobs.delete(ALICE, deleted.id, Requester("command line"))
     submitted(store, priority=-7)
-    store.leases.report(claimed(store), brought_on(5))
+    store.leases.report(claimed(store, EXPIRED), brought_on(5))
     submitted(store, BOB, priority=100, spec={"value": 0.1 + 0.2})
 
 

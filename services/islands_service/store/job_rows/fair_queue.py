@@ -1,0 +1,171 @@
+"""Order of the owners in the queue: start-time fair queueing.
+
+Every claim of an owner has a start tag, the virtual time of the owner: the larger one of the start tag of its
+last claim plus ``STRIDE / weight``, and of the virtual time of the queue, which is the largest start tag of
+all claims. The owner with the smallest tag is served. Owners with queued jobs therefore get claims in
+proportion to their weights, and an owner that has been idle gets no credit for that time.
+
+Between two claims of owner ``i`` that always has a job that can be claimed, owner ``j`` gets at most
+``1 + w_j / w_i`` claims, whatever the number of its jobs: its tags in that time are ``STRIDE / w_j`` apart
+and in an interval of the length ``STRIDE / w_i``. No owner waits for ever. Two owners with equal weights get
+claims in turn.
+
+Tags are integers, so that sums of many strides are exact.
+
+References
+----------
+.. [1] P. Goyal, H. M. Vin, H. Cheng, "Start-time fair queueing: a scheduling algorithm for integrated
+   services packet switching networks", IEEE/ACM Transactions on Networking 5 (1997), theorem 1.
+.. [2] C. A. Waldspurger, W. E. Weihl, "Stride scheduling", MIT/LCS/TM-528 (1995).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import (
+    CTE,
+    BigInteger,
+    Connection,
+    CursorResult,
+    Float,
+    Row,
+    Select,
+    String,
+    bindparam,
+    func,
+    literal,
+    or_,
+    select,
+    tuple_,
+)
+
+from islands_service.domain.job import Job, JobState
+from islands_service.domain.owner import DEFAULT_WEIGHT
+from islands_service.store.backends import dialect
+from islands_service.store.tables import jobs, owners
+
+#: Virtual time between two claims of an owner with weight 1.
+STRIDE = 10**9
+
+#: Least tag of the next claim of an owner; 0 before its first claim.
+_NEXT = func.coalesce(owners.c.virtual_time + literal(STRIDE) // owners.c.weight, 0)
+
+#: Virtual time of the queue.
+_NOW = func.coalesce(select(func.max(owners.c.virtual_time)).scalar_subquery(), 0)
+
+_QUEUED = jobs.c.state == JobState.QUEUED
+
+
+def _select_waiting() -> CTE:
+    """Return a query for the owners with queued jobs, and null.
+
+    It searches the index once for each owner, whatever the number of its jobs: DISTINCT would read them all.
+    """
+    least = select(func.min(jobs.c.owner).label("owner")).where(_QUEUED)
+    waiting = least.cte("waiting", recursive=True)
+    following = least.where(jobs.c.owner > waiting.c.owner).correlate(waiting).scalar_subquery()
+    return waiting.union_all(select(following).where(waiting.c.owner.is_not(None)))
+
+
+def _select_ranked() -> Select[Any]:
+    waiting = _select_waiting()
+    running = (
+        select(jobs.c.owner, func.count().label("count"))
+        .where(jobs.c.state == JobState.RUNNING)
+        .group_by(jobs.c.owner)
+        .subquery()
+    )
+    most = func.coalesce(owners.c.max_running, bindparam("most_running", type_=BigInteger))
+    return (
+        select(waiting.c.owner.label("name"), _NEXT.label("next"), _NOW.label("now"))
+        .outerjoin(owners, owners.c.name == waiting.c.owner)
+        .outerjoin(running, running.c.owner == waiting.c.owner)
+        .where(waiting.c.owner.is_not(None))
+        .where(or_(most.is_(None), func.coalesce(running.c.count, 0) < most))
+        .order_by("next", "name")
+    )
+
+
+def _select_backlogs() -> Select[Any]:
+    waiting = (
+        select(jobs.c.owner, func.count().label("count")).where(_QUEUED).group_by(jobs.c.owner).subquery()
+    )
+    weight = func.coalesce(owners.c.weight, DEFAULT_WEIGHT)
+    return select(
+        waiting.c.owner.label("name"), _NEXT.label("next"), _NOW.label("now"), weight, waiting.c.count
+    ).outerjoin(owners, owners.c.name == waiting.c.owner)
+
+
+def _select_own_earlier() -> Select[Any]:
+    """Return a query for the number of queued jobs of an owner that precede one of its jobs."""
+    mine = select(func.count()).where(_QUEUED, jobs.c.owner == bindparam("owner"))
+    # Two counts, each of a range of the index.
+    higher = mine.where(jobs.c.priority > bindparam("priority"))
+    place = tuple_(bindparam("created", type_=Float), bindparam("id", type_=String))
+    older = mine.where(jobs.c.priority == bindparam("priority"), tuple_(jobs.c.created, jobs.c.id) < place)
+    return select(higher.scalar_subquery() + older.scalar_subquery())
+
+
+# Built once, since building them takes as long as executing them.
+_RANKED, _BACKLOGS, _OWN_EARLIER = _select_ranked(), _select_backlogs(), _select_own_earlier()
+
+
+def rank_owners(connection: Connection, most_running: int | None) -> CursorResult[Any]:
+    """Return the owners with queued jobs in the order of their turns: ``name``, ``next`` and ``now``.
+
+    Parameters
+    ----------
+    most_running : int, optional
+        Quota of running jobs of an owner that has no other one. Owners that have used it up are omitted.
+    """
+    return connection.execute(_RANKED, {"most_running": most_running})
+
+
+def charge_owner(connection: Connection, turn: Row[Any]) -> None:
+    """Count a claim of an owner, given its row of `rank_owners`."""
+    dialect.upsert(connection, owners, {"name": turn.name}, {"virtual_time": max(turn.next, turn.now)})
+
+
+def estimate_positions(connection: Connection, found: Iterable[Job]) -> dict[str, int]:
+    """Return the positions of the queued ones of some jobs in the order of claims; 1 is claimed next.
+
+    They hold if every queued job can be claimed, and no other one arrives.
+    """
+    backlogs = {row.name: _Backlog(*row) for row in connection.execute(_BACKLOGS)}
+    return {
+        job.id: 1 + _count_earlier(connection, job, backlogs)
+        for job in found
+        if job.state == JobState.QUEUED and job.owner in backlogs
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Backlog:
+    """Queued jobs of an owner, and the tags of their claims."""
+
+    name: str
+    next: int
+    now: int
+    weight: int
+    count: int
+
+    def tag(self, number: int) -> tuple[int, str]:
+        """Return the tag of a claim, counted from 0. Tags of all owners order the claims."""
+        if number == 0:
+            return self.next, self.name
+        return max(self.next, self.now) + number * (STRIDE // self.weight), self.name
+
+    def count_before(self, tag: tuple[int, str]) -> int:
+        """Return the number of claims of this owner before the claim of another owner with a tag."""
+        if self.tag(0) > tag:
+            return 0
+        latest = tag[0] - (self.name > tag[1])
+        return min(self.count, 1 + max(0, (latest - max(self.next, self.now)) // (STRIDE // self.weight)))
+
+
+def _count_earlier(connection: Connection, job: Job, backlogs: dict[str, _Backlog]) -> int:
+    values = {"owner": job.owner, "priority": job.priority, "created": job.created, "id": job.id}
+    own: int = connection.execute(_OWN_EARLIER, values).scalar_one()
+    tag = backlogs[job.owner].tag(own)
+    return own + sum(each.count_before(tag) for each in backlogs.values() if each.name != job.owner)

@@ -1,0 +1,161 @@
+"""Laws of the fair queue between owners, in any order of submissions and claims."""
+
+import shutil
+import time
+from collections import Counter
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sqlalchemy import delete, insert
+
+from islands_service.store import Store
+from islands_service.store.tables import events, jobs, owners
+from support.stores import claimed
+
+OWNERS = "abcd"
+
+weights = st.dictionaries(st.sampled_from(OWNERS), st.integers(1, 400), min_size=2)
+
+# An example takes a hundred statements.
+few = settings(max_examples=12)
+
+
+@pytest.fixture(scope="module")
+def fair(prepared_sqlite, tmp_path_factory):
+    path = shutil.copyfile(prepared_sqlite, tmp_path_factory.mktemp("fair") / "islands.db")
+    with Store(f"sqlite:///{path}") as store:
+        yield store
+
+
+def start(store, weighted):
+    """Empty the store, and set the weights of owners."""
+
+    def operation(connection):
+        for table in (events, jobs, owners):
+            connection.execute(delete(table))
+        for name, weight in weighted.items():
+            connection.execute(insert(owners).values(name=name, weight=weight))
+
+    store.database.write(operation)
+
+
+def submit(store, *several, first=0):
+    """Queue jobs of some owners, an owner for each, in one transaction."""
+    rows = [
+        {
+            "id": f"{first + number:032x}",
+            "owner": owner,
+            "kind": "identification",
+            "name": "",
+            "spec": "{}",
+            "request_sha256": "",
+            "priority": 0,
+            "state": "queued",
+            "created": float(first + number),
+            "updated": 0.0,
+        }
+        for number, owner in enumerate(several)
+    ]
+    store.database.write(lambda connection: connection.execute(insert(jobs), rows))
+
+
+def claims(store, count):
+    """Claim jobs; return their owners."""
+    return [claimed(store).job.owner for _ in range(count)]
+
+
+@few
+@given(weights, st.integers(5, 25))
+def test_claims_of_backlogged_owners_are_in_proportion_to_their_weights(fair, weighted, count):
+    """Start-time fair queueing: theorem 1 of Goyal, Vin and Cheng, for jobs of equal cost."""
+    start(fair, weighted)
+    submit(fair, *(owner for owner in weighted for _ in range(count)))
+    served = claims(fair, count)
+    for begin in range(count):
+        for end in range(begin, count + 1):
+            got = Counter(served[begin:end])
+            for one, other in pairwise(weighted):
+                shares = got[one] / weighted[one], got[other] / weighted[other]
+                bound = 1 / weighted[one] + 1 / weighted[other]
+                assert abs(shares[0] - shares[1]) <= bound * (1 + 1e-6)
+
+
+@few
+@given(st.integers(2, 4), st.integers(1, 400), st.integers(4, 24))
+def test_backlogged_owners_of_equal_weight_are_served_in_turn(fair, several, weight, count):
+    start(fair, dict.fromkeys(OWNERS[:several], weight))
+    submit(fair, *(owner for owner in OWNERS[:several] for _ in range(count)))
+    served = claims(fair, count)
+    for begin in range(count):
+        for end in range(begin, count + 1):
+            got = [served[begin:end].count(owner) for owner in OWNERS[:several]]
+            assert max(got) - min(got) <= 1
+
+
+@few
+@given(weights, st.lists(st.sampled_from(OWNERS), max_size=20), st.data())
+def test_no_owner_waits_longer_than_its_bound(fair, weighted, earlier, data):
+    """Whatever the owners have received before, and however many jobs the others have."""
+    start(fair, weighted)
+    if earlier:
+        submit(fair, *earlier)
+        claims(fair, len(earlier))
+    late = data.draw(st.sampled_from(sorted(weighted)))
+    others = sorted(weighted.keys() - {late})
+    bound = sum(1 + -(-weighted[other] // weighted[late]) for other in others)
+    most = min(bound, 40)
+    submit(fair, late, *(owner for owner in others for _ in range(most)), first=1000)
+    served = claims(fair, min(most + 1, most * len(others) + 1))
+    assert bound > most or late in served
+
+
+def test_weights_of_two_to_one_give_two_claims_to_one(fair):
+    start(fair, {"a": 200, "b": 100})
+    submit(fair, *"a" * 30, *"b" * 30)
+    assert Counter(claims(fair, 30)) == {"a": 20, "b": 10}
+
+
+def test_idle_owner_gets_no_credit(fair):
+    start(fair, {})
+    submit(fair, *"a" * 20, "b")
+    claims(fair, 11)
+    submit(fair, *"b" * 10, first=100)
+    got = Counter(claims(fair, 8))
+    assert max(got.values()) - min(got.values()) <= 1
+
+
+def test_claims_alternate_after_a_weight_is_changed(fair):
+    start(fair, {"a": 300, "b": 100})
+    submit(fair, *"a" * 40, *"b" * 40)
+    claims(fair, 12)
+    fair.database.write(lambda connection: connection.execute(owners.update().values(weight=100)))
+    claims(fair, 2)
+    assert Counter(claims(fair, 20)) == {"a": 10, "b": 10}
+
+
+@few
+@given(weights, st.lists(st.sampled_from(OWNERS), min_size=1, max_size=20), st.integers(0, 19))
+def test_positions_are_the_order_of_the_claims(fair, weighted, queued, before):
+    start(fair, weighted)
+    submit(fair, *queued)
+    before = min(before, len(queued) - 1)
+    claims(fair, before)
+    waiting = [job for owner in OWNERS for job in fair.jobs.page(owner, "queued").jobs]
+    positions = fair.leases.queue_positions(waiting)
+    order = [claimed(fair).job.id for _ in waiting]
+    assert sorted(positions, key=positions.__getitem__) == order
+    assert sorted(positions.values()) == list(range(1, len(waiting) + 1))
+
+
+@pytest.mark.ci
+def test_ten_jobs_are_not_delayed_by_ten_thousand_of_another_owner(fair):
+    start(fair, {})
+    submit(fair, *"a" * 10_000)
+    submit(fair, *"b" * 10, first=10_000)
+    claims(fair, 2)
+    began = time.process_time()
+    served = claims(fair, 18)
+    assert served.count("b") == 9
+    assert (time.process_time() - began) / len(served) < 5e-3
