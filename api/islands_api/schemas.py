@@ -151,7 +151,9 @@ class JobView(ResponseModel):
     started: datetime | None = None
     finished: datetime | None = None
     spec: dict[str, Any]
-    progress: dict[str, Any] | None = Field(default=None, description="Phase, and estimated position in the queue.")
+    progress: dict[str, Any] | None = Field(
+        default=None, description="Phase, and estimated position in the queue."
+    )
     summary: dict[str, Any] | None = Field(default=None, description="Summary of the result.")
     problem: dict[str, Any] | None = Field(default=None, description="Why the job failed.")
     versions: dict[str, str | None] = Field(

@@ -135,7 +135,7 @@ class ServiceSettings(BaseSettings):
     max_stored: Count = 5_000_000_000
     max_active: Count = 10_000
     max_running: Count = 1000
-    max_streams: Count = 500
+    max_streams: Count = 1000
     max_drawings: Count = 100
     max_evaluations: Count = 10_000_000_000
     max_islands: Count = 256

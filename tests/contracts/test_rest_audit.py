@@ -14,6 +14,9 @@ CHANGES = {
     ("POST", "/v1/jobs/{job}/cancel"): Action.CANCEL,
     ("POST", "/v1/jobs/{job}/resume"): Action.RESUME,
     ("DELETE", "/v1/jobs/{job}"): Action.DELETE,
+    ("POST", "/v1/admin/keys"): Action.CREATE_KEY,
+    ("POST", "/v1/admin/keys/{key}/revoke"): Action.REVOKE_KEY,
+    ("PATCH", "/v1/admin/owners/{owner}"): Action.CHANGE_OWNER,
 }
 
 
@@ -21,11 +24,11 @@ def test_every_changing_route_has_an_action(service):
     paths = service.client.get("/openapi.json").json()["paths"]
     routes = {(method.upper(), path) for path, entry in paths.items() for method in entry}
     assert {route for route in routes if route[0] != "GET"} == set(CHANGES)
-    assert {*CHANGES.values(), Action.CREATE_KEY, Action.REVOKE_KEY} == set(Action)
+    assert set(CHANGES.values()) == set(Action)
 
 
 def test_every_change_is_recorded_with_its_key_and_address(service):
-    header = service.key("read", "write", owner="me")
+    header = service.key("read", "write", "admin", owner="me")
     (key,) = service.store.keys.all()
     used, unused = kept(service.store, "me"), kept(service.store, "me", b"2")
     failed = job_in(service.store, JobState.FAILED, "me", spec=spec(used)).id
@@ -37,13 +40,18 @@ def test_every_change_is_recorded_with_its_key_and_address(service):
         ("POST", "/v1/jobs/{job}/resume", {}),
         ("POST", "/v1/jobs/{job}/cancel", {}),
         ("DELETE", "/v1/jobs/{job}", {}),
+        ("POST", "/v1/admin/keys", {"json": {"scopes": ["read"], "owner": "me"}}),
+        ("PATCH", "/v1/admin/owners/{owner}", {"json": {"weight": 7}}),
+        # The last one, since it is the key of these requests.
+        ("POST", "/v1/admin/keys/{key}/revoke", {}),
     ]
     assert {(method, route) for method, route, _ in requests} == set(CHANGES)
     for method, route, body in requests:
-        path = route.format(job=failed, dataset=unused)
+        path = route.format(job=failed, dataset=unused, owner="me", key=key.id)
         answer = service.client.request(method, path, headers=header, **body)
         assert answer.is_success, (route, answer.text)
-        subject = {"dataset}": unused}.get(route.rpartition("{")[2], failed)
+        subjects = {"job": failed, "dataset": unused, "owner": "me", "key": key.id}
+        subject = subjects.get(route.partition("{")[2].partition("}")[0])
         if "{" not in route:
             subject = answer.json()["id"]
         (entry,) = service.store.audit.entries("me", limit=1)

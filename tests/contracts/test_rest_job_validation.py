@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from islands_api.web.uploads.owner_slots import OwnerSlots
+from islands_api.web.limits.owner_slots import OwnerSlots
 from support.service import csv, emptied, npz, problem_of, spec
 
 #: Unusual column names that a text table can have.

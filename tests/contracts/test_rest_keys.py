@@ -43,6 +43,12 @@ GUARDED = {
     ("GET", "/v1/datasets/{dataset}"): "read",
     ("DELETE", "/v1/datasets/{dataset}"): "write",
     ("GET", "/metrics"): "metrics",
+    ("GET", "/v1/admin/keys"): "admin",
+    ("POST", "/v1/admin/keys"): "admin",
+    ("POST", "/v1/admin/keys/{key}/revoke"): "admin",
+    ("GET", "/v1/admin/owners"): "admin",
+    ("GET", "/v1/admin/owners/{owner}"): "admin",
+    ("PATCH", "/v1/admin/owners/{owner}"): "admin",
 }
 
 #: Public routes.
@@ -51,10 +57,12 @@ OPEN = {("GET", "/healthz"), ("GET", "/readyz"), ("GET", "/problems/{kind}")}
 
 def send_request(service, method, path, headers):
     """Send a request, with a body if the route needs one."""
-    path = path.format(job="0" * 32, dataset="0" * 32, rank=1, figure="loop")
+    path = path.format(job="0" * 32, dataset="0" * 32, rank=1, figure="loop", key="0", owner="0")
     body = {"json": spec("0-csv")} if (method, path) == ("POST", "/v1/jobs") else {}
     if path == "/v1/discrepancies":
         body = {"json": held("0-csv")}
+    if path.startswith("/v1/admin") and method in ("POST", "PATCH"):
+        body = {"json": {}}
     if (method, path) == ("POST", "/v1/datasets"):
         body = {"files": {"file": ("a.csv", b"")}}
     return service.client.request(method, path, headers=headers, **body)

@@ -118,6 +118,9 @@ def test_every_example_of_the_openapi_document_is_valid(document):
         "/v1/jobs/{job}/models/1/figures",
         "/v1/datasets",
         "/v1/datasets/{dataset}",
+        "/v1/admin/keys",
+        "/v1/admin/owners",
+        "/v1/admin/owners/local",
         "/healthz",
         "/readyz",
         "/metrics",
@@ -160,6 +163,11 @@ def test_responses_of_other_requests_match_the_documentation(service, document):
         == 304
     )
     service.client.post(f"/v1/jobs/{known}/cancel")
+    key = check_response(document, service.client.post("/v1/admin/keys", json={"scopes": ["read"]}))
+    path = f"/v1/admin/keys/{key.json()['id']}/revoke"
+    assert check_response(document, service.client.post(path)).status_code == 200
+    change = service.client.patch("/v1/admin/owners/local", json={"weight": 7, "max_stored": None})
+    assert check_response(document, change).status_code == 200
     ended = service.client.get(f"/v1/jobs/{known}/events", headers={"Last-Event-ID": "9"})
     assert check_response(document, ended).status_code == 204
 

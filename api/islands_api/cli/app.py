@@ -45,7 +45,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "start.",
         "jobs": "Jobs of a service: submit, diagnose, list, show, watch, cancel, resume, result.",
         "keys": "API keys of a service: create, list, revoke.",
-        "admin": "Operation of a service: audit, backup, restore.",
+        "admin": "Operation of a service: audit, owners, backup, restore.",
     }
 )
 

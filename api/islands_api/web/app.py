@@ -19,12 +19,13 @@ from islands_api.web.dependencies import (
     AppState,
 )
 from islands_api.web.event_hub import JobEventHub
+from islands_api.web.limits.owner_counts import OwnerCounts
+from islands_api.web.limits.owner_slots import OwnerSlots
+from islands_api.web.limits.rate_limit import RateLimiter
 from islands_api.web.middleware import BodyLimit, HeadRequests, RequestLogging, RootPath, SameOrigin
 from islands_api.web.problems import ProblemDocument
 from islands_api.web.prometheus import ServiceMetrics
-from islands_api.web.rate_limit import RateLimiter
 from islands_api.web.routes import ROUTERS
-from islands_api.web.uploads.owner_slots import OwnerSlots
 from islands_api.web.uploads.upload_admission import UploadAdmission
 from islands_service.liveness import EVERY, send_heartbeat
 from islands_service.settings import ServiceSettings
@@ -66,9 +67,11 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             hub,
             RateLimiter(settings.rate, settings.burst),
             ServiceMetrics(opened, settings.data_dir),
-            UploadAdmission(settings.max_uploads, settings.max_uploads_per_owner),
+            UploadAdmission(settings.max_uploads),
             OwnerSlots(MAX_CONCURRENT_INSPECTIONS, MAX_INSPECTIONS_PER_OWNER),
             OwnerSlots(MAX_CONCURRENT_DRAWINGS, MAX_CONCURRENT_DRAWINGS),
+            OwnerCounts("requests for figures"),
+            OwnerCounts("event streams"),
             executor,
         )
         app.state.keys = KeyCache(state)

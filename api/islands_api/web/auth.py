@@ -159,5 +159,8 @@ Reader = Annotated[Principal, Depends(_require_scope("read"))]
 #: Type of a route parameter that receives a caller with the scope `write`.
 Writer = Annotated[Principal, Depends(_require_scope("write"))]
 
+#: Type of a route parameter that receives a caller with the scope `admin`.
+Administrator = Annotated[Principal, Depends(_require_scope("admin"))]
+
 #: Type of a route parameter that receives a caller with the scope `metrics`.
 Operator = Annotated[Any, Depends(_require_scope("metrics"))]

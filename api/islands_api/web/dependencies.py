@@ -8,10 +8,12 @@ from fastapi import Depends, Request
 
 from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.event_hub import JobEventHub
+from islands_api.web.limits.owner_counts import OwnerCounts
+from islands_api.web.limits.owner_slots import OwnerSlots
+from islands_api.web.limits.rate_limit import RateLimiter
 from islands_api.web.prometheus import ServiceMetrics
-from islands_api.web.rate_limit import RateLimiter
-from islands_api.web.uploads.owner_slots import OwnerSlots
 from islands_api.web.uploads.upload_admission import UploadAdmission
+from islands_service.domain.owner import Quotas, default_quotas
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -42,7 +44,13 @@ class AppState:
     uploads: UploadAdmission
     inspection_slots: OwnerSlots
     figure_slots: OwnerSlots
+    drawings: OwnerCounts
+    streams: OwnerCounts
     executor: BlockingExecutor
+
+    async def quotas(self, owner: str) -> Quotas:
+        """Return the quotas of an owner."""
+        return await self.run_blocking(self.store.owners.quotas, owner, default_quotas(self.settings))
 
     async def run_blocking(self, operation: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Run an operation that waits for the database or the disk in a thread."""

@@ -26,6 +26,8 @@ from islands_service.domain.job import (
 from islands_service.store.blobs import BlobNotFoundError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError
+from islands_service.store.keys import KeyNotFoundError
+from islands_service.store.owners import OwnerNotFoundError
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -145,6 +147,8 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         DatasetNotFoundError: ProblemKind(
             HTTPStatus.NOT_FOUND, "no-such-dataset", "There is no such data set"
         ),
+        KeyNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "no-such-key", "There is no such key"),
+        OwnerNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "no-such-owner", "There is no such owner"),
         ResourceNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "not-found", "There is no such resource"),
         MalformedBodyError: ProblemKind(HTTPStatus.BAD_REQUEST, "bad-request", "The request cannot be read"),
         RequestTimeoutError: ProblemKind(

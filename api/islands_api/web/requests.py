@@ -104,10 +104,11 @@ class FormRoute(BodyRoute):
         length = request.headers.get("content-length", "")
         least = max(0, int(length) - FORM_OVERHEAD_BYTES) if length.isdecimal() else 0
         most = least if length else settings.max_upload
-        with state.uploads.admit(caller.owner):
+        quotas = await state.quotas(caller.owner)
+        with state.uploads.admit(caller.owner, quotas.max_uploads):
             stored = await state.run_blocking(state.store.datasets.stored_bytes, caller.owner)
             with (
-                state.uploads.reserve(caller.owner, least, most, stored, settings.max_stored) as reserved,
+                state.uploads.reserve(caller.owner, least, most, stored, quotas.max_stored) as reserved,
                 await state.run_blocking(state.blobs.spool) as target,
             ):
                 room = reserved + FORM_OVERHEAD_BYTES

@@ -1,4 +1,4 @@
-"""JSON documents of jobs and data sets, written by hand for speed: clients poll jobs very often."""
+"""JSON documents of jobs and other resources, written by hand for speed: clients poll jobs very often."""
 
 import json
 from datetime import UTC, datetime
@@ -8,7 +8,9 @@ from typing import Any
 from starlette.responses import JSONResponse
 
 from islands_service.domain.job import Job, JobState
+from islands_service.domain.owner import Owner
 from islands_service.store.datasets import StoredDataset
+from islands_service.store.keys import Key
 
 
 def job_document(job: Job, position: int | None = None) -> dict[str, Any]:
@@ -61,6 +63,32 @@ def dataset_summary(dataset: StoredDataset) -> dict[str, Any]:
     document = dataset_document(dataset)
     summary = document.pop("preview")
     return {**document, **summary}
+
+
+def key_document(key: Key) -> dict[str, Any]:
+    """Convert a key to a document with the fields of `islands_api.admin_schemas.KeyView`."""
+    return {
+        "id": key.id,
+        "owner": key.owner,
+        "name": key.name,
+        "scopes": sorted(key.scopes),
+        "created": _format_time(key.created),
+        "expires": _format_time(key.expires),
+        "revoked": _format_time(key.revoked),
+        "valid": key.valid,
+    }
+
+
+def owner_document(owner: Owner) -> dict[str, Any]:
+    """Convert an owner to a document with the fields of `islands_api.admin_schemas.OwnerView`."""
+    return {
+        "name": owner.name,
+        "weight": owner.weight,
+        **owner.quotas,
+        "queued": owner.queued,
+        "running": owner.running,
+        "stored": owner.stored,
+    }
 
 
 class JSONDocument(JSONResponse):

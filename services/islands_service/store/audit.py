@@ -80,9 +80,7 @@ class AuditTrail:
             query = query.where(audit.c.at >= since)
         with self._database.read() as connection:
             return tuple(
-                AuditEntry(
-                    row.at, row.action, row.owner, row.subject, row.key_id, row.address, row.details
-                )
+                AuditEntry(row.at, row.action, row.owner, row.subject, row.key_id, row.address, row.details)
                 for row in connection.execute(query)
             )
 

@@ -20,6 +20,7 @@ SCOPES = {
     "read": "read your own data sets, jobs and results",
     "write": "upload data sets, submit, cancel, resume and delete jobs",
     "metrics": "read the service's metrics",
+    "admin": "manage keys, and the weights and quotas of owners",
 }
 
 #: Prefix of every key, by which scanners for leaked secrets can detect it.

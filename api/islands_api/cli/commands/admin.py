@@ -1,4 +1,4 @@
-"""``islands admin``: operation of a service, in its database: audit trail, backup, restoration."""
+"""``islands admin``: operation of a service, in its database: audit trail, owners, backup, restoration."""
 
 import json
 from contextlib import closing
@@ -9,8 +9,10 @@ from typing import Annotated, Any
 
 import typer
 from rich.table import Column, Table
+from rich.text import Text
 
 from islands_api.cli.console import errors, output
+from islands_api.cli.service.owner_commands import owners
 from islands_api.cli.service.store_options import Database, DataDir, open_store
 from islands_service.settings import service_settings
 from islands_service.store.blobs import Blobs
@@ -18,15 +20,18 @@ from islands_service.store.database import Database as StoreDatabase
 from islands_service.supervisor import folder_lock
 
 admin = typer.Typer(
-    help="Operation of a service: audit, backup, restore.", no_args_is_help=True, add_completion=False
+    help="Operation of a service: audit, owners, backup, restore.",
+    no_args_is_help=True,
+    add_completion=False,
 )
+admin.add_typer(owners, name="owners")
 
 Folder = Annotated[Path, typer.Argument(help="Folder of the backup.")]
 
 
 @admin.callback()
 def _admin() -> None:
-    """Operation of a service: audit, backup, restore."""
+    """Operation of a service: audit, owners, backup, restore."""
 
 
 @admin.command()
@@ -48,13 +53,13 @@ def audit(
         for entry in entries:
             print(json.dumps({**asdict(entry), "at": _format_time(entry.at)}))
         return
-    table = Table(
-        Column("time", no_wrap=True),
-        *(Column(name, overflow="fold") for name in ("action", "owner", "id", "key", "address")),
-    )
+    # Few entries have details, and the table has to fit into 80 columns.
+    detailed = any(entry.details for entry in entries)
+    names = ("action", "owner", "id", "key", "address", *(("details",) if detailed else ()))
+    table = Table(Column("time", no_wrap=True), *(Column(name, overflow="fold") for name in names))
     for entry in entries:
-        texts = (entry.action, entry.owner, entry.subject, entry.key_id or "", entry.address)
-        table.add_row(_format_time(entry.at), *texts)
+        texts = [entry.action, entry.owner, entry.subject, entry.key_id, entry.address, entry.details]
+        table.add_row(_format_time(entry.at), *(Text(text or "") for text in texts[: len(names)]))
     output.print(table, markup=False)
 
 

@@ -5,7 +5,18 @@ To add a file, add its router to `ROUTERS`.
 
 from fastapi import APIRouter
 
-from islands_api.web.routes import datasets, diagnoses, events, figures, jobs, models, page, service
+from islands_api.web.routes import (
+    datasets,
+    diagnoses,
+    events,
+    figures,
+    jobs,
+    keys,
+    models,
+    owners,
+    page,
+    service,
+)
 
 #: All routers of the application.
 ROUTERS: tuple[APIRouter, ...] = (
@@ -15,6 +26,8 @@ ROUTERS: tuple[APIRouter, ...] = (
     events.router,
     models.router,
     figures.router,
+    keys.router,
+    owners.router,
     service.router,
     page.router,
 )

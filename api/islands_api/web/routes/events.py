@@ -1,12 +1,13 @@
 """Events of a job as server-sent events. A client that reconnects continues after its last event."""
 
 from collections.abc import AsyncGenerator, AsyncIterator
-from contextlib import aclosing
+from contextlib import ExitStack, aclosing
 from time import monotonic
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request, Response
 from fastapi.responses import StreamingResponse
+from starlette.types import Receive, Scope, Send
 
 from islands_api.web.auth import KeyCache, Principal, Reader
 from islands_api.web.dependencies import AppState, AppStateDep
@@ -61,16 +62,31 @@ async def events(
     if found.state in TERMINAL and last_event_id >= found.version:
         # Any other end of the stream makes an EventSource of a browser reconnect.
         return Response(status_code=204)
+    quotas = await state.quotas(caller.owner)
     # The event response of the framework builds a model of every event for each client: too slow for 500.
-    return StreamingResponse(
-        # Limit the event number to existing events: a client with a larger one would wait for ever.
-        _while_key_valid(
-            request.app.state.keys, caller, _stream(state, found, min(last_event_id, found.version))
-        ),
-        media_type="text/event-stream",
+    with ExitStack() as counted:
+        counted.enter_context(state.streams.count(caller.owner, quotas.max_streams))
+        return _EventStream(
+            # Limit the event number to existing events: a client with a larger one would wait for ever.
+            _while_key_valid(
+                request.app.state.keys, caller, _stream(state, found, min(last_event_id, found.version))
+            ),
+            counted.pop_all(),
+        )
+
+
+class _EventStream(StreamingResponse):
+    """Stream that counts as one of its owner until it has ended."""
+
+    def __init__(self, content: AsyncIterator[bytes], counted: ExitStack) -> None:
         # nginx buffers responses unless this header forbids it.
-        headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
-    )
+        headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+        super().__init__(content, media_type="text/event-stream", headers=headers)
+        self._counted = counted
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        with self._counted:
+            await super().__call__(scope, receive, send)
 
 
 async def _stream(state: AppState, job: Job, last: int) -> AsyncGenerator[bytes]:

@@ -185,12 +185,14 @@ async def _figure_response(
 ) -> Response:
     blob = await state.run_blocking(state.store.results.artefact, job, name)
     if blob is None:
-        async with state.figure_slots.hold(caller.owner):
-            # Another request may have drawn the figure in the meantime.
-            blob = await state.run_blocking(state.store.results.artefact, job, name)
-            if blob is None:
-                await _draw(state, caller, job, rank)
+        quotas = await state.quotas(caller.owner)
+        with state.drawings.count(caller.owner, quotas.max_drawings):
+            async with state.figure_slots.hold(caller.owner):
+                # Another request may have drawn the figure in the meantime.
                 blob = await state.run_blocking(state.store.results.artefact, job, name)
+                if blob is None:
+                    await _draw(state, caller, job, rank)
+                    blob = await state.run_blocking(state.store.results.artefact, job, name)
     if blob is None:
         raise ResourceNotFoundError(f"job {job} has no figure {name}")
     data = await state.run_blocking(state.blobs.read, blob)

@@ -16,28 +16,28 @@ class UploadAdmission:
 
     Parameters
     ----------
-    total, per_owner : int
+    total : int
         Maximum number of uploads in progress.
     """
 
-    def __init__(self, total: int, per_owner: int) -> None:
-        self._total, self._per_owner = total, per_owner
+    def __init__(self, total: int) -> None:
+        self._total = total
         self._uploads: Counter[str] = Counter()
         self._reserved: Counter[str] = Counter()
 
     @contextmanager
-    def admit(self, owner: str) -> Iterator[None]:
-        """Count an upload during the block.
+    def admit(self, owner: str, most: int) -> Iterator[None]:
+        """Count an upload during the block. The owner may have ``most`` in progress.
 
         Raises
         ------
         UploadLimitError
             Too many uploads are in progress.
         """
-        if self._uploads[owner] >= self._per_owner:
+        if self._uploads[owner] >= most:
             raise UploadLimitError(
-                f"{self._uploads[owner]} uploads of this owner are in progress, and {self._per_owner} is the "
-                "most: wait until one has ended",
+                f"{self._uploads[owner]} uploads of this owner are in progress, and {most} is the most: "
+                "wait until one has ended",
                 _RETRY_AFTER,
             )
         if self._uploads.total() >= self._total:

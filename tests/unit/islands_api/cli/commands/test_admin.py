@@ -58,6 +58,7 @@ def test_audit_lists_changes_newest_first(run: Run, subjects: list[str]) -> None
         "subject": subjects[2],
         "key_id": "0123456789abcdef",
         "address": "192.0.2.7",
+        "details": None,
     }
     code, out, _ = run()
     assert code == 0
@@ -70,6 +71,50 @@ def test_audit_is_limited_to_an_owner_a_time_and_a_number(run: Run, subjects: li
     assert len(read(run, "--since", "2024-10-06T00:00:01")) == 1
     assert [entry["subject"] for entry in read(run, "--limit", "1")] == subjects[:1]
     assert run("--limit", "0")[0] == 2
+
+
+def test_owners_are_listed_and_changed(run: Run, subjects: list[str], command_line: Run) -> None:
+    owners = partial(command_line, "admin", "owners")
+    assert owners("set", "bob", "--weight", 200, "--max-running", 2) == (
+        0,
+        "owner bob: weight 200, max_running 2\n",
+        "",
+    )
+    code, out, _ = owners("list", "--json")
+    listed = {each["name"]: each for each in map(json.loads, out.splitlines())}
+    assert (code, set(listed)) == (0, {"bob"})
+    assert (listed["bob"]["weight"], listed["bob"]["quotas"]["max_running"]) == (200, 2)
+    assert "200" in owners("list")[1]
+    assert owners("set", "bob", "--unset", "max-running", "--unset", "weight")[1] == (
+        "owner bob: weight 100, default quotas\n"
+    )
+    restored, changed = read(run, "--limit", "2")
+    assert (changed["action"], changed["owner"], changed["address"]) == (
+        "change-owner",
+        "bob",
+        "command line",
+    )
+    assert json.loads(str(changed["details"])) == {"weight": 200, "max_running": 2}
+    assert json.loads(str(restored["details"])) == {"weight": 100, "max_running": None}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("unknown", "--weight", 2), "there is no owner 'unknown'"),
+        (("bob", "--weight", 0), "weight is an integer from 1 to 10000, got 0"),
+        (("bob", "--max-stored", -1), "max_stored is an integer of at least 0, got -1"),
+        (("bob", "--unset", "size"), "size is no quota: take one of max_active"),
+    ],
+)
+def test_invalid_change_of_an_owner_is_refused(
+    run: Run, subjects: list[str], command_line: Run, words: tuple[object, ...], message: str
+) -> None:
+    before = read(run)
+    code, out, err = command_line("admin", "owners", "set", *words)
+    assert (code, out) == (2, "")
+    assert message in " ".join(err.split())
+    assert read(run) == before
 
 
 def test_keys_of_the_command_line_are_audited(run: Run, command_line: Run) -> None:

@@ -83,6 +83,7 @@ def test_scopes_of_a_key_limit_its_permissions(run: Run, service: Service, scope
         "read": service.client.get("/v1/jobs", headers=headers),
         "write": service.client.post("/v1/jobs/0/cancel", headers=headers),
         "metrics": service.client.get("/metrics", headers=headers),
+        "admin": service.client.get("/v1/admin/keys", headers=headers),
     }
     assert {name for name, answer in answers.items() if answer.status_code != 403} == {scope}
     assert answers[scope].status_code == (404 if scope == "write" else 200)

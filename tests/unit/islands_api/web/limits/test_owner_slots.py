@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from islands_api.web.uploads.owner_slots import OwnerSlots
+from islands_api.web.limits.owner_slots import OwnerSlots
 
 OWNERS = "abc"
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from islands_api.web import rate_limit
+from islands_api.web.limits import rate_limit
+from islands_api.web.limits.rate_limit import RateLimiter
 from islands_api.web.problems import RateLimitError
-from islands_api.web.rate_limit import RateLimiter
 
 
 @pytest.fixture

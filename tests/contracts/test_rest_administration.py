@@ -1,0 +1,157 @@
+"""Keys and owners over REST: administration with the scope admin, and quotas of single owners."""
+
+from contextlib import ExitStack
+
+import pytest
+
+from islands_api.admin_schemas import CreatedKey, KeyPage, KeyView, OwnerPage, OwnerView
+from support.processes import eventually
+from support.service import csv, kept, problem_of, queued, spec
+from support.stores import FOUND, claimed
+
+
+@pytest.fixture(scope="module")
+def shared(serve):
+    with serve(require_keys=True, rate=0.0, max_active=3) as running:
+        yield running
+
+
+@pytest.fixture
+def admin(service):
+    return service.key("admin", owner="operator")
+
+
+@pytest.fixture
+def mine(service):
+    return service.key(owner="me")
+
+
+@pytest.fixture
+def change(service, admin, mine):
+    """Return a function that changes the owner ``me``."""
+
+    def change(owner="me", /, **changes):
+        return service.client.patch(f"/v1/admin/owners/{owner}", json=changes, headers=admin)
+
+    return change
+
+
+def test_created_key_is_accepted_until_it_is_revoked(service, admin):
+    wanted = {"name": "lab-3", "owner": "lab", "scopes": ["write", "read"], "days": 2}
+    answer = service.client.post("/v1/admin/keys", json=wanted, headers=admin)
+    assert (answer.status_code, answer.headers["cache-control"]) == (201, "no-store")
+    key = CreatedKey.model_validate(answer.json())
+    assert (key.name, key.owner, key.scopes, key.valid) == ("lab-3", "lab", ("read", "write"), True)
+    assert (key.expires - key.created).total_seconds() == pytest.approx(2 * 86_400.0, abs=0.1)
+    header = {"Authorization": f"Bearer {key.secret}"}
+    assert service.client.get("/v1/jobs", headers=header).status_code == 200
+    listed = service.client.get("/v1/admin/keys", headers=admin)
+    assert key.id in {each.id for each in KeyPage.model_validate(listed.json()).items}
+    assert key.secret not in listed.text
+    revoked = service.client.post(f"/v1/admin/keys/{key.id}/revoke", headers=admin)
+    assert revoked.status_code == 200
+    assert KeyView.model_validate(revoked.json()).revoked >= key.created
+    eventually(lambda: service.client.get("/v1/jobs", headers=header).status_code == 401)
+
+
+@pytest.mark.parametrize(
+    ("body", "kind"),
+    [
+        ({}, "invalid-request"),
+        ({"scopes": []}, "invalid-request"),
+        ({"scopes": ["root"]}, "invalid-settings"),
+        ({"scopes": ["read"], "owner": "a/b"}, "invalid-request"),
+        ({"scopes": ["read"], "owner": "x" * 65}, "invalid-request"),
+        ({"scopes": ["read"], "days": 0}, "invalid-request"),
+        ({"scopes": ["read"], "secret": "x" * 32}, "invalid-request"),
+    ],
+)
+def test_invalid_key_is_refused(service, admin, body, kind):
+    before = service.store.keys.all()
+    problem_of(service.client.post("/v1/admin/keys", json=body, headers=admin), 422, kind)
+    assert service.store.keys.all() == before
+
+
+def test_unknown_key_and_owner_are_not_found(service, admin, change):
+    problem_of(service.client.post("/v1/admin/keys/0/revoke", headers=admin), 404, "no-such-key")
+    problem_of(service.client.get("/v1/admin/owners/unknown", headers=admin), 404, "no-such-owner")
+    problem_of(change("unknown", weight=2), 404, "no-such-owner")
+
+
+def test_owners_are_listed_with_their_quotas_and_use(service, admin, change):
+    dataset = kept(service.store, "me")
+    for _ in range(2):
+        queued(service.store, "me", spec=spec(dataset))
+    claimed(service.store)
+    assert change(weight=250, max_running=0).status_code == 200
+    answer = service.client.get("/v1/admin/owners", headers=admin)
+    me, operator = OwnerPage.model_validate(answer.json()).items
+    assert (operator.name, operator.weight, operator.queued) == ("operator", 100, 0)
+    assert me == OwnerView(name="me", weight=250, max_running=0, queued=1, running=1, stored=7)
+    assert service.client.get("/v1/admin/owners/me", headers=admin).json() == answer.json()["items"][0]
+
+
+def test_absent_fields_are_not_changed_and_null_restores_a_default(change):
+    assert change(weight=250, max_running=1).json()["max_running"] == 1
+    again = change(max_running=None, max_stored=5).json()
+    assert (again["weight"], again["max_running"], again["max_stored"]) == (250, None, 5)
+    assert change(weight=None).json()["weight"] == 100
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"weight": 0}, {"weight": 10_001}, {"max_active": -1}, {"max_jobs": 1}, {"max_stored": "many"}]
+)
+def test_invalid_change_is_refused(service, change, wrong):
+    problem_of(change(**wrong), 422, "invalid-request")
+    assert service.store.owners.get("me").weight == 100
+
+
+def test_quota_of_active_jobs_of_an_owner_precedes_the_setting(service, mine, change):
+    order = spec(kept(service.store, "me"))
+    change(max_active=4)
+    answers = [service.submit(mine, **order, seed=seed) for seed in range(5)]
+    assert [answer.status_code for answer in answers] == [202] * 4 + [429]
+    assert "4 is the most" in problem_of(answers[-1], 429, "quota-exceeded")
+    change(max_active=0)
+    other = service.key(owner="them")
+    assert service.submit(other, **spec(kept(service.store, "them"))).status_code == 202
+
+
+@pytest.mark.ci
+def test_quotas_of_uploads_and_bytes_apply_to_single_owners(service, mine, change):
+    files = {"file": ("a.csv", csv())}
+    change(max_uploads=0)
+    answer = service.client.post("/v1/datasets", files=files, headers=mine)
+    problem_of(answer, 429, "too-many-uploads")
+    change(max_uploads=None, max_stored=10)
+    answer = service.client.post("/v1/datasets", files=files, headers=mine)
+    assert "0.0 MB is the most: delete some" in problem_of(answer, 429, "quota-exceeded")
+
+
+def test_event_streams_of_an_owner_are_limited_until_they_end(service, mine, change):
+    path = f"/v1/jobs/{queued(service.store, 'me').id}/events"
+    change(max_streams=2)
+    with ExitStack() as stack:
+        for _ in range(2):
+            stack.enter_context(service.client.stream("GET", path, headers=mine))
+        answer = service.client.get(path, headers=mine)
+        assert "2 event streams of this owner" in problem_of(answer, 429, "quota-exceeded")
+
+    def is_open():
+        with service.client.stream("GET", path, headers=mine) as answer:
+            return answer.status_code == 200
+
+    eventually(is_open)
+
+
+def test_figures_of_an_owner_without_a_quota_of_drawings_are_refused(service, mine, change):
+    job = queued(service.store, "me").id
+    service.store.leases.finish(claimed(service.store), FOUND)
+    path = f"/v1/jobs/{job}/models/1/figures/free-run.svg"
+    change(max_drawings=0)
+    answer = service.client.get(path, headers=mine)
+    assert "0 is the most" in problem_of(answer, 429, "quota-exceeded")
+    # A figure that is drawn already is sent.
+    blob = service.app.state.islands.blobs.write(b"<svg/>")
+    service.store.results.keep(job, {"1/free-run.svg": blob})
+    assert service.client.get(path, headers=mine).status_code == 200
