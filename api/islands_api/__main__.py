@@ -4,6 +4,8 @@ import gc
 import ssl
 import sys
 
+import structlog
+
 from islands.errors import IslandsError, SettingsError
 from islands_api.server.http_server import HTTPServer, make_server_config
 from islands_api.server.listener import open_listener, raise_file_limit
@@ -12,6 +14,8 @@ from islands_service.logging_config import configure_logs
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.supervisor import MISCONFIGURED
+
+log = structlog.get_logger()
 
 #: Arguments of `gc.set_threshold`: allocations per collection of generation 0, collections per older one.
 _GC_THRESHOLDS = 10_000, 20, 20
@@ -30,6 +34,7 @@ def main() -> int:
         settings = service_settings()
         configure_logs(settings.log_format, "api")
         store = Store(settings.url)
+        install_admin_key(settings, store)
         check_safe(settings, store)
         listener = open_listener(settings.host, settings.port)
     except IslandsError as error:
@@ -53,6 +58,19 @@ def _freeze_garbage_collector() -> None:
     gc.set_threshold(*_GC_THRESHOLDS)
 
 
+def install_admin_key(settings: ServiceSettings, store: Store) -> None:
+    """Accept the key in the operator's file, and refuse the one of an earlier file.
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be read, or its key cannot be used.
+    """
+    secret = settings.read_admin_key()
+    if not store.keys.install_admin_key(secret) and secret is not None:
+        log.warning("the key of ISLANDS_ADMIN_KEY_FILE is revoked: write another one into the file")
+
+
 def check_safe(settings: ServiceSettings, store: Store) -> None:
     """Check that a service that other machines can reach needs keys, and that the TLS files are usable.
 
@@ -64,7 +82,8 @@ def check_safe(settings: ServiceSettings, store: Store) -> None:
     if settings.keys_needed and not store.keys.any_valid():
         raise SettingsError(
             f"{settings.host} can be reached by other machines, and there is no key: create one with "
-            "'islands keys create --scope read --scope write', or serve on 127.0.0.1"
+            "'islands keys create --scope read --scope write', name a file with one in "
+            "ISLANDS_ADMIN_KEY_FILE, or serve on 127.0.0.1"
         )
     if (settings.tls_certificate is None) != (settings.tls_key is None):
         raise SettingsError("TLS needs both a certificate and a key: give --tls-certificate and --tls-key")

@@ -94,6 +94,9 @@ class ServiceSettings(BaseSettings):
         Time after which an entry of the audit trail is deleted; 0 keeps it for ever.
     rate, burst
         Requests per second of one key, and requests that it may send at once; a rate of 0 disables the limit.
+    admin_key_file
+        File with a key of at least 32 characters that has the scope ``admin``, for example a mounted secret.
+        With it the first keys can be created over REST. Without it that key is revoked.
     tls_certificate, tls_key
         PEM files for HTTPS.
     metrics_host, metrics_port
@@ -145,6 +148,7 @@ class ServiceSettings(BaseSettings):
     rate: Annotated[float, Field(ge=0.0)] = 50.0
     burst: Count = 200
     require_keys: bool = False
+    admin_key_file: Path | None = None
     tls_certificate: Path | None = None
     tls_key: Path | None = None
     metrics_host: str = "127.0.0.1"
@@ -189,6 +193,23 @@ class ServiceSettings(BaseSettings):
     def keys_needed(self) -> bool:
         """Whether every request needs a key."""
         return self.require_keys or not self.on_loopback
+
+    def read_admin_key(self) -> str | None:
+        """Return the key of the operator; None without a file.
+
+        Raises
+        ------
+        SettingsError
+            The file cannot be read.
+        """
+        if self.admin_key_file is None:
+            return None
+        try:
+            return self.admin_key_file.read_text(encoding="utf-8").strip()
+        except (OSError, ValueError) as error:
+            raise SettingsError(
+                f"cannot read the file of ISLANDS_ADMIN_KEY_FILE, {self.admin_key_file}: {error}"
+            ) from error
 
     def environment(self) -> dict[str, str]:
         """Return environment variables that give a child process the same settings.

@@ -71,6 +71,19 @@ def test_address_reachable_by_others_needs_a_key(tmp_path: Path) -> None:
         assert answer.status_code == 200
 
 
+def test_key_in_a_file_is_enough_for_the_first_start(tmp_path: Path) -> None:
+    secret = tmp_path / "admin-key"
+    secret.write_text("0123456789abcdef" * 4)
+    environment = {**API_ONLY, "ISLANDS_ADMIN_KEY_FILE": str(secret)}
+    with serving(tmp_path / "data", "--host", "0.0.0.0", environment=environment) as service:
+        header = {"Authorization": f"Bearer {secret.read_text()}"}
+        made = service.client.post("/v1/admin/keys", json={"scopes": ["read"]}, headers=header).json()
+        answer = service.client.get("/v1/jobs", headers={"Authorization": f"Bearer {made['secret']}"})
+        assert answer.status_code == 200
+        missing = refused("--data-dir", tmp_path / "other", ISLANDS_ADMIN_KEY_FILE=str(tmp_path / "none"))
+    assert "cannot read the file of ISLANDS_ADMIN_KEY_FILE" in missing
+
+
 def test_api_without_a_valid_key_starts_when_a_key_is_created(tmp_path: Path) -> None:
     """No other role ends, so that jobs continue to run."""
     folder = tmp_path / "data"

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import secrets
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,7 @@ from sqlalchemy import Column, Connection, Row, func, insert, or_, select, updat
 from islands.errors import IslandsError, SettingsError
 from islands_service.domain.job import Requester
 from islands_service.store.audit import Action, record_change
+from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
 from islands_service.store.tables import keys
@@ -25,6 +27,14 @@ SCOPES = {
 
 #: Prefix of every key, by which scanners for leaked secrets can detect it.
 PREFIX = "islands_"
+
+#: Id and owner of the key in the file of the operator.
+ADMIN_KEY = "admin-key-file"
+
+#: Origin of the changes of this key in the audit trail.
+_ADMIN_KEY_FILE = Requester("ISLANDS_ADMIN_KEY_FILE")
+
+_ADMIN_SECRET = re.compile(r"[\x21-\x7e]{32,}")
 
 
 class KeyNotFoundError(IslandsError):
@@ -110,11 +120,58 @@ class Keys:
 
         return self._database.write(operation), secret
 
+    def install_admin_key(self, secret: str | None) -> bool:
+        """Make a secret that the operator has chosen the key `ADMIN_KEY`, or revoke that key if None.
+
+        Another secret replaces the previous one, which is then unknown. A key that was revoked stays revoked
+        until the secret changes. Return whether it is not revoked.
+
+        Raises
+        ------
+        SettingsError
+            The secret is too short or has invalid characters, or is that of another key.
+        """
+        if secret is not None and not _ADMIN_SECRET.fullmatch(secret):
+            raise SettingsError(
+                "the key of ISLANDS_ADMIN_KEY_FILE has at least 32 printable characters without spaces: make "
+                "one with 'openssl rand -hex 32'"
+            )
+
+        def operation(connection: Connection) -> bool:
+            dialect.lock_owner(connection, ADMIN_KEY)
+            current = connection.execute(select(keys).where(keys.c.id == ADMIN_KEY)).one_or_none()
+            if secret is None:
+                if current is not None and current.revoked is None:
+                    connection.execute(update(keys).where(keys.c.id == ADMIN_KEY).values(revoked=now()))
+                    record_change(connection, Action.REVOKE_KEY, ADMIN_KEY, ADMIN_KEY, _ADMIN_KEY_FILE)
+                return False
+            digest = _hash(secret)
+            same = connection.execute(select(keys.c.id).where(keys.c.secret_sha256 == digest)).scalar()
+            if current is not None and same == ADMIN_KEY:
+                return current.revoked is None
+            if same is not None:
+                raise SettingsError(
+                    f"the key of ISLANDS_ADMIN_KEY_FILE is that of the key {same}: choose another one"
+                )
+            values = {
+                "owner": ADMIN_KEY,
+                "name": "ISLANDS_ADMIN_KEY_FILE",
+                "secret_sha256": digest,
+                "scopes": json.dumps(["admin"]),
+                "created": now(),
+                "revoked": None,
+            }
+            dialect.upsert(connection, keys, {"id": ADMIN_KEY}, values)
+            record_change(connection, Action.CREATE_KEY, ADMIN_KEY, ADMIN_KEY, _ADMIN_KEY_FILE)
+            return True
+
+        return self._database.write(operation)
+
     def find(self, secret: str) -> Key | None:
         """Return the key of a secret, even if it is expired or revoked; None if the secret is wrong.
 
-        A secret has 256 random bits, so that a plain hash reveals nothing about it, and a lookup by the hash
-        takes the same time for every wrong secret.
+        A secret has 256 random bits, or was chosen by the operator to be as good, so that a plain hash
+        reveals nothing about it, and a lookup by the hash takes the same time for every wrong secret.
         """
         with self._database.read() as connection:
             row = connection.execute(_query().where(keys.c.secret_sha256 == _hash(secret))).one_or_none()
