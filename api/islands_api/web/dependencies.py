@@ -1,7 +1,7 @@
 """State shared by the routes of one application, and the dependency that injects it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any, ParamSpec, TypeVar
 
 from fastapi import Depends, Request
@@ -12,6 +12,7 @@ from islands_api.web.limits.owner_counts import OwnerCounts
 from islands_api.web.limits.owner_slots import OwnerSlots
 from islands_api.web.limits.rate_limit import RateLimiter
 from islands_api.web.prometheus import ServiceMetrics
+from islands_api.web.responses import QueuePositions
 from islands_api.web.uploads.upload_admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
 from islands_service.settings import ServiceSettings
@@ -47,6 +48,7 @@ class AppState:
     drawings: OwnerCounts
     streams: OwnerCounts
     executor: BlockingExecutor
+    positions: QueuePositions = field(default_factory=QueuePositions)
 
     async def quotas(self, owner: str) -> Quotas:
         """Return the quotas of an owner."""

@@ -1,6 +1,6 @@
 """Job submission, and lookup of jobs and results, for all kinds of jobs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from fastapi import Header
@@ -78,10 +78,11 @@ async def describe_job(state: AppState, job: Job) -> dict[str, Any]:
 
 async def describe_jobs(state: AppState, jobs: Sequence[Job]) -> list[dict[str, Any]]:
     """Return the documents of jobs, with the positions of those that are queued."""
-    positions: Mapping[str, int] = {}
-    # Most requests are polls of running jobs, which have no position.
-    if any(job.state == JobState.QUEUED for job in jobs):
-        positions = await state.run_blocking(state.store.leases.queue_positions, jobs)
+    positions, unknown = state.positions.find(jobs)
+    if unknown:
+        found = await state.run_blocking(state.store.leases.queue_positions, unknown)
+        state.positions.store(unknown, found)
+        positions |= found
     return [job_document(job, positions.get(job.id)) for job in jobs]
 
 

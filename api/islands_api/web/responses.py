@@ -1,8 +1,10 @@
 """JSON documents of jobs and other resources, written by hand for speed: clients poll jobs very often."""
 
 import json
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from math import isfinite
+from math import inf, isfinite
+from time import monotonic
 from typing import Any
 
 from starlette.responses import JSONResponse
@@ -11,6 +13,12 @@ from islands_service.domain.job import Job, JobState
 from islands_service.domain.owner import Owner
 from islands_service.store.datasets import StoredDataset
 from islands_service.store.keys import Key
+
+#: Seconds for which the position of a queued job is kept.
+_POSITION_SECONDS = 1.0
+
+#: Largest number of jobs whose position is kept.
+_MAX_POSITIONS = 10_000
 
 
 def job_document(job: Job, position: int | None = None) -> dict[str, Any]:
@@ -44,6 +52,30 @@ def job_document(job: Job, position: int | None = None) -> dict[str, Any]:
         "problem": job.problem,
         "versions": job.versions,
     }
+
+
+class QueuePositions:
+    """Cache of the positions of queued jobs, for a second: clients poll more often than jobs move."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, tuple[float, int | None]] = {}
+
+    def find(self, jobs: Sequence[Job]) -> tuple[dict[str, int], list[Job]]:
+        """Return the known positions of jobs, and the queued ones whose position has to be read."""
+        now = monotonic()
+        queued = [job for job in jobs if job.state == JobState.QUEUED]
+        known = {job.id: self._known.get(job.id, (-inf, None)) for job in queued}
+        fresh = {job: position for job, (at, position) in known.items() if now - at < _POSITION_SECONDS}
+        positions = {job: position for job, position in fresh.items() if position is not None}
+        return positions, [job for job in queued if job.id not in fresh]
+
+    def store(self, jobs: Sequence[Job], positions: Mapping[str, int]) -> None:
+        """Store the positions of jobs that were read now."""
+        now = monotonic()
+        if len(self._known) > _MAX_POSITIONS:
+            self._known.clear()
+        for job in jobs:
+            self._known[job.id] = now, positions.get(job.id)
 
 
 def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
