@@ -69,9 +69,12 @@ class HTTPProtocol(H11Protocol):
         else:
             self._refuse(MalformedBodyError(f"the request is not valid HTTP: {error or msg}"))
 
+    def _awaits_request(self) -> bool:
+        """Return whether the connection is open, and no request is in progress."""
+        return not self.transport.is_closing() and (self.cycle is None or self.cycle.response_complete)
+
     def _update_deadline(self) -> None:
-        waiting = self.cycle is None or self.cycle.response_complete
-        if not waiting or self.transport.is_closing():
+        if not self._awaits_request():
             self._stop_deadline()
         elif self._deadline is None:
             self._deadline = self.loop.call_later(HEADER_TIMEOUT, self._handle_timeout)
@@ -83,7 +86,7 @@ class HTTPProtocol(H11Protocol):
 
     def _handle_timeout(self) -> None:
         self._deadline = None
-        if self.transport.is_closing() or not (self.cycle is None or self.cycle.response_complete):
+        if not self._awaits_request():
             return
         if self.conn.trailing_data[0]:
             self._refuse(

@@ -11,7 +11,7 @@ from time import monotonic
 from typing import IO
 
 from islands.errors import IslandsError
-from islands_service.store.database import StorageFullError
+from islands_service.store.database import StorageFullError, ignore_duration
 
 #: Suffix of a file that is being written.
 _PART = ".part"
@@ -33,7 +33,7 @@ class Blobs:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         #: Called with the seconds until a blob was on the disk.
-        self.observe_write: Callable[[float], None] = _ignore_write
+        self.observe_write: Callable[[float], None] = ignore_duration
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
 
     def path(self, blob: str) -> Path:
@@ -178,10 +178,6 @@ def translate_disk_full() -> Iterator[None]:
         raise StorageFullError(
             f"the disk of the data folder is full ({error.strerror}): make room"
         ) from error
-
-
-def _ignore_write(_seconds: float) -> None:
-    """Do nothing with the duration of a write."""
 
 
 def _sync(folder: Path) -> None:

@@ -83,7 +83,7 @@ class Database:
         self._writer: Thread | None = None
         self._closed = False
         #: Called with the seconds of each group commit.
-        self.observe_commit: Callable[[float], None] = _ignore_commit
+        self.observe_commit: Callable[[float], None] = ignore_duration
         # Ensures that concurrent first writers start one thread, and that no operation is queued after the
         # end.
         self._lock = Lock()
@@ -214,8 +214,8 @@ class Database:
         return results
 
 
-def _ignore_commit(_seconds: float) -> None:
-    """Do nothing with the duration of a commit."""
+def ignore_duration(_seconds: float) -> None:
+    """Do nothing with the duration of a write; the default of observers."""
 
 
 def _run_operation(operation: Callable[[Connection], Any], connection: Connection) -> _OperationResult:

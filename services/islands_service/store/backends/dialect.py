@@ -27,13 +27,17 @@ def _postgresql(_element: now, _compiler: Any, **_: Any) -> str:
     return "EXTRACT(EPOCH FROM clock_timestamp())::float8"
 
 
+#: First statement of a transaction whose statements all see one state, by dialect.
+_BEGIN_SNAPSHOT = {
+    "postgresql": "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY",
+    "sqlite": "BEGIN",
+}
+
+
 def begin_snapshot(connection: Connection) -> None:
     """Let all statements of a new transaction see the state of the first one."""
     # Readers of SQLite begin no transaction by themselves.
-    postgresql = connection.dialect.name == "postgresql"
-    connection.exec_driver_sql(
-        "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY" if postgresql else "BEGIN"
-    )
+    connection.exec_driver_sql(_BEGIN_SNAPSHOT[connection.dialect.name])
 
 
 #: First keys of the advisory locks of PostgreSQL, which separate these from the locks of other programs.
