@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from islands_api.web.limits.owner_counts import OwnerCounts
 from islands_api.web.problems import UploadLimitError
 from islands_service.domain.job import QuotaError
 
@@ -22,7 +23,7 @@ class UploadAdmission:
 
     def __init__(self, total: int) -> None:
         self._total = total
-        self._uploads: Counter[str] = Counter()
+        self._uploads = OwnerCounts("uploads", _refuse)
         self._reserved: Counter[str] = Counter()
 
     @contextmanager
@@ -34,22 +35,10 @@ class UploadAdmission:
         UploadLimitError
             Too many uploads are in progress.
         """
-        if self._uploads[owner] >= most:
-            raise UploadLimitError(
-                f"{self._uploads[owner]} uploads of this owner are in progress, and {most} is the most: "
-                "wait until one has ended",
-                _RETRY_AFTER,
-            )
-        if self._uploads.total() >= self._total:
-            raise UploadLimitError(
-                f"{self._total} uploads are in progress, the most of this service: try again", _RETRY_AFTER
-            )
-        self._uploads[owner] += 1
-        try:
+        with self._uploads.count(owner, most):
+            if self._uploads.total > self._total:
+                raise _refuse(f"{self._total} uploads are in progress, the most of this service: try again")
             yield
-        finally:
-            self._uploads[owner] -= 1
-            self._uploads += Counter()  # drops owners without an upload
 
     @contextmanager
     def reserve(self, owner: str, least: int, most: int, stored: int, max_stored: int) -> Iterator[int]:
@@ -81,3 +70,7 @@ class UploadAdmission:
         finally:
             self._reserved[owner] -= reserved
             self._reserved += Counter()
+
+
+def _refuse(message: str) -> UploadLimitError:
+    return UploadLimitError(message, _RETRY_AFTER)
