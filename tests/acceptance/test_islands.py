@@ -92,6 +92,7 @@ def test_run_on_a_local_ray_resumes_with_another_engine(folder: Path) -> None:
     assert found(out) == found(folder / "serial")
 
 
+@pytest.mark.ci
 def test_invalid_island_options_are_rejected_in_one_line(folder: Path) -> None:
     base = ("identify", folder / "record.csv", *COLUMNS, "--out", folder / "never")
     for options, message in (

@@ -183,12 +183,14 @@ def test_gzip_bomb_is_cut_off_at_the_limit(service):
     assert nothing_stored(service)
 
 
+@pytest.mark.ci
 def test_valid_gzip_is_unpacked(service):
     answer = service.upload(gzip.compress(csv()), "a.csv.gz")
     assert (answer.status_code, answer.json()["name"]) == (201, "a.csv")
     assert answer.json() == {**service.upload(csv(), "a.csv").json(), "created": answer.json()["created"]}
 
 
+@pytest.mark.ci
 def test_decimal_comma_is_read_with_a_warning_in_the_preview(service):
     stored = service.upload(csv(200, ";", ","), "a.csv").json()
     assert stored["preview"]["warnings"] == [

@@ -22,6 +22,7 @@ def test_figures_are_drawn_after_the_data_set_was_deleted(service):
     assert service.store.retention.named_blobs() == frozenset()
 
 
+@pytest.mark.ci
 def test_a_job_without_its_data_set_is_resumed_only_after_the_same_upload(service):
     dataset = service.upload(csv()).json()["id"]
     job = job_in(service.store, JobState.CANCELLED, "local", spec=spec(dataset)).id
@@ -45,6 +46,7 @@ def test_a_repeated_request_after_the_deletion_of_its_job_creates_no_second_one(
     assert service.submit({"Idempotency-Key": "k2"}, **order).status_code == 202
 
 
+@pytest.mark.ci
 def test_a_list_of_wide_data_sets_has_no_columns(service):
     rows = ["t_s," + ",".join(f"c{each}_V" for each in range(300))]
     rows += [

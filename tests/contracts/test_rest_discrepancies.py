@@ -255,6 +255,7 @@ def test_the_report_is_self_contained_and_has_a_strict_policy(finished):
     assert not re.findall(r'(?:src|href)="(?!data:)', answer.text)
 
 
+@pytest.mark.ci
 def test_the_events_of_a_diagnosis_show_its_phases(finished):
     service, job = finished
     events = parse_events(service.client.get(f"/v1/jobs/{job}/events").text)

@@ -43,6 +43,7 @@ def test_a_service_without_keys_believes_the_browser_about_the_site(service, sit
     )
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("prefix", ["", "/tools/islands"])
 def test_a_location_has_the_prefix_of_the_proxy(behind_proxy, prefix, monkeypatch):
     """Some proxies remove the prefix from the path, and some do not."""

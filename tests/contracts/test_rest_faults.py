@@ -74,6 +74,7 @@ def test_a_full_disk_while_drawing_is_reported_as_such(disk, serve):
         assert service.client.get(path).status_code == 200
 
 
+@pytest.mark.ci
 def test_a_full_disk_during_an_upload_is_reported_as_such(disk, serve, monkeypatch):
     """The disk that receives bodies is full first, then that of the links to files under their names."""
     with serve() as service:

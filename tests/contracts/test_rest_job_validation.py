@@ -124,6 +124,7 @@ def test_columns_of_two_recordings_cannot_be_combined(service):
     assert "the channels of a record must have equal length" in problem_of(answer, 422, "invalid-record")
 
 
+@pytest.mark.ci
 def test_a_replayed_job_is_not_inspected_again(service, dataset):
     """An inspection may take two minutes; a client that lost the response repeats its request earlier."""
     order, state = spec(dataset, rows="0:100"), service.app.state.islands

@@ -264,6 +264,7 @@ def test_every_figure_is_drawn_once_and_stored(service, document, finished):
     assert "script" not in report.headers["content-security-policy"]
 
 
+@pytest.mark.ci
 def test_the_preview_of_a_data_set_describes_its_columns(service):
     preview = service.upload(csv(123), "größe.csv").json()["preview"]
     assert (preview["samples"], preview["time"], preview["dt"], preview["warnings"]) == (123, "t_s", 0.01, [])

@@ -43,6 +43,7 @@ def spans(received):
                     yield sender["service.name"], span.name
 
 
+@pytest.mark.ci
 def test_requests_are_spans_except_health_checks(collector, tmp_path):
     address, received = collector
     with served(tmp_path / "data", telemetry=address) as service:

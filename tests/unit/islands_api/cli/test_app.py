@@ -153,6 +153,7 @@ def test_fit_prints_the_models_and_the_output_folder(fitted):
     assert json.loads(Path("out/result.json").read_text())["search"]["wall_s"] > 0.0
 
 
+@pytest.mark.ci
 def test_force_replaces_a_result_and_all_its_models(run, fitted):
     assert len(list(Path("out/models").iterdir())) == 3
     code, _, err = run(*FIT)

@@ -174,6 +174,7 @@ class Away:
         return getattr(self._store, name)
 
 
+@pytest.mark.ci
 def test_failed_reports_do_not_affect_the_result(store: Store, blobs: Blobs, submit: Submit) -> None:
     job = submit()
     outcome = run_job(claim(store), Away(store), blobs)

@@ -91,6 +91,7 @@ def test_checkpoint_of_a_newer_version_is_left_to_its_coordinators(
         run_identification_job(claim(store), store, blobs, SerialEngine(), lambda: None, 1e-9)
 
 
+@pytest.mark.ci
 def test_superseded_checkpoint_is_deleted_at_once(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -107,6 +108,7 @@ def test_superseded_checkpoint_is_deleted_at_once(
     assert len(seen) > 5
 
 
+@pytest.mark.ci
 def test_lost_lease_deletes_no_checkpoint_of_its_successor(store: Store, blobs: Blobs, job: Job) -> None:
     interrupt(store, blobs)
     old, new = claim(store), claim(store)

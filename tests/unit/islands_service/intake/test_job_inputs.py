@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from islands_service.domain.job_spec import Discrepancy, Identification
 from islands_service.intake.job_inputs import read_record_and_columns, read_record_and_validation
@@ -36,6 +37,7 @@ def test_recordings_of_a_diagnosis_are_joined_with_their_recorded_simulations(tm
     assert np.flatnonzero(np.diff(columns["t_s"]) < 0.0).tolist() == [119]
 
 
+@pytest.mark.ci
 def test_recordings_of_a_job_are_joined(tmp_path: Path) -> None:
     blobs = Blobs(tmp_path)
     datasets = store_datasets(blobs)

@@ -107,6 +107,7 @@ def test_job_is_submitted_watched_and_shown(
     assert "Property 1" in out
 
 
+@pytest.mark.ci
 def test_watch_prints_the_ended_job_as_json(run: Run, done: str) -> None:
     code, out, _ = run("watch", done, "--json")
     assert code == 0

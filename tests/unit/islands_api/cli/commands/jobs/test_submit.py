@@ -184,6 +184,7 @@ def test_options_of_diagnose_reach_the_job(run: Run, service: Service, owner: st
     assert out.splitlines()[0] == f"job {job['id']}: queued"
 
 
+@pytest.mark.ci
 def test_recordings_of_a_diagnosis_are_uploaded(run: Run, tmp_path: Path) -> None:
     (tmp_path / "v.csv").write_bytes(csv(120))
     words = ("--simulation", "bouc-wen-piezo", "--rows", "0:110", "--json")
