@@ -18,9 +18,9 @@ SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*
 #: Class names that two modules use: the client and the OpenAPI document name them like the core does.
 SHARED_CLASS_NAMES = {"Event", "HistoryPoint", "Preview"}
 
-#: Module names that two packages use: the application of each interface, errors and settings of each package,
+#: Module names that two packages use: the application of each interface, errors of each package,
 #: and records of jobs, keys and the second-order system, which a store or a simulator has a module for.
-SHARED_MODULE_NAMES = {"app", "errors", "second_order", "settings"}
+SHARED_MODULE_NAMES = {"app", "errors", "second_order"}
 
 
 def test_imports_keep_the_contracts() -> None:

@@ -1,33 +1,18 @@
 """Settings of the service, read from environment variables. Each field is ``ISLANDS_`` and its name."""
 
 import os
-from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from platformdirs import user_data_path
-from pydantic import AfterValidator, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from islands.errors import SettingsError
+from islands_service.settings.setting_checks import Count, Hosts, Networks, Positive
 
 #: Addresses that only this machine can reach.
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
-
-Positive = Annotated[float, Field(gt=0.0)]
-Count = Annotated[int, Field(ge=1)]
-
-
-def _check_networks(text: str) -> str:
-    networks = [network.strip() for network in text.split(",") if network.strip()]
-    for network in networks:
-        try:
-            ip_network(network)
-        except ValueError as error:
-            raise ValueError(
-                f"{error}: give addresses or networks, for example 127.0.0.1, 10.0.0.0/8"
-            ) from error
-    return ",".join(networks)
 
 
 class ServiceSettings(BaseSettings):
@@ -99,6 +84,11 @@ class ServiceSettings(BaseSettings):
         With it the first keys can be created over REST. Without it that key is revoked.
     tls_certificate, tls_key
         PEM files for HTTPS.
+    private_hosts
+        Hosts to which the service may send requests for its clients though their addresses are private,
+        separated by commas, each with an optional port: ``hooks.lan:8443, 10.0.0.7``. None by default.
+    http_hosts
+        Hosts to which such requests may be sent without TLS, in the same form. None by default.
     metrics_host, metrics_port
         Address at which a coordinator serves its metrics to Prometheus, without a key; no metrics with
         port 0. The coordinators of ``islands serve`` use this port and the following ones.
@@ -120,7 +110,7 @@ class ServiceSettings(BaseSettings):
     database_file: Path | None = None
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
-    trusted_proxies: Annotated[str, AfterValidator(_check_networks)] = ""
+    trusted_proxies: Networks = ""
     root_path: Annotated[str, Field(pattern=r"^(/[A-Za-z0-9._~-]+)*$")] = ""
     ray_address: str | None = None
     autoscaling: bool = False
@@ -151,6 +141,8 @@ class ServiceSettings(BaseSettings):
     admin_key_file: Path | None = None
     tls_certificate: Path | None = None
     tls_key: Path | None = None
+    private_hosts: Hosts = ""
+    http_hosts: Hosts = ""
     metrics_host: str = "127.0.0.1"
     metrics_port: Annotated[int, Field(ge=0, le=65535)] = 0
     log_format: Literal["text", "json"] = "text"

@@ -1,0 +1,48 @@
+"""Types of settings with their checks: numbers in a range, and lists of networks or hosts as text."""
+
+import re
+from ipaddress import ip_network
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+#: Label of a host name, and an optional port after the name or after an address in brackets.
+_HOST = re.compile(r"(?:[A-Za-z0-9_](?:[A-Za-z0-9._-]{0,252})|\[[0-9A-Fa-f:.]+\])(?::[0-9]{1,5})?")
+
+
+def split_list(text: str) -> tuple[str, ...]:
+    """Return the entries of a list that is separated by commas, without spaces and empty ones."""
+    return tuple(entry for each in text.split(",") if (entry := each.strip()))
+
+
+def _check_networks(text: str) -> str:
+    networks = split_list(text)
+    for network in networks:
+        try:
+            ip_network(network)
+        except ValueError as error:
+            raise ValueError(
+                f"{error}: give addresses or networks, for example 127.0.0.1, 10.0.0.0/8"
+            ) from error
+    return ",".join(networks)
+
+
+def _check_hosts(text: str) -> str:
+    hosts = split_list(text)
+    for host in hosts:
+        if not _HOST.fullmatch(host):
+            raise ValueError(
+                f"{host!r} is no host: give names or addresses with an optional port, for example "
+                "hooks.example.org, 10.0.0.7:8080, [fd00::7]:8080"
+            )
+    return ",".join(hosts).lower()
+
+
+Positive = Annotated[float, Field(gt=0.0)]
+Count = Annotated[int, Field(ge=1)]
+
+#: Addresses and networks, separated by commas.
+Networks = Annotated[str, AfterValidator(_check_networks)]
+
+#: Hosts with optional ports, separated by commas, in lower case.
+Hosts = Annotated[str, AfterValidator(_check_hosts)]
