@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import Connection, Row, Select, insert, select, tuple_
+from sqlalchemy import Connection, Row, bindparam, insert, select, tuple_
 
 from islands_service.domain.job import (
     ISLANDS_VERSION,
@@ -41,7 +41,8 @@ from islands_service.store.tables import events, jobs
 #: Largest number of jobs of a page.
 MAX_PAGE_SIZE = 200
 
-#: Built once, since building the statement takes as long as executing it.
+# Built once, since building a statement takes as long as executing it.
+_OWNED_JOB = select(jobs).where(jobs.c.id == bindparam("id"), jobs.c.owner == bindparam("owner"))
 _INSERT_JOB = (
     insert(jobs)
     .values(state=JobState.QUEUED, created=now(), updated=now(), islands_version=ISLANDS_VERSION)
@@ -130,7 +131,7 @@ class Jobs:
         JobNotFoundError
         """
         with self._database.read() as connection:
-            return job_from_row(_select_owned(connection, owner, job))
+            return job_from_row(_read_owned(connection, owner, job))
 
     def page(
         self,
@@ -163,7 +164,7 @@ class Jobs:
         """
 
         def operation(connection: Connection) -> Job:
-            current = _select_owned(connection, owner, job, locked=True)
+            current = _read_owned(connection, owner, job, locked=True)
             if current.state in TERMINAL:
                 raise JobStateError(f"job {job} is {current.state}: there is nothing to cancel")
             if current.cancel_requested:
@@ -200,7 +201,7 @@ class Jobs:
 
         def operation(connection: Connection) -> Job:
             dialect.lock_owner(connection, owner)
-            current = _select_owned(connection, owner, job, locked=True)
+            current = _read_owned(connection, owner, job, locked=True)
             if current.state not in RESUMABLE:
                 raise JobStateError(
                     f"job {job} is {current.state}: only a failed or cancelled job can be resumed"
@@ -235,7 +236,7 @@ class Jobs:
         """
 
         def operation(connection: Connection) -> None:
-            current = _select_owned(connection, owner, job, locked=True)
+            current = _read_owned(connection, owner, job, locked=True)
             if current.state not in TERMINAL:
                 raise JobStateError(f"job {job} is {current.state}: cancel it first")
             delete_job(connection, current)
@@ -267,9 +268,9 @@ class Jobs:
             return read_queue_statistics(connection)
 
 
-def _select_owned(connection: Connection, owner: str, job: str, locked: bool = False) -> Row[Any]:
-    query: Select[Any] = select(jobs).where(jobs.c.id == job, jobs.c.owner == owner)
-    row = connection.execute(query.with_for_update() if locked else query).one_or_none()
+def _read_owned(connection: Connection, owner: str, job: str, locked: bool = False) -> Row[Any]:
+    query = _OWNED_JOB.with_for_update() if locked else _OWNED_JOB
+    row = connection.execute(query, {"id": job, "owner": owner}).one_or_none()
     if row is None:
         raise JobNotFoundError(f"there is no job {job!r}")
     return row

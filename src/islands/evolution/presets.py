@@ -1,7 +1,7 @@
 """Table of presets. The presets `paper-*` are those of the paper."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -11,6 +11,8 @@ from islands.evolution.settings import Settings
 
 #: Section 6.1, theoretical piezo: shooting over 500 steps, tolerance 1e-5.
 _PAPER = Settings()
+
+_SETTING_NAMES = dict.fromkeys(field.name for field in fields(Settings))
 
 #: Appendix A, first system: one-step-ahead error, multiplication only, no constraint.
 _APPENDIX = Settings(
@@ -180,7 +182,7 @@ def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
         raise SettingsError("the preset auto needs the record of one output: name another preset")
     base = lookup({AUTO: _PAPER, **PRESETS}, preset, "preset")
     for name in changes:
-        lookup(asdict(base), name, "setting")
+        lookup(_SETTING_NAMES, name, "setting")
     if "max_terms" in changes and "initial_terms" not in changes:
         fewest, most = (min(count, changes["max_terms"]) for count in base.initial_terms)
         changes = {**changes, "initial_terms": (max(1, fewest), max(1, most))}

@@ -2,7 +2,7 @@
 
 import hashlib
 
-from sqlalchemy import Connection, func, select
+from sqlalchemy import BigInteger, BindParameter, Connection, bindparam, func, select
 
 from islands_service.domain.job import (
     ACTIVE,
@@ -15,6 +15,25 @@ from islands_service.domain.job import (
 )
 from islands_service.store.job_rows.job_events import job_from_row
 from islands_service.store.tables import datasets, jobs, owners, retired_keys
+
+# Built once, since building a statement takes as long as executing it.
+_OF_OWNER: BindParameter[str] = bindparam("owner")
+_OF_KEY: BindParameter[str] = bindparam("key")
+_ACCEPTED = select(jobs).where(jobs.c.owner == _OF_OWNER, jobs.c.idempotency_key == _OF_KEY)
+_RETIRED = select(retired_keys).where(
+    retired_keys.c.owner == _OF_OWNER, retired_keys.c.idempotency_key == _OF_KEY
+)
+_QUOTA = (
+    select(
+        func.count(),
+        func.coalesce(
+            select(owners.c.max_active).where(owners.c.name == _OF_OWNER).scalar_subquery(),
+            bindparam("most", type_=BigInteger),
+        ),
+    )
+    .select_from(jobs)
+    .where(jobs.c.owner == _OF_OWNER, jobs.c.state.in_(ACTIVE))
+)
 
 
 def request_digest(submission: Submission) -> str:
@@ -35,8 +54,7 @@ def find_accepted_job(connection: Connection, submission: Submission) -> Job | N
     key = submission.idempotency_key
     if key is None:
         return None
-    query = select(jobs).where(jobs.c.owner == submission.owner, jobs.c.idempotency_key == key)
-    job = connection.execute(query).one_or_none()
+    job = connection.execute(_ACCEPTED, {"owner": submission.owner, "key": key}).one_or_none()
     if job is None:
         _check_retired_key(connection, submission, key)
         return None
@@ -45,11 +63,7 @@ def find_accepted_job(connection: Connection, submission: Submission) -> Job | N
 
 
 def _check_retired_key(connection: Connection, submission: Submission, key: str) -> None:
-    retired = connection.execute(
-        select(retired_keys).where(
-            retired_keys.c.owner == submission.owner, retired_keys.c.idempotency_key == key
-        )
-    ).one_or_none()
+    retired = connection.execute(_RETIRED, {"owner": submission.owner, "key": key}).one_or_none()
     if retired is not None:
         _check_request(retired.job_id, retired.request_sha256, submission, key)
         raise JobDeletedError(
@@ -91,12 +105,7 @@ def check_quota(connection: Connection, owner: str, most: int) -> None:
     ------
     QuotaError
     """
-    own = select(owners.c.max_active).where(owners.c.name == owner).scalar_subquery()
-    active, most = connection.execute(
-        select(func.count(), func.coalesce(own, most))
-        .select_from(jobs)
-        .where(jobs.c.owner == owner, jobs.c.state.in_(ACTIVE))
-    ).one()
+    active, most = connection.execute(_QUOTA, {"owner": owner, "most": most}).one()
     if active >= most:
         raise QuotaError(
             f"{active} jobs are waiting or running, and {most} is the most: wait for some, or cancel some"
