@@ -115,7 +115,7 @@ def copy_blob(source: Blobs, target: Blobs, blob: str) -> None:
     BackupError
         Its content does not have the SHA-256 of its name.
     """
-    with source.path(blob).open("rb") as stream, target.receiving() as copy:
+    with source.open(blob) as stream, target.receiving() as copy:
         shutil.copyfileobj(stream, copy, 1 << 20)
         copied = target.keep(copy)
     if copied != blob:

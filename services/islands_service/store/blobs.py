@@ -45,10 +45,20 @@ class Blobs:
         """
         path = self._at(blob)
         if not path.is_file():
-            raise BlobNotFoundError(
-                f"the blob {blob} is not in {self._folder}: restore the data folder from a backup"
-            )
+            raise self._not_found(blob)
         return path
+
+    def open(self, blob: str) -> IO[bytes]:
+        """Open a blob for reading. An open blob can be read even if it is deleted meanwhile.
+
+        Raises
+        ------
+        BlobNotFoundError
+        """
+        try:
+            return self._at(blob).open("rb")
+        except FileNotFoundError as error:
+            raise self._not_found(blob) from error
 
     def read(self, blob: str) -> bytes:
         """Return the bytes of a blob.
@@ -57,7 +67,8 @@ class Blobs:
         ------
         BlobNotFoundError
         """
-        return self.path(blob).read_bytes()
+        with self.open(blob) as stream:
+            return stream.read()
 
     def write(self, data: bytes) -> str:
         """Store bytes; return their blob once it is on the disk.
@@ -157,6 +168,11 @@ class Blobs:
         # A file that cannot be removed now is removed by a sweep.
         with suppress(OSError):
             self._at(blob).unlink()
+
+    def _not_found(self, blob: str) -> BlobNotFoundError:
+        return BlobNotFoundError(
+            f"the blob {blob} is not in {self._folder}: restore the data folder from a backup"
+        )
 
     def _at(self, blob: str) -> Path:
         return self._folder / blob[:2] / blob
