@@ -9,6 +9,8 @@ from islands_service.domain.job import Job, JobState
 from islands_service.store.backends.dialect import now
 from islands_service.store.tables import events, jobs
 
+_INSERT_EVENT = insert(events)
+
 
 def update_job(connection: Connection, job: str, **values: Any) -> Row[Any]:
     """Update a job, raise its version, and return the new row."""
@@ -23,7 +25,7 @@ def update_job(connection: Connection, job: str, **values: Any) -> Row[Any]:
 def append_event(connection: Connection, row: Row[Any], kind: str, data: str = "{}") -> None:
     """Append the event of the current version of a job."""
     values = {"job_id": row.id, "number": row.version, "kind": kind, "data": data, "at": row.updated}
-    connection.execute(insert(events), values)
+    connection.execute(_INSERT_EVENT, values)
 
 
 def job_from_row(row: Row[Any]) -> Job:
