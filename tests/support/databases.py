@@ -13,7 +13,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from sqlalchemy import Engine, create_engine, text
 from sqlalchemy.exc import OperationalError
 
 from islands_service.store.tables import metadata
+from support.processes import descendants
 
 #: Environment variable with a database whose user may create others: ``postgresql+psycopg://user:password@host/database``.
 VARIABLE = "ISLANDS_TEST_POSTGRES"
@@ -76,6 +77,23 @@ class Server:
         """URL of the initial database."""
         return f"postgresql+psycopg://islands@/postgres?host={self.folder}"
 
+    @property
+    def socket(self) -> Path:
+        """Unix socket that the server listens on."""
+        return self.folder / ".s.PGSQL.5432"
+
+    @contextmanager
+    def frozen(self) -> Iterator[None]:
+        """Suspend all processes of the server while the block runs."""
+        assert self._process is not None
+        os.kill(self._process.pid, signal.SIGSTOP)  # first, so that no further process starts
+        processes = [self._process.pid, *descendants(self._process.pid)]
+        try:
+            _send(signal.SIGSTOP, processes)
+            yield
+        finally:
+            _send(signal.SIGCONT, processes)
+
     def start(self) -> None:
         settings = self._settings | {"unix_socket_directories": self.folder}
         options = [word for name, value in settings.items() for word in ("-c", f"{name}={value}")]
@@ -102,6 +120,12 @@ class Server:
         if self._process is not None:
             self.stop()
         shutil.rmtree(self.folder)
+
+
+def _send(number: signal.Signals, processes: list[int]) -> None:
+    for pid in processes:
+        with suppress(ProcessLookupError):
+            os.kill(pid, number)
 
 
 def is_available(url: str) -> bool:

@@ -79,6 +79,7 @@ class Database:
         self.url = url
         self.engine = make_engine(url)
         self._writing = self.engine.execution_options(writes=True)
+        self._patient = self.engine.execution_options(patient=True)
         self._waiting: SimpleQueue[_Waiting | None] = SimpleQueue()
         self._writer: Thread | None = None
         self._closed = False
@@ -146,14 +147,14 @@ class Database:
         StoreUnavailableError
         """
         self._check_open()
-        with translate_db_errors(), self.engine.begin() as connection:
+        with translate_db_errors(), self._patient.begin() as connection:
             dialect.begin_snapshot(connection)
             yield connection
 
     @contextmanager
     def exclusive(self) -> Iterator[Connection]:
         """Open a writing transaction outside the groups, for migrations."""
-        with translate_db_errors(), self._writing.begin() as connection:
+        with translate_db_errors(), self._patient.execution_options(writes=True).begin() as connection:
             yield connection
 
     def _check_open(self) -> None:

@@ -29,7 +29,11 @@ SETTINGS = ("idle_in_transaction_session_timeout = '10s'",)
 
 
 def make_engine(url: str) -> Engine:
-    """Return an engine for a URL. A transaction that writes must set the execution option ``writes``."""
+    """Return an engine for a URL.
+
+    A transaction that writes must set the execution option ``writes``, and one with statements that may take
+    minutes the option ``patient``.
+    """
     return (_sqlite if url.startswith("sqlite") else _postgresql)(url)
 
 
@@ -74,6 +78,9 @@ def _enable_wal(connection: sqlite3.Connection) -> None:
 
 
 def _postgresql(url: str) -> Engine:
+    # An optional dependency, which SQLite does not need.
+    from islands_service.store.backends.timed_connection import TimedConnection  # noqa: PLC0415
+
     given = make_url(url).query
     engine = create_engine(
         url,
@@ -90,5 +97,15 @@ def _postgresql(url: str) -> Engine:
         for setting in SETTINGS:
             connection.execute(f"SET {setting}")
         connection.commit()
+
+    @event.listens_for(engine, "do_connect")
+    def _connect(_dialect: Any, _record: Any, arguments: Any, options: Any) -> Any:
+        return TimedConnection.connect(*arguments, **options)
+
+    @event.listens_for(engine, "begin")
+    def _begin(connection: Connection) -> None:
+        driver = connection.connection.driver_connection
+        assert isinstance(driver, TimedConnection)
+        driver.patient = connection.get_execution_options().get("patient", False)
 
     return engine
