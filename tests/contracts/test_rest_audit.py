@@ -17,6 +17,8 @@ CHANGES = {
     ("POST", "/v1/admin/keys"): Action.CREATE_KEY,
     ("POST", "/v1/admin/keys/{key}/revoke"): Action.REVOKE_KEY,
     ("PATCH", "/v1/admin/owners/{owner}"): Action.CHANGE_OWNER,
+    ("POST", "/v1/webhooks"): Action.CREATE_WEBHOOK,
+    ("DELETE", "/v1/webhooks/{webhook}"): Action.DELETE_WEBHOOK,
 }
 
 
@@ -32,6 +34,7 @@ def test_every_change_is_recorded_with_its_key_and_address(service):
     (key,) = service.store.keys.all()
     used, unused = kept(service.store, "me"), kept(service.store, "me", b"2")
     failed = job_in(service.store, JobState.FAILED, "me", spec=spec(used)).id
+    webhook = service.store.webhooks.create("me", "https://1.1.1.1", ("job.succeeded",), 1)[0].id
     requests = [
         ("POST", "/v1/datasets", {"files": {"file": ("a.csv", csv())}}),
         ("DELETE", "/v1/datasets/{dataset}", {}),
@@ -42,15 +45,17 @@ def test_every_change_is_recorded_with_its_key_and_address(service):
         ("DELETE", "/v1/jobs/{job}", {}),
         ("POST", "/v1/admin/keys", {"json": {"scopes": ["read"], "owner": "me"}}),
         ("PATCH", "/v1/admin/owners/{owner}", {"json": {"weight": 7}}),
+        ("DELETE", "/v1/webhooks/{webhook}", {}),
+        ("POST", "/v1/webhooks", {"json": {"url": "https://1.1.1.1"}}),
         # The last one, since it is the key of these requests.
         ("POST", "/v1/admin/keys/{key}/revoke", {}),
     ]
     assert {(method, route) for method, route, _ in requests} == set(CHANGES)
     for method, route, body in requests:
-        path = route.format(job=failed, dataset=unused, owner="me", key=key.id)
+        path = route.format(job=failed, dataset=unused, owner="me", key=key.id, webhook=webhook)
         answer = service.client.request(method, path, headers=header, **body)
         assert answer.is_success, (route, answer.text)
-        subjects = {"job": failed, "dataset": unused, "owner": "me", "key": key.id}
+        subjects = {"job": failed, "dataset": unused, "owner": "me", "key": key.id, "webhook": webhook}
         subject = subjects.get(route.partition("{")[2].partition("}")[0])
         if "{" not in route:
             subject = answer.json()["id"]

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from islands_api.web.routes import events
-from islands_service.store.keys import SCOPES
+from islands_service.store.tenants.keys import SCOPES
 from support.service import PATIENCE, csv, held, kept, problem_of, queued, spec
 
 
@@ -49,6 +49,10 @@ GUARDED = {
     ("GET", "/v1/admin/owners"): "admin",
     ("GET", "/v1/admin/owners/{owner}"): "admin",
     ("PATCH", "/v1/admin/owners/{owner}"): "admin",
+    ("GET", "/v1/webhooks"): "read",
+    ("POST", "/v1/webhooks"): "write",
+    ("DELETE", "/v1/webhooks/{webhook}"): "write",
+    ("GET", "/v1/webhooks/{webhook}/deliveries"): "read",
 }
 
 #: Public routes.
@@ -57,12 +61,16 @@ OPEN = {("GET", "/healthz"), ("GET", "/readyz"), ("GET", "/problems/{kind}")}
 
 def send_request(service, method, path, headers):
     """Send a request, with a body if the route needs one."""
-    path = path.format(job="0" * 32, dataset="0" * 32, rank=1, figure="loop", key="0", owner="0")
+    path = path.format(
+        job="0" * 32, dataset="0" * 32, rank=1, figure="loop", key="0", owner="0", webhook="0" * 32
+    )
     body = {"json": spec("0-csv")} if (method, path) == ("POST", "/v1/jobs") else {}
     if path == "/v1/discrepancies":
         body = {"json": held("0-csv")}
     if path.startswith("/v1/admin") and method in ("POST", "PATCH"):
         body = {"json": {}}
+    if (method, path) == ("POST", "/v1/webhooks"):
+        body = {"json": {"url": "https://127.0.0.1"}}
     if (method, path) == ("POST", "/v1/datasets"):
         body = {"files": {"file": ("a.csv", b"")}}
     return service.client.request(method, path, headers=headers, **body)

@@ -9,11 +9,11 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import event, select
+from sqlalchemy import Connection, event, select, update
 
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, ProgressReport, Submission
 from islands_service.store import Store
-from islands_service.store.tables import metadata
+from islands_service.store.tables import deliveries, metadata, webhooks
 from support.processes import eventually
 
 ALICE, BOB = "alice", "bob"
@@ -91,6 +91,17 @@ def job_in(store: Store, state: JobState, owner: str = ALICE, /, **changes: Any)
     job = store.jobs.get(owner, job.id)
     assert job.state == state
     return job
+
+
+def expire_webhooks(store: Store) -> None:
+    """Make every unfinished delivery due, and let the leases of webhooks expire, as time does."""
+
+    def operation(connection: Connection) -> None:
+        unfinished = update(deliveries).where(deliveries.c.next_at.is_not(None))
+        connection.execute(unfinished.values(next_at=0.0))
+        connection.execute(update(webhooks).values(busy_until=0.0))
+
+    store.database.write(operation)
 
 
 def contents(store: Store) -> dict[str, list[tuple[Any, ...]]]:

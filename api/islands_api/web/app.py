@@ -28,6 +28,8 @@ from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.routes import ROUTERS
 from islands_api.web.uploads.upload_admission import UploadAdmission
 from islands_service.liveness import EVERY, send_heartbeat
+from islands_service.outbound.checked_client import make_checked_client
+from islands_service.outbound.delivery_sender import DeliverySender
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -73,9 +75,14 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             OwnerCounts("requests for figures"),
             OwnerCounts("event streams"),
             executor,
+            make_checked_client(settings),
+        )
+        sender = DeliverySender(
+            opened.deliveries, state.outbound, executor.run, state.metrics.observe_delivery
         )
         app.state.keys = KeyCache(state)
-        tasks = [asyncio.create_task(hub.run()), asyncio.create_task(_send_heartbeats(settings.lifeline))]
+        running = (hub.run(), sender.run(), _send_heartbeats(settings.lifeline))
+        tasks = [asyncio.create_task(each) for each in running]
         try:
             yield
         finally:

@@ -12,7 +12,7 @@ from islands_api.web.dependencies import AppState
 from islands_api.web.problems import AuthenticationError, InsufficientScopeError
 from islands_service.domain.job import Requester
 from islands_service.store.database import StoreError
-from islands_service.store.keys import SCOPES, Key
+from islands_service.store.tenants.keys import SCOPES, Key
 
 #: Owner of all data of requests without a key, which only a loopback address allows.
 LOCAL_OWNER = "local"

@@ -15,6 +15,7 @@ from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.responses import QueuePositions
 from islands_api.web.uploads.upload_admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
+from islands_service.outbound.checked_client import CheckedClient
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -48,6 +49,7 @@ class AppState:
     drawings: OwnerCounts
     streams: OwnerCounts
     executor: BlockingExecutor
+    outbound: CheckedClient
     positions: QueuePositions = field(default_factory=QueuePositions)
 
     async def quotas(self, owner: str) -> Quotas:

@@ -23,11 +23,12 @@ from islands_service.domain.job import (
     JobStateError,
     QuotaError,
 )
+from islands_service.domain.webhook import WebhookNotFoundError
 from islands_service.store.blobs import BlobNotFoundError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError
-from islands_service.store.keys import KeyNotFoundError
-from islands_service.store.owners import OwnerNotFoundError
+from islands_service.store.tenants.keys import KeyNotFoundError
+from islands_service.store.tenants.owners import OwnerNotFoundError
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -149,6 +150,9 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         ),
         KeyNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "no-such-key", "There is no such key"),
         OwnerNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "no-such-owner", "There is no such owner"),
+        WebhookNotFoundError: ProblemKind(
+            HTTPStatus.NOT_FOUND, "no-such-webhook", "There is no such webhook"
+        ),
         ResourceNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "not-found", "There is no such resource"),
         MalformedBodyError: ProblemKind(HTTPStatus.BAD_REQUEST, "bad-request", "The request cannot be read"),
         RequestTimeoutError: ProblemKind(

@@ -41,9 +41,20 @@ class ServiceMetrics:
             "islands_dataset_bytes_received", "Bytes of data sets received.", registry=self.registry
         )
         self.streams = Gauge("islands_event_streams", "Open event streams.", registry=self.registry)
+        self._deliveries = Histogram(
+            "islands_webhook_delivery_seconds",
+            "Time of an attempt to deliver an event: delivered, retried (repeated later), failed (the last).",
+            ["outcome"],
+            buckets=(0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 15.0),
+            registry=self.registry,
+        )
         store.database.observe_commit = make_commit_histogram(self.registry).observe
         self.registry.register(_JobCollector(store))
         self.registry.register(_DiskCollector(folder))
+
+    def observe_delivery(self, outcome: str, seconds: float) -> None:
+        """Count an attempt to deliver an event to a webhook."""
+        self._deliveries.labels(outcome).observe(seconds)
 
     def page(self) -> bytes:
         """Return all metrics in the text format of Prometheus.
@@ -94,6 +105,15 @@ class _JobCollector(Collector):
         for (owner, state), count in _combine_owners(statistics.active).items():
             active.add_metric([owner, state], count)
         yield active
+        pending = self._store.deliveries.pending()
+        yield GaugeMetricFamily(
+            "islands_webhook_deliveries_pending",
+            "Deliveries of webhooks to be sent or repeated.",
+            pending.count,
+        )
+        yield GaugeMetricFamily(
+            "islands_webhook_oldest_seconds", "Age of the oldest pending delivery.", pending.oldest
+        )
         yield GaugeMetricFamily("islands_leases", "Leases that have not expired.", statistics.leases)
         running = (
             ("islands_evaluations_per_second", "Individuals evaluated per second.", "evaluations_per_second"),

@@ -11,8 +11,9 @@ from starlette.responses import JSONResponse
 
 from islands_service.domain.job import Job, JobState
 from islands_service.domain.owner import Owner
+from islands_service.domain.webhook import Delivery, Webhook
 from islands_service.store.datasets import StoredDataset
-from islands_service.store.keys import Key
+from islands_service.store.tenants.keys import Key
 
 #: Seconds for which the position of a queued job is kept.
 _POSITION_SECONDS = 1.0
@@ -120,6 +121,32 @@ def owner_document(owner: Owner) -> dict[str, Any]:
         "queued": owner.queued,
         "running": owner.running,
         "stored": owner.stored,
+    }
+
+
+def webhook_document(webhook: Webhook) -> dict[str, Any]:
+    """Convert a webhook to a document with the fields of `islands_api.webhook_schemas.WebhookView`."""
+    return {
+        "id": webhook.id,
+        "url": webhook.url,
+        "events": webhook.events,
+        "created": _format_time(webhook.created),
+    }
+
+
+def delivery_document(delivery: Delivery) -> dict[str, Any]:
+    """Convert a delivery to a document with the fields of `islands_api.webhook_schemas.DeliveryView`."""
+    return {
+        "id": delivery.id,
+        "event": delivery.event,
+        "job": delivery.job,
+        "state": delivery.state,
+        "attempts": delivery.attempts,
+        "created": _format_time(delivery.created),
+        "attempted": _format_time(delivery.attempted),
+        "next_attempt": _format_time(delivery.next_attempt),
+        "status": delivery.status,
+        "error": delivery.error,
     }
 
 

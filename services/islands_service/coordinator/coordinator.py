@@ -48,6 +48,9 @@ RAY_STARTUP_TIMEOUT = 60.0
 #: Seconds between two sweeps of expired jobs and unreferenced blobs.
 SWEEP_INTERVAL = 600.0
 
+#: Seconds for which a finished delivery of a webhook is kept.
+DELIVERY_RETENTION = 7 * 86_400.0
+
 #: Seconds after which a blob that no row references is deleted.
 ORPHAN_AGE = 3600.0
 
@@ -285,6 +288,7 @@ class Coordinator:
             self._store.retention.delete_expired(self._settings.retention)
         if self._settings.audit_retention:
             self._store.retention.delete_old_audit(self._settings.audit_retention)
+        self._store.deliveries.delete_old(DELIVERY_RETENTION)
         # Read the clock before the references, and those before the files: a blob that is referenced only
         # after the query is younger than the limit.
         before = time() - ORPHAN_AGE

@@ -121,6 +121,18 @@ class CheckedClient:
                 finally:
                     await response.aclose()
 
+    async def check_host(self, url: str, seconds: float) -> None:
+        """Check a URL and the addresses of its host, without a connection.
+
+        Raises
+        ------
+        OutboundRefusedError, OutboundFailedError
+            See `open`.
+        """
+        parsed = self.check_url(url)
+        async with _deadline(parsed.host, seconds):
+            await self._addresses(parsed)
+
     async def _addresses(self, url: httpx.URL) -> tuple[str, ...]:
         """Return the addresses of the host of a URL.
 

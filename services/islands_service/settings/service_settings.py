@@ -84,6 +84,8 @@ class ServiceSettings(BaseSettings):
         With it the first keys can be created over REST. Without it that key is revoked.
     tls_certificate, tls_key
         PEM files for HTTPS.
+    max_webhooks
+        Webhooks of one owner. 0 disables webhooks.
     private_hosts
         Hosts to which the service may send requests for its clients though their addresses are private,
         separated by commas, each with an optional port: ``hooks.lan:8443, 10.0.0.7``. None by default.
@@ -141,6 +143,7 @@ class ServiceSettings(BaseSettings):
     admin_key_file: Path | None = None
     tls_certificate: Path | None = None
     tls_key: Path | None = None
+    max_webhooks: Annotated[int, Field(ge=0)] = 10
     private_hosts: Hosts = ""
     http_hosts: Hosts = ""
     metrics_host: str = "127.0.0.1"

@@ -27,6 +27,8 @@ class Action(StrEnum):
     CREATE_KEY = "create-key"
     REVOKE_KEY = "revoke-key"
     CHANGE_OWNER = "change-owner"
+    CREATE_WEBHOOK = "create-webhook"
+    DELETE_WEBHOOK = "delete-webhook"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,13 +42,13 @@ class AuditEntry:
     action : str
         One of `Action`; a newer version may have others.
     owner, subject : str
-        Owner, and id, of the job, the data set or the key; the owner is its own subject.
+        Owner, and id, of the job, the data set, the key or the webhook; the owner is its own subject.
     key_id : str or None
         Key of the request; None if it needed none.
     address : str
         Address of the client, or ``command line``.
     details : str or None
-        New values of a changed owner as JSON.
+        New values of a changed owner, or the host of a new webhook, as JSON.
     """
 
     at: float

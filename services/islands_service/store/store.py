@@ -6,12 +6,14 @@ from islands_service.store.audit import AuditTrail
 from islands_service.store.database import Database
 from islands_service.store.datasets import Datasets
 from islands_service.store.jobs import Jobs
-from islands_service.store.keys import Keys
 from islands_service.store.leases import Leases
 from islands_service.store.migrations.upgrade import prepare
-from islands_service.store.owners import Owners
 from islands_service.store.results import Results
 from islands_service.store.retention import Retention
+from islands_service.store.tenants.deliveries import Deliveries
+from islands_service.store.tenants.keys import Keys
+from islands_service.store.tenants.owners import Owners
+from islands_service.store.tenants.webhooks import Webhooks
 
 
 class Store:
@@ -21,7 +23,8 @@ class Store:
     durable. A job belongs to one lease at a time, and a write under an older one changes nothing and raises
     `LeaseLostError`. A checkpoint, its progress and its event appear together or not at all. An idempotency
     key names one job. Events of a job are numbered without gaps, in the order in which they became visible.
-    An owner cannot access data of another owner. A change and its entry in the audit trail appear together.
+    An owner cannot access data of another owner. A change and its entry in the audit trail appear together;
+    so do the end of a job and the deliveries of its webhooks.
 
     Parameters
     ----------
@@ -49,6 +52,8 @@ class Store:
         self.datasets = Datasets(self.database)
         self.keys = Keys(self.database)
         self.owners = Owners(self.database)
+        self.webhooks = Webhooks(self.database)
+        self.deliveries = Deliveries(self.database)
         self.retention = Retention(self.database)
         self.audit = AuditTrail(self.database)
 

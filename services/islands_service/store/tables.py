@@ -161,6 +161,43 @@ keys = Table(
     Column("revoked", Float),
 )
 
+#: URLs that receive the events of an owner's jobs.
+webhooks = Table(
+    "webhooks",
+    metadata,
+    Column("id", String(32), primary_key=True),
+    Column("owner", String(64), nullable=False),
+    Column("url", Text, nullable=False),
+    Column("events", Text, nullable=False),
+    # Key of the signatures, which cannot be computed from a hash.
+    Column("secret", String(64), nullable=False),
+    Column("created", Float, nullable=False),
+    # Until this time a process sends to the URL.
+    Column("busy_until", Float, nullable=False, server_default=text("0")),
+    Index(None, "owner"),
+)
+
+#: Outbox of the events of webhooks, and what was sent.
+deliveries = Table(
+    "deliveries",
+    metadata,
+    Column("id", String(32), primary_key=True),
+    Column("webhook_id", String(32), ForeignKey("webhooks.id", ondelete="CASCADE"), nullable=False),
+    Column("event", String(32), nullable=False),
+    Column("job_id", String(32), nullable=False),
+    Column("body", Text, nullable=False),
+    Column("created", Float, nullable=False),
+    Column("attempts", Integer, nullable=False),
+    # Time of the next attempt; null if the delivery is finished.
+    Column("next_at", Float),
+    Column("attempted", Float),
+    Column("delivered", Float),
+    Column("status", Integer),
+    Column("error", Text),
+    Index(None, "webhook_id", "next_at"),
+    Index(None, "webhook_id", "created"),
+)
+
 #: Owners with a weight, a quota or a claimed job. All others have the defaults.
 owners = Table(
     "owners",
@@ -182,12 +219,12 @@ audit = Table(
     Column("at", Float, nullable=False),
     Column("action", String(32), nullable=False),
     Column("owner", String(64), nullable=False),
-    # Id of the job, the data set or the key, or name of the owner.
+    # Id of the job, the data set, the key or the webhook, or name of the owner.
     Column("subject", String(64), nullable=False),
     # Key of the request; null without one.
     Column("key_id", String(16)),
     Column("address", String(64), nullable=False),
-    # New values of a changed owner.
+    # New values of a changed owner, or the host of a new webhook.
     Column("details", Text),
     Index(None, "at"),
     Index(None, "owner", "at"),

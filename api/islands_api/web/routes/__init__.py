@@ -16,6 +16,7 @@ from islands_api.web.routes import (
     owners,
     page,
     service,
+    webhooks,
 )
 
 #: All routers of the application.
@@ -28,6 +29,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     figures.router,
     keys.router,
     owners.router,
+    webhooks.router,
     service.router,
     page.router,
 )

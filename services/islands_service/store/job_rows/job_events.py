@@ -5,9 +5,10 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, insert, update
 
-from islands_service.domain.job import Job, JobState
+from islands_service.domain.job import TERMINAL, Job, JobState
 from islands_service.store.backends.dialect import now
 from islands_service.store.tables import events, jobs
+from islands_service.store.tenants.deliveries import queue_deliveries
 
 _INSERT_EVENT = insert(events)
 
@@ -23,9 +24,11 @@ def update_job(connection: Connection, job: str, **values: Any) -> Row[Any]:
 
 
 def append_event(connection: Connection, row: Row[Any], kind: str, data: str = "{}") -> None:
-    """Append the event of the current version of a job."""
+    """Append the event of the current version of a job; at its end also to the outbox of webhooks."""
     values = {"job_id": row.id, "number": row.version, "kind": kind, "data": data, "at": row.updated}
     connection.execute(_INSERT_EVENT, values)
+    if kind in TERMINAL:
+        queue_deliveries(connection, row)
 
 
 def job_from_row(row: Row[Any]) -> Job:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from islands_api.client import Client, ServiceError
-from islands_service.store.keys import SCOPES, Key
+from islands_service.store.tenants.keys import SCOPES, Key
 from support.processes import eventually
 from support.service import Service
 

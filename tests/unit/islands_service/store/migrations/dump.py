@@ -25,6 +25,7 @@ def fill(store: Store) -> None:
     store.keys.create("revoked", frozenset({"read", "write"}), ALICE, seconds=3600.0)
     store.keys.revoke(store.keys.all()[0].id)
     store.datasets.add(ALICE, "Bühne.csv", ".csv", BLOB, 12, {"columns": [{"name": "u", "unit": "µm"}]})
+    store.webhooks.create(ALICE, "https://hooks.example.org/a", ("job.succeeded",), 1)
     for outcome, owner in ((FOUND, ALICE), (FAILED, BOB)):
         submitted(store, owner, name="it's done; really", idempotency_key="k")
         lease = claimed(store)

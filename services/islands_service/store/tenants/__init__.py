@@ -1,0 +1,1 @@
+"""Tenants of the service: keys, owners with their quotas, and webhooks with their deliveries."""

@@ -1,0 +1,179 @@
+"""Deliveries of webhooks: an outbox that is filled in the transaction that changes the state of a job.
+
+A process sends to a webhook while it holds its lease, ``busy_until``. Each webhook therefore receives one
+request at a time, and a slow one delays no other. If the process ends, the lease expires, and the delivery is
+repeated under the same id: at least once.
+"""
+
+import json
+from dataclasses import dataclass
+from typing import Any
+from uuid import uuid4
+
+from sqlalchemy import Connection, Row, delete, exists, func, insert, select, update
+
+from islands_service.domain.webhook import EVENTS, Delivery, DueDelivery, make_body, retry_delay
+from islands_service.store.backends.dialect import now
+from islands_service.store.database import Database
+from islands_service.store.tables import deliveries, webhooks
+
+#: Largest number of characters of an error that is kept.
+_MAX_ERROR = 500
+
+#: Whether a webhook has a delivery to send now.
+_HAS_DUE = exists(
+    select(deliveries.c.id).where(deliveries.c.webhook_id == webhooks.c.id, deliveries.c.next_at <= now())
+)
+
+_DUE_WEBHOOKS = select(webhooks).where(webhooks.c.busy_until <= now(), _HAS_DUE)
+
+
+@dataclass(frozen=True, slots=True)
+class PendingDeliveries:
+    """Number of the deliveries that are not finished, and seconds since the creation of the oldest one."""
+
+    count: int
+    oldest: float
+
+
+def queue_deliveries(connection: Connection, job: Row[Any]) -> None:
+    """Add the event of a job that has ended to the outbox of its owner's webhooks."""
+    event = EVENTS[job.state]
+    found = connection.execute(
+        select(webhooks.c.id, webhooks.c.events).where(webhooks.c.owner == job.owner)
+    ).all()
+    body = make_body(event, job.id, job.kind, job.name, job.state, job.updated)
+    for webhook in found:
+        if event in json.loads(webhook.events):
+            values = {
+                "id": uuid4().hex,
+                "webhook_id": webhook.id,
+                "event": event,
+                "job_id": job.id,
+                "body": body,
+                "attempts": 0,
+                "created": job.updated,
+                "next_at": job.updated,
+            }
+            connection.execute(insert(deliveries), values)
+
+
+class Deliveries:
+    """Delivery operations of the store, used by the process that sends.
+
+    Parameters
+    ----------
+    database : Database
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def claim(self, seconds: float, most: int) -> tuple[DueDelivery, ...]:
+        """Claim the oldest due delivery of each webhook to which no process is sending.
+
+        The webhooks that have waited longest come first.
+
+        Parameters
+        ----------
+        seconds : float
+            Time after which the webhook can be claimed again if `record` was not called.
+        most : int
+            Largest number of deliveries.
+        """
+        with self._database.read() as connection:
+            if connection.execute(_DUE_WEBHOOKS.limit(1)).one_or_none() is None:
+                return ()
+
+        def operation(connection: Connection) -> tuple[DueDelivery, ...]:
+            free = _DUE_WEBHOOKS.order_by(webhooks.c.busy_until, webhooks.c.id).limit(most)
+            rows = connection.execute(free.with_for_update(skip_locked=True)).all()
+            return tuple(_lease_webhook(connection, row, seconds) for row in rows)
+
+        return self._database.write(operation)
+
+    def record(self, due: DueDelivery, status: int | None, error: str | None) -> bool:
+        """Store the outcome of an attempt; return whether the delivery is finished.
+
+        A failed attempt is repeated after `retry_delay`. Nothing changes if another process has claimed the
+        delivery since.
+
+        Parameters
+        ----------
+        status : int or None
+            HTTP status of the response.
+        error : str or None
+            Why the attempt has failed; None if it has succeeded.
+        """
+        delay = None if error is None else retry_delay(due.attempt)
+
+        def operation(connection: Connection) -> None:
+            held = (deliveries.c.id == due.id) & (deliveries.c.attempts == due.attempt)
+            connection.execute(
+                update(deliveries)
+                .where(held, deliveries.c.next_at.is_not(None))
+                .values(
+                    next_at=None if delay is None else now() + delay,
+                    delivered=now() if error is None else None,
+                    status=status,
+                    error=None if error is None else error[:_MAX_ERROR],
+                )
+            )
+            leased = (webhooks.c.id == due.webhook) & (webhooks.c.busy_until == due.leased_until)
+            connection.execute(update(webhooks).where(leased).values(busy_until=now()))
+
+        self._database.write(operation)
+        return delay is None
+
+    def pending(self) -> PendingDeliveries:
+        """Return the number and the age of the deliveries of all owners that are not finished."""
+        unfinished = deliveries.c.next_at.is_not(None)
+        query = select(func.count(), func.coalesce(now() - func.min(deliveries.c.created), 0.0))
+        with self._database.read() as connection:
+            count, oldest = connection.execute(query.where(unfinished)).one()
+        return PendingDeliveries(count, oldest)
+
+    def delete_old(self, seconds: float) -> None:
+        """Delete the finished deliveries that were created more than the given seconds ago."""
+        old = deliveries.c.next_at.is_(None) & (deliveries.c.created < now() - seconds)
+        self._database.write(lambda connection: connection.execute(delete(deliveries).where(old)))
+
+
+def delivery_from_row(row: Row[Any]) -> Delivery:
+    """Return the `Delivery` of a row."""
+    finished = "failed" if row.delivered is None else "delivered"
+    return Delivery(
+        row.id,
+        row.event,
+        row.job_id,
+        finished if row.next_at is None else "pending",
+        row.attempts,
+        row.created,
+        row.attempted,
+        row.next_at,
+        row.status,
+        row.error,
+    )
+
+
+def _lease_webhook(connection: Connection, webhook: Row[Any], seconds: float) -> DueDelivery:
+    """Lease a webhook, and begin an attempt at its oldest due delivery."""
+    first = (
+        select(deliveries.c.id)
+        .where(deliveries.c.webhook_id == webhook.id, deliveries.c.next_at <= now())
+        .order_by(deliveries.c.next_at, deliveries.c.id)
+        .limit(1)
+    )
+    begun = connection.execute(
+        update(deliveries)
+        .where(deliveries.c.id == first.scalar_subquery())
+        .values(attempts=deliveries.c.attempts + 1, attempted=now())
+        .returning(deliveries)
+    ).one()
+    leased = connection.execute(
+        update(webhooks)
+        .where(webhooks.c.id == webhook.id)
+        .values(busy_until=now() + seconds)
+        .returning(webhooks.c.busy_until)
+    ).scalar_one()
+    return DueDelivery(begun.id, webhook.id, webhook.url, webhook.secret, begun.body, begun.attempts, leased)
