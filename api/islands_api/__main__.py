@@ -13,6 +13,7 @@ from islands_api.web.app import create_app
 from islands_service.logging_config import configure_logs
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
+from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.supervisor import MISCONFIGURED
 
 log = structlog.get_logger()
@@ -36,6 +37,7 @@ def main() -> int:
         store = Store(settings.url)
         install_admin_key(settings, store)
         check_safe(settings, store)
+        open_blobs(settings).check_settings()
         listener = open_listener(settings.host, settings.port)
     except IslandsError as error:
         print(f"islands: {error}", file=sys.stderr)

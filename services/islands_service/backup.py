@@ -11,7 +11,6 @@ name. It does not depend on the kind of database: a backup from SQLite can be re
 """
 
 import gzip
-import hashlib
 import json
 import shutil
 from collections.abc import Callable, Iterator, Mapping
@@ -24,7 +23,7 @@ from sqlalchemy import Connection, MetaData, Table, func, select, text
 
 from islands.errors import IslandsError
 from islands_service.domain.job import ISLANDS_VERSION
-from islands_service.store.blobs import BlobNotFoundError, Blobs
+from islands_service.store.blobs import BlobNotFoundError, Blobs, hash_file
 from islands_service.store.database import Database
 from islands_service.store.migrations.upgrade import HEAD, revision, upgrade
 from islands_service.store.retention import Retention
@@ -130,7 +129,7 @@ def _write_table(connection: Connection, table: Table, folder: Path) -> dict[str
         for row in rows:
             stream.write(json.dumps(dict(row)).encode() + b"\n")
             count += 1
-    return {"rows": count, "sha256": _hash(path)}
+    return {"rows": count, "sha256": hash_file(path)}
 
 
 def verify_backup(source: Path, report: Callable[[str], None] = lambda _: None) -> dict[str, Any]:
@@ -146,7 +145,7 @@ def verify_backup(source: Path, report: Callable[[str], None] = lambda _: None) 
     named: set[str] = set()
     for name, about in manifest["tables"].items():
         path = source / "tables" / f"{name}.jsonl.gz"
-        if not path.is_file() or _hash(path) != about["sha256"]:
+        if not path.is_file() or hash_file(path) != about["sha256"]:
             raise BackupError(f"{path} is missing or damaged: take another backup")
         for row in _read_rows(path):
             named |= {row[column] for column in ("blob", "checkpoint") if row.get(column)}
@@ -157,7 +156,7 @@ def verify_backup(source: Path, report: Callable[[str], None] = lambda _: None) 
             path = blobs.path(blob)
         except BlobNotFoundError as error:
             raise BackupError(f"the backup lacks the file {blob}: take another one") from error
-        if _hash(path) != blob:
+        if hash_file(path) != blob:
             raise BackupError(f"{path} is damaged: take another backup")
     return manifest
 
@@ -225,8 +224,3 @@ def _read_rows(path: Path) -> Iterator[Mapping[str, Any]]:
     with gzip.open(path, "rt", encoding="utf-8") as stream:
         for line in stream:
             yield json.loads(line)
-
-
-def _hash(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -1,6 +1,7 @@
 """Prometheus metrics of every process: version, memory, CPU time and open files; and their endpoint."""
 
 import platform
+from collections.abc import Callable
 from importlib.metadata import version
 
 from prometheus_client import CollectorRegistry, Histogram, Info, ProcessCollector, start_http_server
@@ -34,6 +35,19 @@ def make_commit_histogram(registry: CollectorRegistry) -> Histogram:
         buckets=WRITE_BUCKETS,
         registry=registry,
     )
+
+
+def make_object_observer(registry: CollectorRegistry) -> Callable[[str, str, float], None]:
+    """Return a function that counts the operations of an object store, for `Blobs.observe_object`."""
+    seconds = Histogram(
+        "islands_object_store_seconds",
+        "Time of a request to the object store, by operation and outcome: done, missing, refused, "
+        "unavailable, failed.",
+        ["operation", "outcome"],
+        buckets=(*WRITE_BUCKETS, 30.0),
+        registry=registry,
+    )
+    return lambda operation, outcome, took: seconds.labels(operation, outcome).observe(took)
 
 
 def serve_metrics(registry: CollectorRegistry, host: str, port: int) -> None:

@@ -32,7 +32,7 @@ from islands_service.outbound.checked_client import make_checked_client
 from islands_service.outbound.delivery_sender import DeliverySender
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.store.blobs import Blobs
+from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.tracing import Traces
 
 #: Minimum size in bytes of a response that is compressed.
@@ -65,7 +65,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
         app.state.islands = state = AppState(
             settings,
             opened,
-            Blobs(settings.blobs),
+            open_blobs(settings),
             hub,
             RateLimiter(settings.rate, settings.burst),
             ServiceMetrics(opened, settings.data_dir),
@@ -80,6 +80,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
         sender = DeliverySender(
             opened.deliveries, state.outbound, executor.run, state.metrics.observe_delivery
         )
+        state.blobs.observe_object = state.metrics.observe_object
         app.state.keys = KeyCache(state)
         running = (hub.run(), sender.run(), _send_heartbeats(settings.lifeline))
         tasks = [asyncio.create_task(each) for each in running]

@@ -1,6 +1,7 @@
 """Job submission, and lookup of jobs and results, for all kinds of jobs."""
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from typing import Annotated, Any
 
 from fastapi import Header
@@ -98,8 +99,11 @@ async def _validate_and_store(
     if replayed is not None:
         return replayed, False
     for inspection in inspections:
-        with link_blob(state.blobs.path(inspection.dataset.blob), inspection.dataset.name) as path:
+        with ExitStack() as files:
             async with state.inspection_slots.hold(submission.owner):
+                holding = state.blobs.hold(inspection.dataset.blob)
+                held = await state.run_blocking(files.enter_context, holding)
+                path = files.enter_context(link_blob(held, inspection.dataset.name))
                 await inspect_file(
                     path,
                     inspection.request,

@@ -24,6 +24,7 @@ from islands_service.domain.job import (
     QuotaError,
 )
 from islands_service.domain.webhook import WebhookNotFoundError
+from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError
@@ -189,6 +190,9 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         ),
         StoreUnavailableError: ProblemKind(
             HTTPStatus.SERVICE_UNAVAILABLE, "store-unavailable", "The database does not answer"
+        ),
+        ObjectStoreError: ProblemKind(
+            HTTPStatus.SERVICE_UNAVAILABLE, "object-store-unavailable", "The object store does not answer"
         ),
         NotReadyError: ProblemKind(HTTPStatus.SERVICE_UNAVAILABLE, "not-ready", "The service is not ready"),
         CommitUnknownError: ProblemKind(

@@ -10,7 +10,7 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from islands_service.domain.job import JobState
-from islands_service.process_metrics import make_commit_histogram, make_registry
+from islands_service.process_metrics import make_commit_histogram, make_object_observer, make_registry
 from islands_service.store import Store
 
 #: Largest number of owners with metrics of their jobs: each is a time series.
@@ -49,6 +49,7 @@ class ServiceMetrics:
             registry=self.registry,
         )
         store.database.observe_commit = make_commit_histogram(self.registry).observe
+        self.observe_object = make_object_observer(self.registry)
         self.registry.register(_JobCollector(store))
         self.registry.register(_DiskCollector(folder))
 

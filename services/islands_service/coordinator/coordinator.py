@@ -4,7 +4,7 @@ import traceback
 from collections.abc import Callable
 from contextlib import ExitStack, closing, suppress
 from functools import partial
-from time import monotonic, time
+from time import monotonic
 from typing import TYPE_CHECKING
 
 import structlog
@@ -22,12 +22,14 @@ from islands_service.coordinator.job_failures import (
 )
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.coordinator.job_runners import JOB_RUNNERS
+from islands_service.coordinator.sweeper import Sweeper
 from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
 from islands_service.liveness import StopRequest, stop_on_signals
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.store.blobs import Blobs
+from islands_service.store.backends.cached_blobs import open_blobs
+from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.database import StoreError
 from islands_service.tracing import Traces
 
@@ -42,17 +44,11 @@ POLL_SECONDS = 0.2
 #: Seconds between two attempts to reach an unavailable store.
 RETRY_SECONDS = 0.5
 
+#: Seconds until a job is tried again that needs an object store which does not answer.
+OBJECT_STORE_PAUSE = 5.0
+
 #: Seconds that the Ray head on this machine may take to start.
 RAY_STARTUP_TIMEOUT = 60.0
-
-#: Seconds between two sweeps of expired jobs and unreferenced blobs.
-SWEEP_INTERVAL = 600.0
-
-#: Seconds for which a finished delivery of a webhook is kept.
-DELIVERY_RETENTION = 7 * 86_400.0
-
-#: Seconds after which a blob that no row references is deleted.
-ORPHAN_AGE = 3600.0
 
 
 class Coordinator:
@@ -82,24 +78,28 @@ class Coordinator:
         self._metrics = metrics or CoordinatorMetrics()
         self._store = Store(settings.url)
         self._store.database.observe_commit = self._metrics.commits.observe
-        self._blobs = Blobs(settings.blobs)
+        self._blobs = open_blobs(settings)
         self._blobs.observe_write = self._metrics.blob_writes.observe
+        self._blobs.observe_object = self._metrics.observe_object
         self._traces = Traces(settings.telemetry, "coordinator")
         self._ray = ExitStack()
         self._connected = self._store_away = False
-        self._sweep_at = monotonic() + POLL_SECONDS
+        self._sweeper = Sweeper(settings, self._store, self._blobs, POLL_SECONDS)
 
     def run(self) -> None:
         """Process jobs until a stop is requested.
 
         Raises
         ------
+        SettingsError
+            The object store refuses the service.
         ClusterError
             Ray has not started, or the connection to the cluster is lost. Only a new process can connect to
             another one.
         """
         log.info("coordinator started", name=self._name)
         with self._store, self._ray, closing(self._traces):
+            self._blobs.check_settings()
             while not self._stopping.requested:
                 if self._can_claim():
                     self._claim_next()
@@ -116,7 +116,7 @@ class Coordinator:
 
     def _claim_next(self) -> None:
         try:
-            self._sweep_if_due()
+            self._sweeper.sweep_if_due()
             lease = self._store.leases.claim(
                 self._name, self._settings.lease, most_running=self._settings.max_running
             )
@@ -172,6 +172,10 @@ class Coordinator:
             except CoordinatorStopping:
                 self._metrics.given_back.labels("stopping").inc()
                 self._release(lease)
+            except ObjectStoreError as error:
+                log.warning("object store unavailable", reason=str(error))
+                self._metrics.given_back.labels("object-store").inc()
+                self._give_back(self._postpone_for_objects, lease)
             except StoreError as error:
                 log.warning("job given back", reason=str(error))
                 self._metrics.given_back.labels("store").inc()
@@ -214,7 +218,7 @@ class Coordinator:
         heartbeat.check()
         # A job that runs for days writes a checkpoint every few seconds: delete replaced ones meanwhile.
         try:
-            self._sweep_if_due()
+            self._sweeper.sweep_if_due()
         except (StoreError, OSError) as error:
             log.warning("sweep failed", reason=str(error))
 
@@ -242,6 +246,11 @@ class Coordinator:
         except (LeaseLostError, StoreError) as error:
             # Another coordinator claims the job after the lease has expired.
             log.warning("job not released", reason=str(error))
+
+    def _postpone_for_objects(self, lease: Lease) -> None:
+        # No attempt: the job is not lost however long the object store is away.
+        note = "waiting for the object store, which does not answer"
+        self._store.leases.postpone(lease, note, OBJECT_STORE_PAUSE, attempted=False)
 
     def _wait_for_ray(self, lease: Lease, heartbeat: Heartbeat) -> None:
         if self._connected:
@@ -277,20 +286,3 @@ class Coordinator:
         from islands_service.coordinator.job_engine import make_job_engine  # noqa: PLC0415
 
         return make_job_engine(lease, notes.add, self._settings.autoscaling)
-
-    def _sweep_if_due(self) -> None:
-        if monotonic() > self._sweep_at:
-            self._sweep_at = monotonic() + SWEEP_INTERVAL
-            self._sweep()
-
-    def _sweep(self) -> None:
-        if self._settings.retention:
-            self._store.retention.delete_expired(self._settings.retention)
-        if self._settings.audit_retention:
-            self._store.retention.delete_old_audit(self._settings.audit_retention)
-        self._store.deliveries.delete_old(DELIVERY_RETENTION)
-        # Read the clock before the references, and those before the files: a blob that is referenced only
-        # after the query is younger than the limit.
-        before = time() - ORPHAN_AGE
-        removed = self._blobs.sweep(self._store.retention.named_blobs(), before)
-        log.info("swept", blobs=removed)

@@ -2,7 +2,12 @@
 
 from prometheus_client import Counter, Gauge, Histogram
 
-from islands_service.process_metrics import WRITE_BUCKETS, make_commit_histogram, make_registry
+from islands_service.process_metrics import (
+    WRITE_BUCKETS,
+    make_commit_histogram,
+    make_object_observer,
+    make_registry,
+)
 
 
 class CoordinatorMetrics:
@@ -21,6 +26,8 @@ class CoordinatorMetrics:
         Whether a job runs.
     commits, blob_writes : Histogram
         Seconds of transactions, and of blobs until they are on the disk. A checkpoint is one of each.
+    observe_object : callable
+        See `make_object_observer`.
     """
 
     def __init__(self) -> None:
@@ -36,7 +43,8 @@ class CoordinatorMetrics:
         )
         self.given_back = Counter(
             "islands_attempts_given_back",
-            "Attempts without an outcome: lease-lost, stopping, declined, interrupted, store, cluster.",
+            "Attempts without an outcome: lease-lost, stopping, declined, interrupted, store, object-store, "
+            "cluster.",
             ["reason"],
             registry=self.registry,
         )
@@ -50,3 +58,4 @@ class CoordinatorMetrics:
             buckets=WRITE_BUCKETS,
             registry=self.registry,
         )
+        self.observe_object = make_object_observer(self.registry)

@@ -1,7 +1,9 @@
 """Discrepancy job: diagnose a simulation, write the report and the extended simulation."""
 
 from collections.abc import Callable
-from time import monotonic
+from time import monotonic, sleep
+
+import structlog
 
 from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula, diagnose
 from islands.discrepancy.interfaces.parallel import ParallelMap
@@ -19,6 +21,12 @@ from islands_service.reports.diagnosis_report import diagnosis_report, summarise
 from islands_service.runtime.parallel_map import ray_map
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
+from islands_service.store.database import StoreError
+
+log = structlog.get_logger()
+
+#: Seconds between two attempts to store what a diagnosis has found.
+_RETRY_SECONDS = 1.0
 
 
 def run_diagnosis_job(
@@ -63,9 +71,9 @@ def run_diagnosis_job(
     wall_s = monotonic() - started
     report("writing the report", 0.98)
     names = ", ".join(datasets[part.dataset].name for part in spec.parts)
-    artefacts = {REPORT: blobs.write(diagnosis_report(names, found, proposal=formula))}
+    artefacts = {REPORT: _keep(diagnosis_report(names, found, proposal=formula), blobs, check)}
     if found.gain is not None:
-        artefacts[EXTENDED] = blobs.write(extended_json(found.best, found.record).encode())
+        artefacts[EXTENDED] = _keep(extended_json(found.best, found.record).encode(), blobs, check)
     document = diagnosis_document(found, wall_s, proposal=formula)
     return JobOutcome(
         JobState.SUCCEEDED,
@@ -73,6 +81,17 @@ def run_diagnosis_job(
         summary=_summary(found, formula, simulator.name, wall_s),
         artefacts=artefacts,
     )
+
+
+def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
+    """Store a blob. Retry while the store is unavailable: the work is done."""
+    while True:
+        try:
+            return blobs.write(data)
+        except StoreError as error:
+            log.warning("cannot store yet", reason=str(error))
+            check()
+            sleep(_RETRY_SECONDS)
 
 
 def _summary(

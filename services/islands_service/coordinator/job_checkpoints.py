@@ -19,6 +19,7 @@ from islands.io.checkpoints import (
 from islands_service.coordinator.job_failures import check_readable
 from islands_service.domain.job import Job
 from islands_service.store.blobs import BlobNotFoundError, Blobs
+from islands_service.store.database import StoreError
 
 log = structlog.get_logger()
 
@@ -79,7 +80,7 @@ class JobCheckpoints:
         ------
         JobDeclinedError
             A newer version of islands wrote the checkpoint, and this one cannot read it.
-        OSError
+        OSError, StoreError
             The file cannot be read now.
         """
         job = self._job
@@ -90,6 +91,8 @@ class JobCheckpoints:
             archipelago, about = archipelago_from_document(text, f"the checkpoint of job {job.id}")
             choice = choice_from_document(about["choice"]) if about.get("choice") else None
             return JobStart(state_from_document(archipelago, about), float(about["wall_s"]), choice)
+        except StoreError:
+            raise
         except _LOSS_ERRORS as error:
             check_readable(job.versions["checkpoint"], "checkpoint", error)
             log.error("checkpoint lost", job=job.id, reason=str(error))
@@ -100,7 +103,7 @@ class JobCheckpoints:
 
         Raises
         ------
-        StorageFullError
+        StorageFullError, ObjectStoreError
         """
         about: dict[str, Any] = {
             "job": self._job.id,

@@ -56,7 +56,7 @@ def _read_part(
     request = RecordRequest(spec.inputs, spec.output, spec.dt, part.rows, reading)
     settings = service_settings()
     memory, seconds = settings.inspection_memory, settings.inspection_seconds
-    with link_blob(blobs.path(stored.blob), stored.name) as path:
+    with blobs.hold(stored.blob) as held, link_blob(held, stored.name) as path:
         return read_confined(path, request, memory, seconds)
 
 

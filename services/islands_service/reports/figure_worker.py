@@ -10,7 +10,7 @@ import json
 import resource
 import sys
 from collections.abc import Mapping
-from errno import EAGAIN, EINVAL, ENODATA, ENOSPC
+from errno import EAGAIN, EINVAL, EIO, ENODATA, ENOSPC
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,8 @@ from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.reports.identification_report import identification_report
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
+from islands_service.store.backends.cached_blobs import open_blobs
+from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError, Blobs
 from islands_service.store.database import StorageFullError, StoreError
 
@@ -57,7 +59,7 @@ def main() -> int:
     arguments = parser.parse_args()
     settings = service_settings()
     _limit(settings)
-    blobs = Blobs(settings.blobs)
+    blobs = open_blobs(settings)
     try:
         with Store(settings.url) as store:
             job = store.jobs.get(arguments.owner, arguments.job)
@@ -67,6 +69,8 @@ def main() -> int:
             store.results.keep(arguments.job, {name: blobs.write(data) for name, data in made.items()})
     except StorageFullError as error:
         return _report_failure(error, ENOSPC)
+    except ObjectStoreError as error:
+        return _report_failure(error, EIO)
     except StoreError as error:
         return _report_failure(error, EAGAIN)
     except BlobNotFoundError as error:

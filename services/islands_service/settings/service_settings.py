@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from islands.errors import SettingsError
-from islands_service.settings.setting_checks import Count, Hosts, Networks, Positive
+from islands_service.settings.setting_checks import BlobStore, Count, Hosts, Networks, Positive
 
 #: Addresses that only this machine can reach.
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
@@ -26,6 +26,14 @@ class ServiceSettings(BaseSettings):
         ``postgresql+psycopg://USER:PASSWORD@HOST/NAME``; by default SQLite in the data folder.
     database_file
         File that contains the ``database`` instead, for example a mounted secret.
+    blob_store
+        ``s3://BUCKET/PREFIX`` of an S3-compatible store for uploads, checkpoints, reports and figures, which
+        all machines share; by default the data folder. Needs the extra ``s3``. Endpoint and credentials are
+        those of AWS' environment variables and files, for example ``AWS_ENDPOINT_URL`` and
+        ``AWS_SHARED_CREDENTIALS_FILE``. No other service may use the prefix: what no row of the database
+        names is deleted.
+    blob_cache
+        Size of the local copies of what is in the ``blob_store``.
     host, port
         Address that the service listens on.
     trusted_proxies
@@ -110,6 +118,8 @@ class ServiceSettings(BaseSettings):
     data_dir: Path = Field(default_factory=lambda: user_data_path("islands"))
     database: str = ""
     database_file: Path | None = None
+    blob_store: BlobStore = ""
+    blob_cache: Count = 10_000_000_000
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
     trusted_proxies: Networks = ""
@@ -171,8 +181,8 @@ class ServiceSettings(BaseSettings):
 
     @property
     def blobs(self) -> Path:
-        """Folder of the blobs."""
-        return self.data_dir / "blobs"
+        """Folder of the blobs, or of the local copies of those in an object store."""
+        return self.data_dir / ("blob-cache" if self.blob_store else "blobs")
 
     @property
     def ray_address_file(self) -> Path:

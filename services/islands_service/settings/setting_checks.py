@@ -38,6 +38,16 @@ def _check_hosts(text: str) -> str:
     return ",".join(hosts).lower()
 
 
+def _check_blob_store(url: str) -> str:
+    if url and not re.fullmatch(r"s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9._-]+)*/?", url):
+        # Do not repeat the value, which may contain credentials.
+        raise ValueError(
+            "give s3://BUCKET or s3://BUCKET/PREFIX; credentials belong in AWS_ACCESS_KEY_ID and "
+            "AWS_SECRET_ACCESS_KEY, or in AWS_SHARED_CREDENTIALS_FILE"
+        )
+    return url
+
+
 Positive = Annotated[float, Field(gt=0.0)]
 Count = Annotated[int, Field(ge=1)]
 
@@ -46,3 +56,6 @@ Networks = Annotated[str, AfterValidator(_check_networks)]
 
 #: Hosts with optional ports, separated by commas, in lower case.
 Hosts = Annotated[str, AfterValidator(_check_hosts)]
+
+#: Bucket and prefix of an object store; empty for none.
+BlobStore = Annotated[str, AfterValidator(_check_blob_store)]

@@ -14,7 +14,7 @@ from islands.errors import IslandsError
 from islands_service.store.database import StorageFullError, ignore_duration
 
 #: Suffix of a file that is being written.
-_PART = ".part"
+PART = ".part"
 
 
 class BlobNotFoundError(IslandsError):
@@ -27,17 +27,30 @@ class Blobs:
     Parameters
     ----------
     folder : Path
-        Created if it does not exist. All roles of a cluster must share it.
+        Created if it does not exist. All roles of a cluster must share it, or use an object store:
+        `islands_service.store.backends.cached_blobs`.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         #: Called with the seconds until a blob was on the disk.
         self.observe_write: Callable[[float], None] = ignore_duration
+        #: Called with the name, the outcome and the seconds of each operation of an object store.
+        self.observe_object: Callable[[str, str, float], None] = _ignore_operation
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
 
+    @contextmanager
+    def hold(self, blob: str) -> Iterator[Path]:
+        """Provide a blob as a file that stays until the end of the block.
+
+        Raises
+        ------
+        BlobNotFoundError
+        """
+        yield self.path(blob)
+
     def path(self, blob: str) -> Path:
-        """Return the path of a blob.
+        """Return the path of a blob in the folder.
 
         Raises
         ------
@@ -91,7 +104,7 @@ class Blobs:
         """
         with (
             translate_disk_full(),
-            tempfile.NamedTemporaryFile(dir=self._folder, suffix=_PART, delete=False) as stream,
+            tempfile.NamedTemporaryFile(dir=self._folder, suffix=PART, delete=False) as stream,
         ):
             try:
                 yield stream
@@ -119,16 +132,20 @@ class Blobs:
         began = monotonic()
         with translate_disk_full():
             stream.flush()
-            os.fsync(stream.fileno())
-            with Path(stream.name).open("rb") as written:
-                blob = hashlib.file_digest(written, "sha256").hexdigest()
-            path = self._at(blob)
-            path.parent.mkdir(exist_ok=True, mode=0o700)
-            Path(stream.name).replace(path)
-            for folder in (path.parent, self._folder):
-                _sync(folder)
+            blob = hash_file(Path(stream.name))
+            self._place(stream, blob)
         self.observe_write(monotonic() - began)
         return blob
+
+    def _place(self, stream: IO[bytes], blob: str) -> None:
+        """Give a temporary file its final name once it is on the disk."""
+        with Path(stream.name).open("rb") as written:
+            os.fsync(written.fileno())
+        path = self._at(blob)
+        path.parent.mkdir(exist_ok=True, mode=0o700)
+        Path(stream.name).replace(path)
+        for folder in (path.parent, self._folder):
+            _sync(folder)
 
     def check_writable(self) -> None:
         """Write a temporary file.
@@ -143,9 +160,12 @@ class Blobs:
             stream.write(bytes(4096))
             stream.flush()
 
+    def check_settings(self) -> None:
+        """Refuse settings with which blobs cannot be stored: a folder has none."""
+
     def all(self) -> Iterator[tuple[str, Path]]:
-        """Yield every blob with its path; files that are only partly written have an empty name."""
-        for path in self._folder.glob(f"*{_PART}"):
+        """Yield every blob in the folder with its path; partly written files have an empty name."""
+        for path in self._folder.glob(f"*{PART}"):
             yield "", path
         for path in self._folder.glob("??/*"):
             yield path.name, path
@@ -194,6 +214,16 @@ def translate_disk_full() -> Iterator[None]:
         raise StorageFullError(
             f"the disk of the data folder is full ({error.strerror}): make room"
         ) from error
+
+
+def _ignore_operation(name: str, outcome: str, seconds: float) -> None:
+    """Ignore an operation of an object store."""
+
+
+def hash_file(path: Path) -> str:
+    """Return the SHA-256 of a file."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _sync(folder: Path) -> None:

@@ -126,15 +126,17 @@ class Leases:
         """
         self._database.write(lambda connection: _release(connection, lease, attempted))
 
-    def postpone(self, lease: Lease, reason: str, seconds: float) -> None:
-        """Return a job to the queue after a failure that may pass. This counts as an attempt.
+    def postpone(self, lease: Lease, reason: str, seconds: float, attempted: bool = True) -> None:
+        """Return a job to the queue after a failure that may pass.
 
         Parameters
         ----------
         reason : str
             Shown to the owner as the note of the progress.
         seconds : float
-            Time until the second attempt; doubled by every further one.
+            Time until the next attempt; after each further attempt without a checkpoint it is twice as long.
+        attempted : bool
+            Whether this counts as an attempt.
 
         Raises
         ------
@@ -145,7 +147,7 @@ class Leases:
             attempts = (
                 connection.execute(select(jobs.c.stalled).where(jobs.c.id == lease.job.id)).scalar() or 1
             )
-            _release(connection, lease, True, reason, not_before=now() + seconds * 2.0 ** (attempts - 1))
+            _release(connection, lease, attempted, reason, not_before=now() + seconds * 2.0 ** (attempts - 1))
 
         self._database.write(operation)
 

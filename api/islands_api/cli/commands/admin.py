@@ -15,7 +15,7 @@ from islands_api.cli.console import errors, output
 from islands_api.cli.service.owner_commands import owners
 from islands_api.cli.service.store_options import Database, DataDir, open_store
 from islands_service.settings import service_settings
-from islands_service.store.blobs import Blobs
+from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.store.database import Database as StoreDatabase
 from islands_service.supervisor import folder_lock
 
@@ -70,7 +70,7 @@ def backup(folder: Folder, data_dir: DataDir = None, database: Database = None) 
 
     settings = service_settings(data_dir=data_dir, database=database)
     with open_store(data_dir, database) as store:
-        manifest = create_backup(store.database, Blobs(settings.blobs), folder, _report)
+        manifest = create_backup(store.database, open_blobs(settings), folder, _report)
     _print_manifest("written", folder, manifest)
 
 
@@ -89,7 +89,7 @@ def restore(folder: Folder, data_dir: DataDir = None, database: Database = None)
 
     settings = service_settings(data_dir=data_dir, database=database)
     with folder_lock(settings.data_dir), closing(StoreDatabase(settings.url)) as opened:
-        manifest = restore_backup(folder, opened, Blobs(settings.blobs), _report)
+        manifest = restore_backup(folder, opened, open_blobs(settings), _report)
     _print_manifest("restored", folder, manifest)
 
 

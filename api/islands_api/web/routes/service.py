@@ -28,14 +28,17 @@ async def healthz() -> Any:
 async def readyz(state: AppStateDep) -> Any:
     """Return 200 if the database answers and data can be written, so that jobs are accepted.
 
-    Ray may still be starting. If one of them hangs, the status is 503 after two seconds.
+    Ray may still be starting. If the database, the disk or the object store hangs, the status is 503 after
+    two seconds.
     """
     check = asyncio.ensure_future(state.run_blocking(_check_ready, state))
     # The thread of a hanging check cannot be interrupted: leave it behind.
     done, _ = await asyncio.wait({check}, timeout=_READY_SECONDS)
     if not done:
         check.add_done_callback(Future.exception)
-        raise NotReadyError(f"the database or the disk has not answered within {_READY_SECONDS:.0f} s")
+        raise NotReadyError(
+            f"the database, the disk or the object store has not answered within {_READY_SECONDS:.0f} s"
+        )
     await check
     return {"status": "ready"}
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from islands_service.coordinator import coordinator as coordinator_module
+from islands_service.coordinator import sweeper as sweeper_module
 from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
@@ -219,7 +220,7 @@ def test_replaced_checkpoints_are_swept_while_the_job_runs(
         return run_until_check_raises(lease, *arguments)
 
     replace_runner(monkeypatch, keeps_checkpoints)
-    monkeypatch.setattr(coordinator_module, "SWEEP_INTERVAL", 0.05)
+    monkeypatch.setattr(sweeper_module, "SWEEP_INTERVAL", 0.05)
     coordinator()
     eventually(lambda: len(left) == 3 and left[0] not in dict(blobs.all()), seconds=30.0)
     now = store.jobs.get(ALICE, job.id)
@@ -240,11 +241,10 @@ def test_failed_sweep_does_not_affect_the_job(
 ) -> None:
     tries = []
 
-    class Unswept(SerialCoordinator):
-        def _sweep(self) -> None:
-            if self._store.jobs.queue_statistics().leases:
-                tries.append(1)
-                raise error
+    def fail(sweeper: Any) -> None:
+        if sweeper._store.jobs.queue_statistics().leases:
+            tries.append(1)
+            raise error
 
     def works(*arguments: Any) -> JobOutcome:
         while len(tries) < 3:
@@ -252,8 +252,9 @@ def test_failed_sweep_does_not_affect_the_job(
         return DONE
 
     replace_runner(monkeypatch, works)
-    monkeypatch.setattr(coordinator_module, "SWEEP_INTERVAL", 0.0)
-    coordinator(Unswept)
+    monkeypatch.setattr(sweeper_module, "SWEEP_INTERVAL", 0.0)
+    monkeypatch.setattr(sweeper_module.Sweeper, "_sweep", fail)
+    coordinator()
     assert wait_until_finished(store, job).state == JobState.SUCCEEDED
     assert [event.kind for event in store.jobs.events(job.id)] == ["queued", "running", "succeeded"]
 
@@ -262,9 +263,8 @@ def test_blob_referenced_during_a_sweep_is_kept(
     store: Store, blobs: Blobs, settings: ServiceSettings, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A coordinator may be suspended between two steps of a sweep for longer than the age limit."""
-    monkeypatch.setattr(coordinator_module, "ORPHAN_AGE", 0.1)
-    sweeping = SerialCoordinator(settings, "me", StopRequest())
-    named_blobs = sweeping._store.retention.named_blobs
+    monkeypatch.setattr(sweeper_module, "ORPHAN_AGE", 0.1)
+    named_blobs = store.retention.named_blobs
     written: list[str] = []
 
     def slow_named_blobs() -> frozenset[str]:
@@ -273,9 +273,8 @@ def test_blob_referenced_during_a_sweep_is_kept(
         time.sleep(0.3)
         return named
 
-    sweeping._store.retention.named_blobs = slow_named_blobs  # type: ignore[method-assign]
-    with sweeping._store:
-        sweeping._sweep()
+    monkeypatch.setattr(store.retention, "named_blobs", slow_named_blobs)
+    sweeper_module.Sweeper(settings, store, blobs, -1.0).sweep_if_due()
     assert blobs.read(written[0]) == b"named meanwhile"
 
 

@@ -13,6 +13,7 @@ from islands.discrepancy.inference import noise_floor
 from islands.errors import RecordError, SettingsError
 from islands.evolution.engine import SerialEngine
 from islands.io.records.preview import preview
+from islands_service.coordinator import diagnosis_job
 from islands_service.coordinator.diagnosis_job import run_diagnosis_job
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_failures import make_problem_document
@@ -27,6 +28,7 @@ from islands_service.domain.job import (
     Submission,
 )
 from islands_service.store import Store
+from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreUnavailableError
 from support.command_line import write_offset
@@ -180,3 +182,23 @@ def test_failed_reports_do_not_affect_the_result(store: Store, blobs: Blobs, sub
     outcome = run_job(claim(store), Away(store), blobs)
     assert outcome.state == JobState.SUCCEEDED
     assert phases(store, job) == []
+
+
+def test_finished_work_waits_for_an_object_store_that_is_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(diagnosis_job, "_RETRY_SECONDS", 0.0)
+    failures = [ObjectStoreError("away")] * 3
+
+    class Away:
+        def write(self, data: bytes) -> str:
+            if failures:
+                raise failures.pop()
+            return data.decode()
+
+    assert diagnosis_job._keep(b"report", Away(), lambda: None) == "report"  # type: ignore[arg-type]
+
+    def cancel() -> None:
+        raise JobCancelled("cancelled")
+
+    failures.append(ObjectStoreError("away"))
+    with pytest.raises(JobCancelled):
+        diagnosis_job._keep(b"report", Away(), cancel)  # type: ignore[arg-type]

@@ -11,10 +11,11 @@ from sqlalchemy import update
 from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.coordinator.job_checkpoints import RESTARTED
+from islands_service.coordinator.job_checkpoints import RESTARTED, JobCheckpoints
 from islands_service.coordinator.job_failures import JobDeclinedError
-from islands_service.domain.job import ISLANDS_VERSION, Job, Lease, LeaseLostError
+from islands_service.domain.job import ISLANDS_VERSION, Job, Lease, LeaseLostError, ProgressReport
 from islands_service.store import Store
+from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import CommitUnknownError, StoreUnavailableError
 from islands_service.store.tables import jobs
@@ -157,3 +158,19 @@ def test_named_checkpoint_exists_whatever_the_store_acknowledges(
     assert [json.loads(json.dumps(document)) for document, _ in outcome.models] == undisturbed[0]
     assert 2 <= max(kept) <= 4
     assert flaky.reports > 10
+
+
+def test_checkpoint_that_cannot_be_read_now_is_not_lost(
+    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise the search would start again for an interruption of a second."""
+    checkpoint = blobs.write(b"")
+    lease = claim(store)
+    store.leases.report(lease, ProgressReport({}, checkpoint=checkpoint))
+
+    def fail(_blob: str) -> bytes:
+        raise ObjectStoreError("it does not answer")
+
+    monkeypatch.setattr(blobs, "read", fail)
+    with pytest.raises(ObjectStoreError):
+        JobCheckpoints(store.jobs.get(ALICE, job.id), blobs).read()

@@ -1,0 +1,180 @@
+"""`ObjectStore`, and its substitute of other tests, on a simulated S3: lost connections, refusals."""
+
+import os
+from collections import Counter
+from hashlib import sha256
+from time import monotonic, time
+
+import pytest
+
+from islands_service.store.backends import object_store
+from islands_service.store.backends.cached_blobs import CachedBlobs
+from islands_service.store.backends.object_store import (
+    ObjectNotFoundError,
+    ObjectStore,
+    ObjectStoreError,
+    ObjectStoreRefusedError,
+)
+from islands_service.store.blobs import BlobNotFoundError
+from support.object_stores import CuttingProxy, MemoryObjects, make_bucket, s3_server
+
+pytestmark = pytest.mark.ci
+
+URL = "s3://bucket/a/prefix"
+
+
+@pytest.fixture(scope="module")
+def endpoint():
+    with pytest.MonkeyPatch.context() as patch, s3_server(patch) as endpoint:
+        make_bucket(endpoint)
+        yield endpoint
+
+
+@pytest.fixture(autouse=True)
+def short_pauses(monkeypatch):
+    monkeypatch.setattr(object_store, "RETRY_PAUSES", (0.01, 0.02))
+
+
+@pytest.fixture
+def proxy(endpoint, monkeypatch):
+    host, _, port = endpoint.removeprefix("http://").partition(":")
+    with CuttingProxy((host, int(port))) as proxy:
+        monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{proxy.port}")
+        yield proxy
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "file"
+    path.write_bytes(b"content")
+    return path
+
+
+def fetched(objects, key, folder):
+    objects.get(key, folder / "fetched")
+    return (folder / "fetched").read_bytes()
+
+
+@pytest.mark.parametrize("kind", ["s3", "memory"])
+def test_objects_are_stored_listed_renamed_and_deleted(kind, endpoint, file, tmp_path):
+    objects = ObjectStore("s3://bucket/kind/") if kind == "s3" else MemoryObjects()
+    objects.check()
+    with pytest.raises(ObjectNotFoundError):
+        objects.get("aa/b", tmp_path / "none")
+    objects.put("aa/b", file)
+    file.write_bytes(b"")
+    objects.put("aa/empty", file)
+    listed = {key: at for key, at in objects.all() if key != "islands-store"}
+    assert listed.keys() == {"aa/b", "aa/empty"}
+    assert all(abs(at - time()) < 60.0 for at in listed.values())
+    assert [fetched(objects, key, tmp_path) for key in listed] == [b"content", b""]
+    objects.move("aa/b", "unnamed/b")
+    with pytest.raises(ObjectNotFoundError):
+        objects.move("aa/b", "unnamed/c")
+    assert fetched(objects, "unnamed/b", tmp_path) == b"content"
+    for key in ("unnamed/b", "unnamed/b", "aa/empty"):
+        objects.delete(key)
+    assert {key for key, _ in objects.all()} <= {"islands-store"}
+
+
+def test_large_objects_are_transferred_in_parts(endpoint, tmp_path, monkeypatch):
+    monkeypatch.setattr(object_store, "_PART_BYTES", 5 * 2**20)
+    blobs = CachedBlobs(tmp_path / "one", ObjectStore(URL), 10**9)
+    data = os.urandom(12 * 2**20)
+    blob = blobs.write(data)
+    assert CachedBlobs(tmp_path / "other", ObjectStore(URL), 10**9).read(blob) == data
+    stored = make_bucket(endpoint).head_object(Bucket="bucket", Key=f"a/prefix/{blob[:2]}/{blob}")
+    assert stored["ETag"].endswith('-3"')  # the number of parts
+
+
+def test_an_upload_whose_connection_is_cut_is_repeated(proxy, tmp_path):
+    data = os.urandom(2_000_000)
+    blobs = CachedBlobs(tmp_path / "one", ObjectStore(URL), 10**9)
+    outcomes = Counter()
+    blobs.observe_object = lambda name, outcome, _: outcomes.update([(name, outcome)])
+    proxy.cut_after = [300_000] * 2  # the HTTP library repeats a request once
+    blob = blobs.write(data)
+    assert outcomes == {("put", "unavailable"): 1, ("put", "done"): 1}
+    assert CachedBlobs(tmp_path / "other", ObjectStore(URL), 10**9).read(blob) == data
+
+
+def test_a_partial_upload_is_never_read_as_the_blob(proxy, tmp_path):
+    """The upload was cut at every attempt: no name was returned, and a later upload is complete."""
+    data = os.urandom(2_000_000)
+    blobs = CachedBlobs(tmp_path / "one", ObjectStore(URL), 10**9)
+    proxy.cut_after = [300_000] * 100
+    with pytest.raises(ObjectStoreError):
+        blobs.write(data)
+    proxy.cut_after.clear()
+    other = CachedBlobs(tmp_path / "other", ObjectStore(URL), 10**9)
+    with pytest.raises(BlobNotFoundError):
+        other.read(sha256(data).hexdigest())
+    assert other.read(blobs.write(data)) == data
+
+
+def test_a_download_whose_connection_is_cut_is_repeated(proxy, tmp_path):
+    data = os.urandom(2_000_000)
+    blob = CachedBlobs(tmp_path / "one", ObjectStore(URL), 10**9).write(data)
+    other = CachedBlobs(tmp_path / "other", ObjectStore(URL), 10**9)
+    outcomes = Counter()
+    other.observe_object = lambda name, outcome, _: outcomes.update([(name, outcome)])
+    proxy.cut_answer_after = [300_000]
+    assert other.read(blob) == data
+    assert outcomes == {("get", "unavailable"): 1, ("get", "done"): 1}
+
+
+def test_a_store_that_is_absent_at_the_start_and_returns(proxy, tmp_path):
+    proxy.refuse = True
+    blobs = CachedBlobs(tmp_path / "one", ObjectStore(URL), 10**9)
+    blobs.check_settings()
+    with pytest.raises(ObjectStoreError, match="does not answer"):
+        blobs.check_writable()
+    started = monotonic()
+    with pytest.raises(ObjectStoreError, match="AWS_ENDPOINT_URL"):
+        blobs.write(b"record")
+    assert monotonic() - started < 5.0
+    proxy.refuse = False
+    blobs.check_writable()
+    assert blobs.read(blobs.write(b"record")) == b"record"
+
+
+def test_attempts_end_after_a_while(proxy, file, monkeypatch):
+    monkeypatch.setattr(object_store, "RETRY_SECONDS", -1.0)
+    proxy.refuse = True
+    seen = []
+    objects = ObjectStore(URL)
+    objects.observe = lambda *call: seen.append(call[:2])
+    with pytest.raises(ObjectStoreError):
+        objects.put("a", file)
+    assert seen == [("put", "unavailable")]
+
+
+def test_a_missing_bucket_is_refused_with_its_setting(endpoint, file, tmp_path):
+    objects = ObjectStore("s3://absent/prefix")
+    for operation in (
+        objects.check,
+        lambda: objects.put("a", file),
+        lambda: objects.get("a", tmp_path / "b"),
+        lambda: list(objects.all()),
+    ):
+        with pytest.raises(ObjectStoreRefusedError, match="no bucket for s3://absent/prefix: create it"):
+            operation()
+
+
+def test_missing_credentials_are_named(endpoint, file, monkeypatch):
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")
+    monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", "/dev/null")
+    with pytest.raises(ObjectStoreRefusedError, match="set AWS_ACCESS_KEY_ID"):
+        ObjectStore(URL).put("a", file)
+
+
+def test_credentials_in_a_file_are_read(endpoint, file, monkeypatch, tmp_path):
+    """As a mounted secret of a container."""
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.delenv(name)
+    secret = tmp_path / "secret"
+    secret.write_text("[default]\naws_access_key_id = a\naws_secret_access_key = b\n")
+    monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(secret))
+    ObjectStore(URL).put("a", file)
