@@ -209,11 +209,23 @@ def test_every_pod_meets_the_restricted_standard():
 def test_every_container_of_the_service_is_confined_in_the_compose_file():
     services = yaml.safe_load((DEPLOY / "compose/compose.yaml").read_text())["services"]
     ours = [service for service in services.values() if service["image"] == "islands"]
-    assert len(ours) == 4
+    assert len(ours) == 5
     for service in ours:
         assert service["read_only"]
         assert service["cap_drop"] == ["ALL"]
         assert service["security_opt"] == ["no-new-privileges:true"]
+
+
+def test_api_and_coordinators_share_no_volume_but_the_object_store():
+    """A file that only one machine has would be lost for the others."""
+    services = yaml.safe_load((DEPLOY / "compose/compose.yaml").read_text())["services"]
+    settings = yaml.safe_load((KUBERNETES / "config.yaml").read_text())["data"]
+    for each in (services["api"]["environment"], services["coordinator"]["environment"], settings):
+        assert ServiceSettings(blob_store=each["ISLANDS_BLOB_STORE"]).blobs.name == "blob-cache"
+        assert each["AWS_SHARED_CREDENTIALS_FILE"].startswith("/run/secrets/")
+        assert not {"AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"} & each.keys()
+    for path in manifests():
+        assert "persistentVolumeClaim" not in path.read_text()
 
 
 def test_the_caddyfile_is_accepted_and_an_unknown_directive_is_found(tmp_path):
@@ -290,6 +302,7 @@ def test_every_query_names_existing_metrics(serve):
     coordinator = CoordinatorMetrics()
     coordinator.finished.labels("identification", "succeeded").inc()
     coordinator.given_back.labels("stopping").inc()
+    coordinator.observe_object("put", "done", 0.1)
     offered += generate_latest(coordinator.registry).decode()
     existing = {re.split(r"[ {]", line)[0] for line in offered.splitlines() if not line.startswith("#")}
     queries = "\n".join(
