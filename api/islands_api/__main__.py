@@ -10,6 +10,7 @@ from islands.errors import IslandsError, SettingsError
 from islands_api.server.http_server import HTTPServer, make_server_config
 from islands_api.server.listener import open_listener, raise_file_limit
 from islands_api.web.app import create_app
+from islands_api.web.auth import make_verifier
 from islands_service.logging_config import configure_logs
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
@@ -74,14 +75,16 @@ def install_admin_key(settings: ServiceSettings, store: Store) -> None:
 
 
 def check_safe(settings: ServiceSettings, store: Store) -> None:
-    """Check that a service that other machines can reach needs keys, and that the TLS files are usable.
+    """Check that a service that other machines can reach needs keys or tokens, and the TLS files.
 
     Raises
     ------
     SettingsError
-        No valid key exists although keys are needed, or the certificate and the key are not a pair.
+        No valid key exists although keys are needed and tokens are not accepted, the settings of tokens
+        cannot be used, or the certificate and the key are not a pair.
     """
-    if settings.keys_needed and not store.keys.any_valid():
+    make_verifier(settings)
+    if settings.keys_needed and not settings.oidc_issuer and not store.keys.any_valid():
         raise SettingsError(
             f"{settings.host} can be reached by other machines, and there is no key: create one with "
             "'islands keys create --scope read --scope write', name a file with one in "

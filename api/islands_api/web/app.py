@@ -4,13 +4,14 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
+from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from starlette.middleware.gzip import GZipMiddleware
 
 from islands_api.web import exception_handlers
-from islands_api.web.auth import KeyCache
+from islands_api.web.auth import KeyCache, make_verifier
 from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.dependencies import (
     MAX_CONCURRENT_DRAWINGS,
@@ -43,7 +44,8 @@ _DESCRIPTION = """Finds the equation behind measured data.
 Upload a record, submit a job, follow it, and download its models: small difference equations with metrics.
 Or compare a simulation with the record to find its errors and their causes (`/v1/discrepancies`).
 Every error response is `application/problem+json`; its `detail` says what to do.
-A loopback address needs no key. Elsewhere send `Authorization: Bearer islands_...`."""
+A loopback address needs no key. Elsewhere send `Authorization: Bearer islands_...`, or a token of the
+identity provider of the service."""
 
 
 def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI:
@@ -55,7 +57,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     store : Store, optional
         An open store, which the application closes at shutdown. Opened from the settings by default.
     """
-    traces = Traces(settings.telemetry, "api")
+    traces, tokens = Traces(settings.telemetry, "api"), make_verifier(settings)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -76,6 +78,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             OwnerCounts("event streams"),
             executor,
             make_checked_client(settings),
+            tokens,
         )
         sender = DeliverySender(
             opened.deliveries, state.outbound, executor.run, state.metrics.observe_delivery
@@ -91,6 +94,8 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
                 task.cancel()
                 with suppress(asyncio.CancelledError):
                     await task
+            if tokens is not None:
+                await tokens.keys.close()
             await state.run_blocking(opened.close)
             await state.run_blocking(traces.close)
             executor.close()
@@ -118,7 +123,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     if settings.root_path:
         app.add_middleware(RootPath, root_path=settings.root_path)
     _install_tracing(app, traces)
-    _install_openapi(app)
+    _install_openapi(app, settings.oidc_issuer)
     return app
 
 
@@ -138,8 +143,8 @@ async def _send_heartbeats(descriptor: int | None) -> None:
         await asyncio.sleep(EVERY)
 
 
-def _install_openapi(app: FastAPI) -> None:
-    """Add the problem document to the OpenAPI schema."""
+def _install_openapi(app: FastAPI, issuer: str) -> None:
+    """Add the problem document, and the issuer of tokens if there is one, to the OpenAPI schema."""
 
     def openapi() -> dict[str, object]:
         if app.openapi_schema is None:
@@ -151,10 +156,22 @@ def _install_openapi(app: FastAPI) -> None:
             schemas.update(document.pop("$defs"))
             schemas["ProblemDocument"] = document
             _remove_framework_responses(schema)
+            if issuer:
+                _add_token_scheme(schema, issuer)
             app.openapi_schema = schema
         return app.openapi_schema
 
     app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _add_token_scheme(schema: dict[str, Any], issuer: str) -> None:
+    """Describe tokens of an issuer as an alternative to keys."""
+    url = f"{issuer.rstrip('/')}/.well-known/openid-configuration"
+    schema["components"]["securitySchemes"]["token"] = {"type": "openIdConnect", "openIdConnectUrl": url}
+    for operations in schema["paths"].values():
+        for operation in operations.values():
+            if "security" in operation:
+                operation["security"].append({"token": []})
 
 
 def _remove_framework_responses(schema: dict[str, object]) -> None:

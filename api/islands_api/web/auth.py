@@ -1,18 +1,26 @@
-"""Authentication: API keys, owners and scopes."""
+"""Authentication: API keys and tokens, owners and scopes."""
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
-from time import monotonic
-from typing import Annotated, Any
+from importlib.util import find_spec
+from math import inf
+from time import monotonic, time
+from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import Depends, Request, Security
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
+from islands.errors import SettingsError
+from islands_api.oidc.bearer_token import TokenRefusedError, is_token
 from islands_api.web.dependencies import AppState
 from islands_api.web.problems import AuthenticationError, InsufficientScopeError
 from islands_service.domain.job import Requester
+from islands_service.settings import ServiceSettings
 from islands_service.store.database import StoreError
 from islands_service.store.tenants.keys import SCOPES, Key
+
+if TYPE_CHECKING:
+    from islands_api.oidc.token_verifier import TokenVerifier
 
 #: Owner of all data of requests without a key, which only a loopback address allows.
 LOCAL_OWNER = "local"
@@ -20,10 +28,14 @@ LOCAL_OWNER = "local"
 #: Seconds for which a key is cached, and therefore the longest time for which a revoked key still works.
 KEY_CACHE_SECONDS = 1.0
 
-#: Tokens of the rate limit that an invalid key costs the address that sent it.
-_INVALID_KEY_TOKENS = 10.0
+#: Requests that an invalid key or token counts as in the rate limit of the address that sent it.
+_INVALID_KEY_COST = 10.0
 
-_bearer = HTTPBearer(auto_error=False, description="A key of `islands keys create`.", scheme_name="key")
+_bearer = HTTPBearer(
+    auto_error=False,
+    description="A key of `islands keys create`, or a token (JWT) of the identity provider of this service.",
+    scheme_name="key",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +47,20 @@ class Principal:
     owner : str
         Owner of the caller's jobs and data sets.
     scopes : frozenset of str
-        Scopes of the key.
+        Scopes of the key, or of the roles of the token.
     requester : Requester
-        Key and address, for the audit trail.
+        Key, or digest of the subject of the token, and address, for the audit trail.
     secret : str or None
         Secret of the key. None if the request had no key.
+    expires : float
+        Time at which the token expires, in seconds since 1970.
     """
 
     owner: str
     scopes: frozenset[str]
     requester: Requester
     secret: str | None = field(default=None, repr=False)
+    expires: float = inf
 
 
 class KeyCache:
@@ -76,9 +91,9 @@ class KeyCache:
         return key
 
     async def is_still_valid(self, caller: Principal) -> bool:
-        """Return whether the key of the caller is still valid. True if the database is unavailable."""
+        """Return whether the key or token of the caller is still valid, True without the database."""
         if caller.secret is None:
-            return True
+            return time() < caller.expires
         try:
             key = await self.find(caller.secret)
         except StoreError:
@@ -93,6 +108,8 @@ async def authenticate(request: Request) -> Principal:
     ------
     AuthenticationError
         The key is missing, unknown, revoked or expired.
+    TokenRefusedError, IssuerUnavailableError
+        The token is not valid, or cannot be checked.
     RateLimitError
         The key, or the address that sent no valid key, has sent too many requests.
     """
@@ -113,15 +130,49 @@ async def _check_key(
             raise AuthenticationError(
                 "this service needs a key: send 'Authorization: Bearer islands_...'; its operator creates "
                 "one with 'islands keys create'"
+                + (f"; or send a token of {state.settings.oidc_issuer}" if state.tokens is not None else "")
             )
         return Principal(LOCAL_OWNER, frozenset(SCOPES), Requester(address))
+    if state.tokens is not None and is_token(credentials.credentials):
+        return await _check_token(state, state.tokens, credentials.credentials, address)
     key = await request.app.state.keys.find(credentials.credentials)
     if key is None or not key.valid:
-        state.rate_limiter.acquire(f"address {address}", min(_INVALID_KEY_TOKENS, state.settings.burst))
+        state.rate_limiter.acquire(f"address {address}", min(_INVALID_KEY_COST, state.settings.burst))
         reason = "is unknown" if key is None else "was revoked" if key.revoked is not None else "has expired"
         raise AuthenticationError(f"the key {reason}: ask the operator of this service for another one")
     state.rate_limiter.acquire(f"key {key.id}")
     return Principal(key.owner, key.scopes, Requester(address, key.id), credentials.credentials)
+
+
+async def _check_token(state: AppState, tokens: "TokenVerifier", token: str, address: str) -> Principal:
+    try:
+        identity = await tokens.verify(token)
+    except TokenRefusedError:
+        state.rate_limiter.acquire(f"address {address}", min(_INVALID_KEY_COST, state.settings.burst))
+        raise
+    state.rate_limiter.acquire(f"token {identity.subject}")
+    by = Requester(address, identity.subject)
+    return Principal(identity.owner, identity.scopes, by, expires=identity.expires)
+
+
+def make_verifier(settings: ServiceSettings) -> "TokenVerifier | None":
+    """Return the verifier of tokens; None if the settings have no issuer.
+
+    Raises
+    ------
+    SettingsError
+        The settings of tokens contradict each other, or the extra ``oidc`` is not installed.
+    """
+    if not settings.oidc_issuer:
+        return None
+    if find_spec("joserfc") is None:
+        raise SettingsError(
+            "tokens (ISLANDS_OIDC_ISSUER) need an extra: install it with pip install 'islands[oidc]'"
+        )
+    # The import of the cryptography takes a tenth of a second.
+    from islands_api.oidc.token_verifier import make_token_verifier  # noqa: PLC0415
+
+    return make_token_verifier(settings)
 
 
 async def _get_principal(
@@ -139,9 +190,10 @@ def check_scope(caller: Principal, scope: str) -> None:
     InsufficientScopeError
     """
     if scope not in caller.scopes:
+        kind, remedy = ("key", "key") if caller.expires == inf else ("token", "role")
         raise InsufficientScopeError(
-            f"the key has the scopes {', '.join(sorted(caller.scopes))}, but this request needs "
-            f"{scope}: ask for another key"
+            f"the {kind} has the scopes {', '.join(sorted(caller.scopes)) or '(none)'}, but this request "
+            f"needs {scope}: ask for another {remedy}"
         )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar
 
 from fastapi import Depends, Request
 
@@ -19,6 +19,9 @@ from islands_service.outbound.checked_client import CheckedClient
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
+
+if TYPE_CHECKING:
+    from islands_api.oidc.token_verifier import TokenVerifier
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -50,6 +53,7 @@ class AppState:
     streams: OwnerCounts
     executor: BlockingExecutor
     outbound: CheckedClient
+    tokens: "TokenVerifier | None"
     positions: QueuePositions = field(default_factory=QueuePositions)
 
     async def quotas(self, owner: str) -> Quotas:

@@ -13,6 +13,7 @@ from starlette.responses import JSONResponse
 from starlette.routing import Match
 
 from islands.errors import IslandsError
+from islands_api.oidc.bearer_token import TokenRefusedError
 from islands_api.web.problems import (
     MEDIA_TYPE,
     PROBLEMS,
@@ -91,6 +92,8 @@ async def _handle_islands_error(request: Request, error: Exception) -> JSONRespo
         headers["Retry-After"] = "60"
     if isinstance(error, AuthenticationError):
         headers["WWW-Authenticate"] = 'Bearer realm="islands"'
+    if isinstance(error, TokenRefusedError):
+        headers["WWW-Authenticate"] = 'Bearer realm="islands", error="invalid_token"'
     if problem.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
         log.error("request failed", type=problem.type, reason=str(error))
     return problem_response(request, problem, _public_detail(error), headers=headers)

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from islands.errors import IslandsError, ModelError, RecordError, SettingsError
+from islands_api.oidc.bearer_token import IssuerUnavailableError, TokenRefusedError
 from islands_service.domain.job import (
     DatasetDeletedError,
     IdempotencyError,
@@ -39,7 +40,7 @@ class AuthenticationError(IslandsError):
 
 
 class InsufficientScopeError(IslandsError):
-    """The key does not have the scope that the request needs."""
+    """The key or the token does not have the scope that the request needs."""
 
 
 class RateLimitError(IslandsError):
@@ -139,6 +140,7 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
             HTTPStatus.UNPROCESSABLE_ENTITY, "idempotency-conflict", "The idempotency key was used before"
         ),
         AuthenticationError: ProblemKind(HTTPStatus.UNAUTHORIZED, "no-key", "A valid key is needed"),
+        TokenRefusedError: ProblemKind(HTTPStatus.UNAUTHORIZED, "invalid-token", "The token is not valid"),
         InsufficientScopeError: ProblemKind(
             HTTPStatus.FORBIDDEN, "scope-missing", "The key does not allow this"
         ),
@@ -193,6 +195,9 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         ),
         ObjectStoreError: ProblemKind(
             HTTPStatus.SERVICE_UNAVAILABLE, "object-store-unavailable", "The object store does not answer"
+        ),
+        IssuerUnavailableError: ProblemKind(
+            HTTPStatus.SERVICE_UNAVAILABLE, "issuer-unavailable", "The issuer of the token does not answer"
         ),
         NotReadyError: ProblemKind(HTTPStatus.SERVICE_UNAVAILABLE, "not-ready", "The service is not ready"),
         CommitUnknownError: ProblemKind(

@@ -90,6 +90,22 @@ class ServiceSettings(BaseSettings):
     admin_key_file
         File with a key of at least 32 characters that has the scope ``admin``, for example a mounted secret.
         With it the first keys can be created over REST. Without it that key is revoked.
+    oidc_issuer
+        URL of an OpenID Connect provider whose tokens are accepted in addition to keys. Then every request
+        needs a key or a token.
+    oidc_audience
+        Value that the claim ``aud`` of a token contains. Required with an issuer.
+    oidc_owner_claim
+        Claim that names the owner. It must be unique, and users must not be able to choose it.
+    oidc_role_claim
+        Claim with the roles: a list, or text with spaces. A path such as ``realm_access.roles`` is possible.
+    oidc_roles
+        Roles by the values of that claim, ``VALUE=ROLE``, separated by commas. The roles are ``reader``,
+        ``submitter``, ``monitor`` and ``administrator``.
+    oidc_algorithms
+        Accepted algorithms of signatures, separated by commas. All are asymmetric.
+    oidc_leeway
+        Tolerated difference of the clocks of the issuer and of this machine.
     tls_certificate, tls_key
         PEM files for HTTPS.
     max_webhooks
@@ -151,6 +167,16 @@ class ServiceSettings(BaseSettings):
     burst: Count = 200
     require_keys: bool = False
     admin_key_file: Path | None = None
+    oidc_issuer: str = ""
+    oidc_audience: str = ""
+    oidc_owner_claim: Annotated[str, Field(min_length=1)] = "sub"
+    oidc_role_claim: Annotated[str, Field(min_length=1)] = "roles"
+    oidc_roles: str = (
+        "islands-reader=reader,islands-submitter=submitter,islands-monitor=monitor,"
+        "islands-administrator=administrator"
+    )
+    oidc_algorithms: str = "RS256,PS256,ES256,Ed25519"
+    oidc_leeway: Annotated[float, Field(ge=0.0, le=300.0)] = 30.0
     tls_certificate: Path | None = None
     tls_key: Path | None = None
     max_webhooks: Annotated[int, Field(ge=0)] = 10
@@ -196,8 +222,8 @@ class ServiceSettings(BaseSettings):
 
     @property
     def keys_needed(self) -> bool:
-        """Whether every request needs a key."""
-        return self.require_keys or not self.on_loopback
+        """Whether every request needs a key or a token."""
+        return self.require_keys or bool(self.oidc_issuer) or not self.on_loopback
 
     def read_admin_key(self) -> str | None:
         """Return the key of the operator; None without a file.

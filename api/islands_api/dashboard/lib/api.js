@@ -64,7 +64,8 @@ export async function sendRequest(path, { headers = {}, signal, ...options } = {
   const allHeaders = secret ? { ...headers, Authorization: `Bearer ${secret}` } : headers;
   let response;
   try {
-    response = await fetch(path, { ...options, headers: allHeaders, signal, credentials: "omit" });
+    // The cookie is that of a proxy that logs users in and adds a token; the service itself has none.
+    response = await fetch(path, { ...options, headers: allHeaders, signal, credentials: "same-origin" });
   } catch (error) {
     if (signal?.aborted) throw error;
     throw reportUnavailable("The service does not answer.");

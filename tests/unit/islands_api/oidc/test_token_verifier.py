@@ -1,0 +1,277 @@
+"""Tokens: the accepted ones with their owners and scopes, and the refusal of each known attack."""
+
+import asyncio
+import hashlib
+import hmac
+import json
+
+import pytest
+
+from islands.errors import SettingsError
+from islands_api.oidc.bearer_token import MAX_TOKEN, TokenRefusedError, is_token
+from islands_service.settings import ServiceSettings
+from support.issuers import AUDIENCE, encode_part, make_claims, make_key, sign
+
+ISSUER = "https://id.example.org/realm"
+
+OTHER = "https://other.example.org"
+
+
+class _Keys:
+    """Keys of an issuer that always answers."""
+
+    def __init__(self, *keys):
+        self._keys = {key.kid: type(key).import_key(key.as_dict(private=False)) for key in keys}
+
+    async def find(self, identity):
+        return self._keys.get(identity)
+
+
+def make(*keys, **settings):
+    from islands_api.oidc.token_verifier import TokenVerifier
+
+    given = {"oidc_issuer": ISSUER, "oidc_audience": AUDIENCE, **settings}
+    return TokenVerifier(ServiceSettings(**given), _Keys(*(keys or (make_key(),))))
+
+
+def verify(token, *keys, **settings):
+    return asyncio.run(make(*keys, **settings).verify(token))
+
+
+def token(**changes):
+    return sign(make_claims(ISSUER, **changes), make_key())
+
+
+def refused(text, *keys, **settings):
+    """Check that a token is refused; return the message."""
+    with pytest.raises(TokenRefusedError) as error:
+        verify(text, *keys, **settings)
+    return str(error.value)
+
+
+def test_a_valid_token_gives_owner_scopes_and_expiry():
+    identity = verify(token(exp=4e9))
+    assert identity.owner == f"oidc-{hashlib.sha256(ISSUER.encode()).hexdigest()[:8]}:alice"
+    assert identity.subject == f"sub-{hashlib.sha256(b'alice').hexdigest()[:12]}"
+    assert identity.scopes == {"read", "write"}
+    assert identity.expires == pytest.approx(4e9, abs=31)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "kind", "size"),
+    [("ES256", "EC", "P-256"), ("RS256", "RSA", 2048), ("PS256", "RSA", 2048), ("Ed25519", "OKP", "Ed25519")],
+)
+def test_a_token_of_every_default_algorithm_is_accepted(algorithm, kind, size):
+    key = make_key("made", kind, size)
+    assert verify(sign(make_claims(ISSUER), key, algorithm), key).scopes
+
+
+@pytest.mark.parametrize("header", [{"typ": None}, {"typ": "at+jwt"}, {"typ": "JWT"}, {"x5t": "abc"}])
+def test_a_token_with_another_usual_header_is_accepted(header):
+    assert verify(sign(make_claims(ISSUER), make_key(), **header)).scopes
+
+
+@pytest.mark.parametrize("audience", [AUDIENCE, [AUDIENCE], ["account", AUDIENCE]])
+def test_the_audience_may_be_one_of_several(audience):
+    assert verify(token(aud=audience)).scopes
+
+
+def test_a_token_without_a_signature_is_refused():
+    parts = [encode_part({"alg": "none", "kid": "first"}), encode_part(make_claims(ISSUER)), ""]
+    assert "signed with 'none'" in refused(".".join(parts))
+
+
+def test_a_token_that_is_signed_with_the_public_key_as_a_secret_is_refused():
+    """The public key is known to everybody: HS256 with it would make anyone an issuer."""
+    parts = f"{encode_part({'alg': 'HS256', 'kid': 'first'})}.{encode_part(make_claims(ISSUER))}"
+    for secret in (make_key().as_pem(private=False), json.dumps(make_key().as_dict(private=False)).encode()):
+        signature = hmac.digest(secret, parts.encode(), hashlib.sha256)
+        assert "signed with 'HS256'" in refused(f"{parts}.{encode_part(signature)}")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"iss": OTHER}, "was issued by 'https://other"),
+        ({"iss": ISSUER + "/"}, "was issued by"),
+        ({"iss": None}, "was issued by None"),
+        ({"aud": "account"}, "for 'account': request one for the audience islands"),
+        ({"aud": ["account"]}, "request one for the audience"),
+        ({"aud": {"islands": 1}}, "request one for the audience"),
+        ({"aud": None}, "request one for the audience"),
+        ({"exp": 1_600_000_000}, "has expired"),
+        ({"exp": None}, "does not expire"),
+        ({"exp": "never"}, "exp of the token is not a time"),
+        ({"exp": True}, "exp of the token is not a time"),
+        ({"exp": float("inf")}, "exp of the token is not a time"),
+        ({"nbf": 4e9}, "not valid yet"),
+        ({"iat": 4e9}, "not valid yet"),
+        ({"sub": None}, "does not name an owner"),
+        ({"sub": ""}, "does not name an owner"),
+        ({"sub": 7}, "does not name an owner"),
+    ],
+)
+def test_a_token_with_wrong_claims_is_refused_with_the_claim(changes, message):
+    assert message in refused(token(**changes))
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ({"kid": None}, "needs a kid"),
+        ({"kid": "second"}, "is not one of the issuer"),
+        ({"typ": "logout+jwt"}, "has the type 'logout+jwt'"),
+        ({"crit": ["b64"], "b64": False}, "signature"),
+    ],
+)
+def test_a_token_with_a_wrong_header_is_refused(header, message):
+    assert message in refused(sign(make_claims(ISSUER), make_key(), **header))
+
+
+@pytest.mark.parametrize("kid", [7, ["first"], {"a": 1}])
+def test_a_token_whose_key_has_no_textual_id_is_refused(kid):
+    parts = f"{encode_part({'alg': 'ES256', 'kid': kid})}.{encode_part(make_claims(ISSUER))}.AAAA"
+    assert "needs a kid" in refused(parts)
+
+
+def test_a_token_of_another_key_with_the_same_id_is_refused():
+    text = sign(make_claims(ISSUER), make_key("second"), kid="first")
+    assert "signature of the token is not valid" in refused(text)
+
+
+def test_a_key_of_the_header_is_not_used():
+    """A token that brings its key along proves nothing."""
+    other = make_key("second")
+    text = sign(make_claims(ISSUER), other, kid="first", jwk=other.as_dict(private=False))
+    assert "signature of the token is not valid" in refused(text)
+
+
+def test_a_changed_claim_breaks_the_signature():
+    header, _, signature = token().split(".")
+    changed = encode_part(make_claims(ISSUER, sub="mallory"))
+    assert "signature of the token is not valid" in refused(f"{header}.{changed}.{signature}")
+
+
+@pytest.mark.parametrize("algorithm", ["RS256", "Ed25519"])
+def test_the_type_of_the_key_must_fit_the_algorithm(algorithm):
+    header = encode_part({"alg": algorithm, "kid": "first"})
+    assert "signature" in refused(f"{header}.{token().partition('.')[2]}")
+
+
+def test_a_key_for_another_algorithm_is_not_used():
+    from joserfc.jwk import RSAKey
+
+    key = RSAKey.import_key({**make_key("made", "RSA", 2048).as_dict(private=True), "alg": "RS256"})
+    assert "is not for PS256" in refused(
+        sign(make_claims(ISSUER), make_key("made", "RSA", 2048), "PS256"), key
+    )
+
+
+def test_an_oversize_token_is_refused_before_it_is_parsed():
+    text = sign(make_claims(ISSUER, padding="a" * MAX_TOKEN), make_key())
+    assert is_token(text)
+    assert f"more than {MAX_TOKEN} characters" in refused(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["islands_abc", "a.b.c", "...", "", "e30", encode_part([1]) + ".e30.", "é" * 9 + ".a.b"]
+)
+def test_a_key_is_no_token(text):
+    assert not is_token(text)
+
+
+@pytest.mark.parametrize("text", ["e30.", "e30.e30", "e30.e30.e30.e30.e30"])
+def test_a_malformed_token_is_refused(text):
+    assert is_token(text)
+    assert refused(text)
+
+
+@pytest.mark.parametrize("payload", [b"[]", b"null", b"{", b"[" * 5000])
+def test_a_signed_payload_that_is_no_object_is_refused(payload):
+    from joserfc import jws
+
+    text = jws.serialize_compact({"alg": "ES256", "kid": "first"}, payload, make_key())
+    assert "not valid" in refused(text)
+
+
+def test_the_leeway_tolerates_the_clock_of_the_issuer():
+    late = make_claims(ISSUER)["iat"] - 20.0
+    assert verify(token(exp=late)).scopes
+    assert "expired" in refused(token(exp=late), oidc_leeway=10.0)
+
+
+@pytest.mark.parametrize(
+    ("roles", "scopes"),
+    [
+        (["islands-reader"], {"read"}),
+        (["islands-reader", "islands-monitor", "unknown", 7], {"read", "metrics"}),
+        (["islands-administrator"], {"read", "write", "metrics", "admin"}),
+        ("openid islands-submitter", {"read", "write"}),
+        (["submitter"], set()),
+        ({"islands-administrator": True}, set()),
+        (None, set()),
+    ],
+)
+def test_roles_give_scopes_and_other_values_give_none(roles, scopes):
+    assert verify(token(roles=roles)).scopes == scopes
+
+
+def test_roles_can_be_in_a_nested_claim_with_other_values():
+    nested = token(roles=None, realm_access={"roles": ["lab/members"]})
+    settings = {"oidc_role_claim": "realm_access.roles", "oidc_roles": "lab/members=submitter, a=b=reader"}
+    assert verify(nested, **settings).scopes == {"read", "write"}
+    assert verify(token(roles="a=b"), oidc_roles=settings["oidc_roles"]).scopes == {"read"}
+    dotted = token(roles=None, **{"https://example.org/roles": ["islands-reader"]})
+    assert verify(dotted, oidc_role_claim="https://example.org/roles").scopes == {"read"}
+
+
+def test_owners_of_two_issuers_and_of_keys_are_never_the_same():
+    values = [
+        "alice",
+        "local",
+        "a/b",
+        "ä",
+        "x" * 100,
+        "x" * 101,
+        "~" + hashlib.sha256(b"a/b").hexdigest()[:47],
+    ]
+    owners = {
+        verify(sign(make_claims(issuer, sub=value), make_key()), oidc_issuer=issuer).owner
+        for issuer in (ISSUER, OTHER)
+        for value in values
+    }
+    assert len(owners) == 2 * len(values)
+    assert all(owner.startswith("oidc-") and len(owner) <= 64 and "/" not in owner for owner in owners)
+
+
+def test_the_owner_can_be_another_claim():
+    identity = verify(token(group="lab-3"), oidc_owner_claim="group")
+    assert identity.owner.endswith(":lab-3")
+    assert identity.subject == verify(token()).subject
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"oidc_audience": ""}, "ISLANDS_OIDC_AUDIENCE"),
+        ({"oidc_algorithms": "HS256"}, "symmetric"),
+        ({"oidc_algorithms": "none"}, "symmetric"),
+        ({"oidc_algorithms": " , "}, "ISLANDS_OIDC_ALGORITHMS"),
+        ({"oidc_roles": "a=god"}, "'a=god' is not VALUE=ROLE with a role of reader"),
+        ({"oidc_roles": "reader"}, "is not VALUE=ROLE"),
+    ],
+)
+def test_settings_that_accept_too_much_or_nothing_are_refused(settings, message):
+    with pytest.raises(SettingsError, match=message):
+        make(**settings)
+
+
+@pytest.mark.parametrize("issuer", ["http://id.example.org", "id.example.org"])
+def test_an_issuer_without_tls_is_refused_unless_it_is_listed(issuer):
+    from islands_api.oidc.token_verifier import make_token_verifier
+
+    settings = {"oidc_issuer": issuer, "oidc_audience": AUDIENCE}
+    with pytest.raises(SettingsError):
+        make_token_verifier(ServiceSettings(**settings))
+    if issuer.startswith("http:"):
+        assert make_token_verifier(ServiceSettings(**settings, http_hosts="id.example.org")) is not None
