@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo test ci nightly soak fuzz load lint bench docs wheel wheel-matrix clean
+.PHONY: setup demo test ci nightly soak fuzz load lint bench docs sbom licences audit wheel wheel-matrix clean
 
 setup: .venv/ready
 
@@ -64,6 +64,18 @@ bench: setup
 # The theme prints a notice about a later version of MkDocs, which is not installed.
 docs: setup
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir site
+
+# What the image contains, in CycloneDX. The file depends on deploy/requirements.lock only.
+sbom: setup
+	$(BIN)/python deploy/packages/write_sbom.py --output dist/islands-sbom.json
+
+# Every locked package has a licence of deploy/packages/licences.toml.
+licences: setup
+	$(BIN)/python deploy/packages/check_licences.py
+
+# Known vulnerabilities of the locked packages. Exit code 2 of the script: not checked, for lack of a service.
+audit: setup
+	$(BIN)/python deploy/packages/audit_packages.py
 
 wheel: setup
 	$(BIN)/python -m build --no-isolation --wheel --outdir dist .
