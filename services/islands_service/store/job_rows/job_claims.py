@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from sqlalchemy import Connection, Row, Select, func, or_, select
+from sqlalchemy import Connection, Row, Select, and_, func, or_, select
 
 from islands_service.domain.job import JobState, Lease
 from islands_service.store.backends import dialect
@@ -22,6 +22,10 @@ _CANDIDATE: Select[Any] = (
     .with_for_update(skip_locked=True)
 )
 
+#: True if the clock of the database has gone back by more than a second since the last change of a job. Times
+#: that were set before may lie far in the future.
+_CLOCK_WENT_BACK = jobs.c.updated > now() + 1.0
+
 #: Problem of a job that failed after `ATTEMPTS` attempts.
 GAVE_UP = {
     "type": "no-progress",
@@ -35,7 +39,7 @@ def claim_job(
     connection: Connection, coordinator: str, seconds: float, version: str, most_running: int | None
 ) -> Lease | None:
     """Claim a lost job, or the first queued job of the owner whose turn it is; see `Leases.claim`."""
-    while (found := _select_lost(connection, coordinator)) is not None:
+    while (found := _select_lost(connection, coordinator, seconds)) is not None:
         if found.stalled < ATTEMPTS:
             return _lease_job(connection, found.id, coordinator, seconds)
         _give_up(connection, found)
@@ -50,9 +54,11 @@ def claim_job(
     return None
 
 
-def _select_lost(connection: Connection, coordinator: str) -> Row[Any] | None:
+def _select_lost(connection: Connection, coordinator: str, seconds: float) -> Row[Any] | None:
     """Return a running job whose coordinator has ended. Its owner has had the turn already."""
-    ended = or_(jobs.c.lease_until < now(), jobs.c.lease_owner == coordinator)
+    # A coordinator that runs renews its lease by the new clock, for a short time from now.
+    never_expires = and_(jobs.c.lease_until > now() + seconds, _CLOCK_WENT_BACK)
+    ended = or_(jobs.c.lease_until < now(), jobs.c.lease_owner == coordinator, never_expires)
     query = _CANDIDATE.where(jobs.c.state == JobState.RUNNING, ended).order_by(jobs.c.created, jobs.c.id)
     return connection.execute(query).one_or_none()
 
@@ -61,7 +67,7 @@ def _select_queued(connection: Connection, owner: str, version: str) -> Row[Any]
     query = _CANDIDATE.where(
         jobs.c.state == JobState.QUEUED,
         jobs.c.owner == owner,
-        jobs.c.not_before <= now(),
+        or_(jobs.c.not_before <= now(), _CLOCK_WENT_BACK),
         ~jobs.c.declined.contains(f",{version},", autoescape=True),
     ).order_by(jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
     return connection.execute(query).one_or_none()
