@@ -1,6 +1,7 @@
-"""Soak test: random kills of a service's processes while jobs are submitted, run and cancelled.
+"""Soak test: random kills and suspensions of a service's processes while jobs are submitted, run, cancelled.
 
-    python benchmarks/service_soak.py [--kills 500] [--seed 0] [--json FILE]
+    python benchmarks/service_soak.py [--database sqlite|postgresql] [--kills 500] [--minutes M] [--seed 0]
+        [--json FILE]
 
 At the end no accepted job may be lost, none may be run twice, and every result must equal that of the same
 job before the first kill byte for byte. Otherwise the exit status is 1.
@@ -8,32 +9,26 @@ job before the first kill byte for byte. Otherwise the exit status is 1.
 
 import argparse
 import json
+import math
 import os
 import random
 import sys
 import tempfile
 import time
 from collections import Counter
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from threading import Event, Thread
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from support.processes import alive, kill
+from soak_killer import Killer
+
+from support.databases import Server, server
+from support.processes import alive
 from support.service_processes import TERMINAL, Service, serving
-
-#: Processes to kill, with relative frequencies. After the loss of a Ray process, recovery takes seconds.
-VICTIMS = {"island": 10, "api": 4, "coordinator": 2, "raylet": 0.3, "gcs": 0.3, "head": 0.3}
-
-#: Range of the seconds between two kills if a job takes `JOB` seconds; scaled with the duration of a job, so
-#: that jobs make progress between two kills on slower machines too.
-PAUSE = (0.5, 2.0)
-
-#: Reference duration of a job in seconds.
-JOB = 3.0
 
 #: Number of different jobs.
 SEEDS = 5
@@ -74,26 +69,6 @@ class Found:
     @property
     def good(self) -> bool:
         return self.lost == self.duplicated == self.different == 0
-
-
-class Killer(Thread):
-    """Kills a given number of processes, one after the other."""
-
-    def __init__(self, service: Service, kills: int, chance: random.Random, found: Found) -> None:
-        super().__init__(name="killer", daemon=True)
-        self._service, self._left, self._chance, self._found = service, kills, chance, found
-        self.over = Event()
-
-    def run(self) -> None:
-        slower = max(1.0, self._found.seconds_of_a_job / JOB)
-        while self._left and not self.over.wait(slower * self._chance.uniform(*PAUSE)):
-            (role,) = self._chance.choices(list(VICTIMS), list(VICTIMS.values()))
-            if pids := self._service.pids(role):
-                with suppress(ProcessLookupError):
-                    kill(self._chance.choice(pids))
-                    self._found.kills[role] += 1
-                    self._left -= 1
-        self.over.set()
 
 
 class Soak:
@@ -215,26 +190,42 @@ class Soak:
             cursor = {"cursor": page["next"]}
 
 
-def soak(folder: Path, kills: int, seed: int) -> Found:
+@contextmanager
+def _database(name: str) -> Iterator[Server | None]:
+    if name == "sqlite":
+        yield None
+    else:
+        with server() as started:
+            yield started
+
+
+def soak(folder: Path, database: str, kills: int, seed: int, minutes: float) -> Found:
     """Kill processes of a service at random; return what happened to its jobs."""
     found, began = Found(), time.monotonic()
-    with serving(folder, patience=CALM) as service:
-        client = Soak(service, random.Random(seed), found)
-        client.prepare()
-        killer = Killer(service, kills, random.Random(seed + 1), found)
-        killer.start()
-        reported = 0
-        while not killer.over.wait(0.1):
-            client.step()
-            if sum(found.kills.values()) >= reported + 20:
-                reported = sum(found.kills.values())
-                print(
-                    f"{reported} kills, {len(client.promised)} jobs, {time.monotonic() - began:.0f} s",
-                    flush=True,
-                )
-        client.finish()
-        client.judge()
-        assert alive([service.process.pid])
+    with _database(database) as postgres:
+        environment = {} if postgres is None else {"ISLANDS_DATABASE": postgres.url}
+        with serving(folder, patience=CALM, environment=environment) as service:
+            client = Soak(service, random.Random(seed), found)
+            client.prepare()
+            killer = Killer(
+                service, postgres, kills, random.Random(seed + 1), found.seconds_of_a_job, found.kills
+            )
+            killer.start()
+            reported = 0
+            while not killer.over.wait(0.1):
+                client.step()
+                if time.monotonic() - began > 60.0 * minutes:
+                    killer.over.set()
+                if sum(found.kills.values()) >= reported + 20:
+                    reported = sum(found.kills.values())
+                    print(
+                        f"{reported} kills, {len(client.promised)} jobs, {time.monotonic() - began:.0f} s",
+                        flush=True,
+                    )
+            killer.join()
+            client.finish()
+            client.judge()
+            assert alive([service.process.pid])
     found.seconds = time.monotonic() - began
     found.load = os.getloadavg()[1]
     return found
@@ -242,7 +233,9 @@ def soak(folder: Path, kills: int, seed: int) -> Found:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--database", choices=("sqlite", "postgresql"), default="sqlite")
     parser.add_argument("--kills", type=int, default=500)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="Kill nothing after this time.")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--folder", type=Path, help="Keep the service's data and its log there.")
@@ -250,7 +243,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="islands-soak-", ignore_cleanup_errors=True) as temporary:
         folder = given.folder or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        found = soak(folder / "data", given.kills, given.seed)
+        found = soak(folder / "data", given.database, given.kills, given.seed, given.minutes)
     for name, value in vars(found).items():
         print(f"{name.replace('_', ' '):24s} {dict(value) if isinstance(value, dict) else value}")
     if given.json:

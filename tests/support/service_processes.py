@@ -75,12 +75,12 @@ class Service:
         self._dataset = ""
 
     def ask(self, method: str, path: str, **asked: Any) -> httpx.Response:
-        """Send a request; retry while the connection is refused or lost, or the response is 503."""
+        """Send a request; retry while the connection is lost, or the database is away or in doubt."""
         deadline = time.monotonic() + self.patience
         while True:
             try:
                 answer = self.client.request(method, path, **asked)
-                if answer.status_code != 503:
+                if answer.status_code not in (503, 504):
                     return answer
             except httpx.TransportError:
                 if time.monotonic() > deadline:
