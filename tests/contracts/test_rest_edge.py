@@ -142,7 +142,7 @@ def test_a_service_that_cannot_write_is_not_ready(service, monkeypatch, failure)
 
     monkeypatch.setattr("tempfile.NamedTemporaryFile", refuse)
     answer = service.client.get("/readyz")
-    assert "the data folder cannot be written: it is read-only" in problem_of(answer, 503, "not-ready")
+    assert "The data folder cannot be written now" in problem_of(answer, 503, "data-folder-unavailable")
     assert "/srv" not in answer.text
 
 

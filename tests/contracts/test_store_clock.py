@@ -22,7 +22,7 @@ def test_job_of_a_lost_coordinator_is_taken_over_after_the_clock_has_gone_back(s
         store.leases.renew(lost, LEASE)
 
 
-def test_job_of_a_running_coordinator_stays_with_it_after_the_clock_has_gone_back(store):
+def test_running_coordinator_keeps_its_job_after_the_clock_has_gone_back(store):
     submitted(store)
     lease = claimed(store, LEASE)
     turn_clock(store, -HOUR)

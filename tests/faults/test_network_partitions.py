@@ -12,7 +12,7 @@ import pytest
 
 from support.hosts import Host, hosts
 from support.processes import alive, eventually
-from support.service_processes import Service, serving
+from support.service_processes import TERMINAL, Service, serving
 
 pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]
 
@@ -32,6 +32,9 @@ HEALTH = {
 
 PORT = 6379
 
+#: Longest time in seconds until a node has joined again: it ends, and its start takes as long as Ray does.
+REJOINED = 240.0
+
 #: Starts a node again whenever it has ended, as systemd and Kubernetes do.
 RESTARTED = 'while :; do "$0" "$@"; sleep 0.5; done'
 
@@ -39,9 +42,9 @@ RESTARTED = 'while :; do "$0" "$@"; sleep 0.5; done'
 class Cluster:
     """Ray nodes on hosts, the first of which is the head without CPUs, and a service on the head's host."""
 
-    def __init__(self, made: list[Host], folder: Path, environment: dict[str, str]) -> None:
+    def __init__(self, made: list[Host], folder: Path, logs: Path, environment: dict[str, str]) -> None:
         self.head, *self.workers = made
-        self._folder, self._environment = folder, environment
+        self._folder, self._logs, self._environment = folder, logs, environment
         self.service: Service
 
     def start(self, host: Host) -> None:
@@ -55,7 +58,7 @@ class Cluster:
             options += ["--address", f"{self.head.address}:{PORT}", "--num-cpus", "1"]
         ray = str(Path(sys.executable).with_name("ray"))
         command = ["bash", "-c", RESTARTED, ray, "start", *options]
-        host.start(command, self._environment, self._folder / f"{host.address}.log")
+        host.start(command, self._environment, self._logs / f"{host.address}.log")
 
     def islands(self, host: Host) -> list[int]:
         """Return the island actors of a host."""
@@ -73,28 +76,28 @@ def _command(pid: int) -> str:
 
 
 @contextmanager
-def _cluster(folder: Path) -> Iterator[Cluster]:
+def _cluster(folder: Path, logs: Path) -> Iterator[Cluster]:
     token = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(16)}
     environment = {**HEALTH, **token}
     with hosts(3) as made:
-        cluster = Cluster(made, folder, environment)
+        cluster = Cluster(made, folder, logs, environment)
         for host in made:
             cluster.start(host)
         with (
             cluster.head.entered(),
             serving(
-                folder / "data", "--ray-address", f"{cluster.head.address}:{PORT}", environment=environment
+                logs / "data", "--ray-address", f"{cluster.head.address}:{PORT}", environment=environment
             ) as cluster.service,
         ):
             yield cluster
 
 
 @pytest.fixture(scope="module")
-def cluster() -> Iterator[Cluster]:
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
     # A short path: that of a socket may have 107 characters.
     with (
         tempfile.TemporaryDirectory(prefix="islands-", ignore_cleanup_errors=True) as folder,
-        _cluster(Path(folder)) as running,
+        _cluster(Path(folder), tmp_path_factory.mktemp("cluster")) as running,
     ):
         yield running
 
@@ -107,10 +110,18 @@ def undisturbed(cluster: Cluster) -> bytes:
 @pytest.fixture
 def job(cluster: Cluster, undisturbed: bytes) -> str:
     """A job that computes on both workers."""
-    submitted = cluster.service.submit(LONG, key=secrets.token_hex(8))
-    cluster.service.under_way(submitted)
-    eventually(cluster.both_compute)
-    return submitted
+    return submit_to_both(cluster)
+
+
+def submit_to_both(cluster: Cluster) -> str:
+    """Submit jobs until one computes on both workers; a node that was lost may still be starting."""
+    service, until = cluster.service, time.monotonic() + REJOINED
+    while True:
+        job = service.submit(LONG, key=secrets.token_hex(8))
+        eventually(lambda: cluster.both_compute() or service.job(job)["state"] in TERMINAL, REJOINED)  # noqa: B023
+        if service.job(job)["state"] not in TERMINAL and service.under_way(job) < LONG // 2:
+            return job
+        assert time.monotonic() < until, "no job has computed on both workers"
 
 
 def progress_after(service: Service, job: str, seconds: float) -> float:
@@ -139,9 +150,7 @@ def test_partition_of_a_worker_delays_a_job_only(
     assert service.job(job)["attempt"] == 1
     print(f"partition of {seconds} s: progress after {taken:.1f} s")
     # The worker is used again.
-    again = service.submit(LONG, key=secrets.token_hex(8))
-    eventually(cluster.both_compute)
-    assert service.found(again) == undisturbed
+    assert service.found(submit_to_both(cluster)) == undisturbed
 
 
 def test_loss_of_a_worker_delays_a_job_only(cluster: Cluster, undisturbed: bytes, job: str) -> None:

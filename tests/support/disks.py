@@ -27,6 +27,16 @@ def mounted(folder: Path, size: int, **options: object) -> Iterator[Path]:
         subprocess.run(["umount", folder], check=True)
 
 
+@contextmanager
+def read_only(disk: Path) -> Iterator[None]:
+    """Make a mounted disk read-only while the block runs, as Linux does after an error of the disk."""
+    subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+    try:
+        yield
+    finally:
+        subprocess.run(["mount", "-o", "remount,rw", disk], check=True)
+
+
 def filled(disk: Path, leave: int = 0) -> Path:
     """Fill a disk except for ``leave`` bytes; return the file that fills it."""
     path = disk / "filler"

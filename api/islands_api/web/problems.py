@@ -26,7 +26,7 @@ from islands_service.domain.job import (
 )
 from islands_service.domain.webhook import WebhookNotFoundError
 from islands_service.store.backends.object_store import ObjectStoreError
-from islands_service.store.blobs import BlobNotFoundError
+from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError
 from islands_service.store.tenants.keys import KeyNotFoundError
@@ -192,6 +192,9 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         ),
         StoreUnavailableError: ProblemKind(
             HTTPStatus.SERVICE_UNAVAILABLE, "store-unavailable", "The database does not answer"
+        ),
+        DataFolderUnavailableError: ProblemKind(
+            HTTPStatus.SERVICE_UNAVAILABLE, "data-folder-unavailable", "The data folder cannot be written"
         ),
         ObjectStoreError: ProblemKind(
             HTTPStatus.SERVICE_UNAVAILABLE, "object-store-unavailable", "The object store does not answer"

@@ -217,10 +217,7 @@ class Coordinator:
         """Raise the reason why a job must end; see `Heartbeat.check`."""
         heartbeat.check()
         # A job that runs for days writes a checkpoint every few seconds: delete replaced ones meanwhile.
-        try:
-            self._sweeper.sweep_if_due()
-        except (StoreError, OSError) as error:
-            log.warning("sweep failed", reason=str(error))
+        self._sweeper.sweep_if_due()
 
     def _finish(self, lease: Lease, outcome: JobOutcome, heartbeat: Heartbeat) -> None:
         """Store the outcome of a job. Retry while the store is unavailable or full: the work is done."""

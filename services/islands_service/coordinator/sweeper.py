@@ -1,12 +1,13 @@
 """Sweeps: deletion of expired rows and unreferenced blobs, by every coordinator."""
 
-from time import monotonic, time
+from time import CLOCK_BOOTTIME, clock_gettime, monotonic, time
 
 import structlog
 
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
+from islands_service.store.database import StoreError
 
 log = structlog.get_logger()
 
@@ -19,9 +20,15 @@ DELIVERY_RETENTION = 7 * 86_400.0
 #: Seconds after which a blob that no row references is deleted.
 ORPHAN_AGE = 3600.0
 
+#: Seconds by which the clock of the database may go forward between two sweeps, beyond the time that passes.
+CLOCK_JUMP = 3600.0
+
+#: Seconds for which nothing is deleted after a larger jump: time to repair a wrong clock.
+CLOCK_PAUSE = 86_400.0
+
 
 class Sweeper:
-    """Deletes what has expired.
+    """Deletes what has expired. A failed sweep is logged, and the next one does its work.
 
     Parameters
     ----------
@@ -35,17 +42,32 @@ class Sweeper:
     def __init__(self, settings: ServiceSettings, store: Store, blobs: Blobs, delay: float) -> None:
         self._settings, self._store, self._blobs = settings, store, blobs
         self._sweep_at = monotonic() + delay
+        # Difference between the clock of the database and the uptime of this machine, and the uptime at which
+        # it has jumped.
+        self._offset: float | None = None
+        self._jumped_at: float | None = None
 
     def sweep_if_due(self) -> None:
-        """Sweep if the last sweep was long ago.
-
-        Raises
-        ------
-        StoreError, OSError
-        """
+        """Sweep if the last sweep was long ago."""
         if monotonic() > self._sweep_at:
             self._sweep_at = monotonic() + SWEEP_INTERVAL
-            self._sweep()
+            try:
+                if self._is_clock_credible():
+                    self._sweep()
+            except (StoreError, OSError) as error:
+                log.warning("sweep failed", reason=str(error))
+
+    def _is_clock_credible(self) -> bool:
+        """Return False after a jump of the clock, by which all finished jobs may seem to have expired."""
+        uptime = clock_gettime(CLOCK_BOOTTIME)
+        offset = self._store.retention.read_clock() - uptime
+        if self._offset is not None and offset - self._offset > CLOCK_JUMP:
+            self._jumped_at = uptime if self._jumped_at is None else self._jumped_at
+            if uptime - self._jumped_at < CLOCK_PAUSE:
+                log.error("clock jumped: nothing is deleted", seconds=round(offset - self._offset))
+                return False
+        self._offset, self._jumped_at = offset, None
+        return True
 
     def _sweep(self) -> None:
         retention = self._store.retention

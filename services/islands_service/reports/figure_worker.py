@@ -10,7 +10,7 @@ import json
 import resource
 import sys
 from collections.abc import Mapping
-from errno import EAGAIN, EINVAL, EIO, ENODATA, ENOSPC
+from errno import EAGAIN, EINVAL, EIO, ENODATA, ENOSPC, EROFS
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,7 @@ from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.store.backends.object_store import ObjectStoreError
-from islands_service.store.blobs import BlobNotFoundError, Blobs
+from islands_service.store.blobs import BlobNotFoundError, Blobs, DataFolderUnavailableError
 from islands_service.store.database import StorageFullError, StoreError
 
 #: Largest number of samples of a simulation that is returned as numbers: a screen shows no more.
@@ -69,6 +69,8 @@ def main() -> int:
             store.results.keep(arguments.job, {name: blobs.write(data) for name, data in made.items()})
     except StorageFullError as error:
         return _report_failure(error, ENOSPC)
+    except DataFolderUnavailableError as error:
+        return _report_failure(error, EROFS)
     except ObjectStoreError as error:
         return _report_failure(error, EIO)
     except StoreError as error:

@@ -5,13 +5,13 @@ import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from errno import EDQUOT, ENOSPC
+from errno import EACCES, EDQUOT, EIO, ENODEV, ENOENT, ENOSPC, EPERM, EROFS, ESTALE
 from pathlib import Path
 from time import monotonic
 from typing import IO
 
 from islands.errors import IslandsError
-from islands_service.store.database import StorageFullError, ignore_duration
+from islands_service.store.database import StorageFullError, StoreUnavailableError, ignore_duration
 
 #: Suffix of a file that is being written.
 PART = ".part"
@@ -19,6 +19,14 @@ PART = ".part"
 
 class BlobNotFoundError(IslandsError):
     """A stored file is missing from the data folder: the operator must restore it from a backup."""
+
+
+class DataFolderUnavailableError(StoreUnavailableError):
+    """The data folder cannot be written now. Nothing was written; try again."""
+
+
+#: Errors of a folder that is read-only, unmounted or unreachable, until the operator repairs it.
+_FOLDER_ERRORS = (EROFS, EIO, ESTALE, ENODEV, ENOENT, EACCES, EPERM)
 
 
 class Blobs:
@@ -88,7 +96,7 @@ class Blobs:
 
         Raises
         ------
-        StorageFullError
+        StorageFullError, DataFolderUnavailableError
         """
         with self.receiving() as stream:
             stream.write(data)
@@ -100,10 +108,10 @@ class Blobs:
 
         Raises
         ------
-        StorageFullError
+        StorageFullError, DataFolderUnavailableError
         """
         with (
-            translate_disk_full(),
+            _translate_folder_errors(),
             tempfile.NamedTemporaryFile(dir=self._folder, suffix=PART, delete=False) as stream,
         ):
             try:
@@ -117,9 +125,9 @@ class Blobs:
 
         Raises
         ------
-        StorageFullError
+        StorageFullError, DataFolderUnavailableError
         """
-        with translate_disk_full():
+        with _translate_folder_errors():
             return tempfile.TemporaryFile(dir=self._folder)
 
     def keep(self, stream: IO[bytes]) -> str:
@@ -127,10 +135,10 @@ class Blobs:
 
         Raises
         ------
-        StorageFullError
+        StorageFullError, DataFolderUnavailableError
         """
         began = monotonic()
-        with translate_disk_full():
+        with _translate_folder_errors():
             stream.flush()
             blob = hash_file(Path(stream.name))
             self._place(stream, blob)
@@ -152,9 +160,7 @@ class Blobs:
 
         Raises
         ------
-        StorageFullError
-        OSError
-            The folder cannot be written.
+        StorageFullError, DataFolderUnavailableError
         """
         with self.receiving() as stream:
             stream.write(bytes(4096))
@@ -224,6 +230,20 @@ def hash_file(path: Path) -> str:
     """Return the SHA-256 of a file."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+@contextmanager
+def _translate_folder_errors() -> Iterator[None]:
+    """Translate the errors of a folder that is full or cannot be written."""
+    with translate_disk_full():
+        try:
+            yield
+        except OSError as error:
+            if error.errno not in _FOLDER_ERRORS:
+                raise
+            raise DataFolderUnavailableError(
+                f"the data folder cannot be written ({error.strerror}): nothing was written; try again"
+            ) from error
 
 
 def _sync(folder: Path) -> None:

@@ -41,6 +41,11 @@ class Retention:
             lambda connection: connection.execute(delete(audit).where(audit.c.at < now() - seconds))
         )
 
+    def read_clock(self) -> float:
+        """Return the clock of the database in seconds since 1970."""
+        with self._database.read() as connection:
+            return float(connection.execute(select(now())).scalar_one())
+
     def named_blobs(self) -> frozenset[str]:
         """Return all blobs that a row references."""
         with self._database.read() as connection:

@@ -21,7 +21,7 @@ from islands_api.web.routes.models import Rank, get_model
 from islands_service.domain.job import IDENTIFICATION, REPORT
 from islands_service.domain.job_spec import parse_identification
 from islands_service.store.backends.object_store import ObjectStoreError
-from islands_service.store.blobs import BlobNotFoundError
+from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
 from islands_service.store.database import StorageFullError, StoreUnavailableError
 
 log = structlog.get_logger()
@@ -250,6 +250,8 @@ async def _run_figure_worker(state: AppState, caller: Principal, job: str, rank:
             raise FigureError(f"the figures of job {job} cannot be drawn: {_decode(stdout)}")
         case errno.ENOSPC:
             raise StorageFullError(reason)
+        case errno.EROFS:
+            raise DataFolderUnavailableError(reason)
         case errno.EIO:
             raise ObjectStoreError(reason)
         case errno.EAGAIN:

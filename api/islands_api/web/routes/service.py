@@ -45,10 +45,7 @@ async def readyz(state: AppStateDep) -> Any:
 
 def _check_ready(state: AppState) -> None:
     state.store.jobs.versions([])
-    try:
-        state.blobs.check_writable()
-    except OSError as error:
-        raise NotReadyError(f"the data folder cannot be written: {error.strerror}") from error
+    state.blobs.check_writable()
 
 
 @router.get(
