@@ -10,6 +10,7 @@ from sqlalchemy import update
 
 from islands.errors import SettingsError
 from islands_service.domain.job import TERMINAL, DatasetDeletedError, JobState, QuotaError
+from islands_service.store import retention
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError, dataset_id
 from islands_service.store.tables import datasets, jobs
 from islands_service.store.tenants.keys import PREFIX, SCOPES, KeyNotFoundError
@@ -25,6 +26,7 @@ from support.stores import (
     at_once,
     brought_on,
     claimed,
+    commits,
     contents,
     job_in,
     open_stores,
@@ -302,6 +304,21 @@ def test_only_jobs_finished_long_ago_are_deleted(store):
     assert not {row[0] for row in contents(store)["models"]} & set(old.values())
     assert store.keys.all() == (key,)
     assert store.datasets.get(ALICE, dataset.id) == dataset
+
+
+def test_many_expired_rows_are_deleted_in_short_transactions(store, monkeypatch):
+    """A heartbeat waits for the transaction before it, and must not wait for longer than a lease."""
+    monkeypatch.setattr(retention, "JOBS_AT_ONCE", 2)
+    monkeypatch.setattr(retention, "ENTRIES_AT_ONCE", 2)
+    for _ in range(5):
+        job_in(store, JobState.SUCCEEDED)
+    entries = len(store.audit.entries())
+    with commits(store) as times:
+        assert store.retention.delete_expired(-LONG) == 5
+        store.retention.delete_old_audit(-LONG)
+    assert len(times) == 3 + 1 + entries // 2 + 1
+    assert store.jobs.page(ALICE).jobs == ()
+    assert store.audit.entries() == ()
 
 
 def test_resumed_job_is_not_deleted(store):
