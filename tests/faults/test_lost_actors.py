@@ -185,12 +185,25 @@ def test_a_cluster_with_an_autoscaler_is_asked_for_a_cpu_for_each_island(
     missing = 3
     islands = len(os.sched_getaffinity(0)) + missing
     for autoscaling, expected in ((False, 0), (True, missing)):
-        pool = actor_pool.IslandActorPool(posed, islands, lambda *_: None, autoscaling=autoscaling)
+        seen = []
+        pool = actor_pool.IslandActorPool(
+            posed,
+            islands,
+            lambda *_: None,
+            autoscaling=autoscaling,
+            observe=lambda *each, seen=seen: seen.append(each),
+        )
         try:
             eventually(lambda pool=pool: pool.maintain(at_once=True) or pool.slots)
             eventually(lambda expected=expected: requested() == expected, seconds=20.0)
+            assert seen[0] == (0, islands)
+            ready = (islands - missing, missing)
+            eventually(
+                lambda pool=pool, seen=seen, ready=ready: pool.maintain(at_once=True) and seen[-1] == ready
+            )
         finally:
             pool.shutdown()
+            assert seen[-1] == (0, 0)
             eventually(lambda: not actors())
     # The search begins with the actors that are ready.
     monkeypatch.setattr(actor_pool, "STARTUP_TIMEOUT", 1.0)

@@ -282,4 +282,4 @@ class Coordinator:
     def _make_engine(self, lease: Lease, notes: JobNotes) -> "Engine":
         from islands_service.coordinator.job_engine import make_job_engine  # noqa: PLC0415
 
-        return make_job_engine(lease, notes.add, self._settings.autoscaling)
+        return make_job_engine(lease, notes.add, self._settings.autoscaling, self._metrics.observe_islands)

@@ -1,4 +1,4 @@
-"""Prometheus metrics of a coordinator: attempts, outcomes, lost leases, and the time of durable writes."""
+"""Prometheus metrics of a coordinator: attempts, outcomes, islands, and the time of durable writes."""
 
 from prometheus_client import Counter, Gauge, Histogram
 
@@ -24,6 +24,10 @@ class CoordinatorMetrics:
         Attempts without an outcome by reason.
     running : Gauge
         Whether a job runs.
+    running_islands, pending_islands : Gauge
+        Islands of the running search with and without a separate CPU. Their sum is the number of its islands.
+        A pending island shares the CPU of another one, or the search has not begun. Both are zero without a
+        search, for example during a diagnosis.
     commits, blob_writes : Histogram
         Seconds of transactions, and of blobs until they are on the disk. A checkpoint is one of each.
     observe_object : callable
@@ -51,6 +55,16 @@ class CoordinatorMetrics:
         self.running = Gauge(
             "islands_coordinator_busy", "1 while a job runs in this coordinator.", registry=self.registry
         )
+        self.running_islands = Gauge(
+            "islands_running_islands",
+            "Islands of the running search that have a separate CPU.",
+            registry=self.registry,
+        )
+        self.pending_islands = Gauge(
+            "islands_pending_islands",
+            "Islands of the running search without a separate CPU: as many more CPUs would be used.",
+            registry=self.registry,
+        )
         self.commits = make_commit_histogram(self.registry)
         self.blob_writes = Histogram(
             "islands_blob_write_seconds",
@@ -59,3 +73,8 @@ class CoordinatorMetrics:
             registry=self.registry,
         )
         self.observe_object = make_object_observer(self.registry)
+
+    def observe_islands(self, running: int, pending: int) -> None:
+        """Set the numbers of islands with and without a separate CPU."""
+        self.running_islands.set(running)
+        self.pending_islands.set(pending)

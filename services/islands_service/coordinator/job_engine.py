@@ -1,5 +1,6 @@
 """Engine that runs the islands of a job on the cluster to which the coordinator is connected."""
 
+from collections.abc import Callable
 from sys import maxsize
 
 import structlog
@@ -16,7 +17,12 @@ from islands_service.runtime.ray_engine import RayEngine
 log = structlog.get_logger()
 
 
-def make_job_engine(lease: Lease, progress: ProgressCallback, autoscaling: bool = False) -> Engine:
+def make_job_engine(
+    lease: Lease,
+    progress: ProgressCallback,
+    autoscaling: bool = False,
+    observe: Callable[[int, int], None] = lambda *_: None,
+) -> Engine:
     """Return an engine for a job, and end the actors of its earlier leases.
 
     Parameters
@@ -26,6 +32,8 @@ def make_job_engine(lease: Lease, progress: ProgressCallback, autoscaling: bool 
     autoscaling : bool
         Whether the cluster starts machines for actors that wait for a CPU. Its present memory is then no
         limit.
+    observe : callable
+        Receives the numbers of islands with and without a separate CPU; see `IslandActorPool`.
 
     Raises
     ------
@@ -36,7 +44,7 @@ def make_job_engine(lease: Lease, progress: ProgressCallback, autoscaling: bool 
         check_memory(lease.job)
     if ended := kill_stale_actors(lease.job.id, lease.epoch):
         log.warning("actors of a lost lease ended", actors=ended)
-    return RayEngine(progress, f"{lease.job.id}.{lease.epoch}", autoscaling)
+    return RayEngine(progress, f"{lease.job.id}.{lease.epoch}", autoscaling, observe)
 
 
 def check_memory(job: Job) -> None:

@@ -1,6 +1,7 @@
 """Pool of the actors that run islands. It grows with the cluster and replaces lost actors."""
 
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import version
 from math import inf
@@ -64,6 +65,9 @@ class IslandActorPool:
     autoscaling : bool
         Request an actor for each island, even beyond the CPUs of the cluster, since it starts machines for
         actors that wait.
+    observe : callable, optional
+        Receives the number of islands with and without a separate CPU, when an actor is
+        ready or lost, and zeros at the end.
     """
 
     def __init__(
@@ -73,7 +77,9 @@ class IslandActorPool:
         progress: ProgressCallback,
         title: str = "",
         autoscaling: bool = False,
+        observe: Callable[[int, int], None] = lambda *_: None,
     ) -> None:
+        self._observe = observe
         self._problem, self._autoscaling = _put(problem), autoscaling
         self._islands, self._report, self._title, self._actor_count = islands, progress, title, 0
         self._size = 0
@@ -141,6 +147,7 @@ class IslandActorPool:
         """Kill all actors."""
         for actor, _ in (*self._joining.values(), *self._members.values()):
             ray.kill(actor)
+        self._observe(0, 0)
 
     def _update_members(self, now: float) -> None:
         if now - self._measured_at > _RESIZE_SECONDS:
@@ -184,6 +191,8 @@ class IslandActorPool:
                 ).remote(self._problem)
                 self._joining[slot] = (actor, actor.prepare.remote())
         self._report_waiting(now)
+        ready = len(self._members.keys() - {STANDBY})
+        self._observe(ready, self._islands - ready)
 
     def _handle_loss(self, slot: int, actor: ActorHandle, reason: str = "an actor was lost") -> None:
         # The actor may only be unreachable; kill it so that its replacement gets the CPU.

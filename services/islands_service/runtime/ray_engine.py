@@ -1,6 +1,6 @@
 """Search engine on Ray: submits epochs of islands to actors and repeats those that are lost."""
 
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from time import monotonic, sleep
 
 import ray
@@ -37,12 +37,19 @@ class RayEngine:
         Prefix of the names of the actors, ``<job>.<lease epoch>``; empty for unnamed ones.
     autoscaling : bool
         Whether the cluster starts machines for actors that wait for a CPU.
+    observe : callable
+        See `IslandActorPool`.
     """
 
     def __init__(
-        self, progress: ProgressCallback = ignore_progress, title: str = "", autoscaling: bool = False
+        self,
+        progress: ProgressCallback = ignore_progress,
+        title: str = "",
+        autoscaling: bool = False,
+        observe: Callable[[int, int], None] = lambda *_: None,
     ) -> None:
         self._progress, self._title, self._autoscaling = progress, title, autoscaling
+        self._observe = observe
 
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Yield the epochs of a search; see `islands.evolution.engine.Engine`."""
@@ -50,7 +57,9 @@ class RayEngine:
         if scheduler.finished:
             return
         islands = len(start.islands)
-        pool = IslandActorPool(problem, islands, self._progress, self._title, self._autoscaling)
+        pool = IslandActorPool(
+            problem, islands, self._progress, self._title, self._autoscaling, self._observe
+        )
         try:
             deadlines = EpochDeadlines(len(start.islands), problem.settings.population)
             yield from _run_epochs(scheduler, pool, deadlines, problem.settings.primitive_table, stop)

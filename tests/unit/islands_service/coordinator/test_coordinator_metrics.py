@@ -5,11 +5,15 @@ from typing import Any
 
 import pytest
 
+from islands_service.coordinator import job_engine
+from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import IDENTIFICATION, Job, JobOutcome, JobState
 from islands_service.liveness import StopRequest
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from support.coordinators import DONE, SerialCoordinator, replace_runner, wait_until_finished
+from support.stores import claimed
 
 
 def test_metrics_count_attempts_outcomes_and_writes(
@@ -41,3 +45,19 @@ def test_metrics_count_attempts_outcomes_and_writes(
     assert read("islands_coordinator_busy") == 0.0
     assert read("islands_blob_write_seconds_count") == 2.0
     assert (read("islands_store_commit_seconds_count") or 0.0) >= 4.0  # two claims, a return and an outcome
+
+
+def test_islands_with_and_without_a_separate_cpu_are_metrics(
+    store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engines: list[Any] = []
+    monkeypatch.setattr(job_engine, "check_memory", lambda _job: None)
+    monkeypatch.setattr(job_engine, "kill_stale_actors", lambda *_: 0)
+    monkeypatch.setattr(job_engine, "RayEngine", lambda *arguments: engines.append(arguments))
+    coordinator = Coordinator(settings, "me", StopRequest())
+    lease = claimed(store)
+    coordinator._make_engine(lease, JobNotes(lease, store))
+    read = coordinator._metrics.registry.get_sample_value
+    assert (read("islands_running_islands"), read("islands_pending_islands")) == (0.0, 0.0)
+    engines[0][-1](2, 6)
+    assert (read("islands_running_islands"), read("islands_pending_islands")) == (2.0, 6.0)
