@@ -1,11 +1,12 @@
 """Wire models of data sets: their columns and the facts about their records."""
 
 from datetime import datetime
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from islands_api.schemas import DATASET_ID, ResponseModel
+from islands_service.domain.job_spec import Name
 
 
 class Column(ResponseModel):
@@ -70,6 +71,40 @@ class Preview(ResponseModel):
     )
 
 
+class FetchRequest(BaseModel):
+    """Request for the download of a record."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"url": "https://data.example.org/piezo.csv", "inputs": ["u_V"], "output": "y_um"},
+                {"url": "s3://measurements/lab/piezo.npz"},
+            ]
+        },
+    )
+
+    url: Annotated[
+        str,
+        Field(
+            min_length=1,
+            max_length=2000,
+            pattern=r"^[\x21-\x7e]+$",
+            description="`https://HOST/PATH` or `s3://BUCKET/KEY`, of a host or bucket that is listed.",
+        ),
+    ]
+    name: Annotated[
+        str | None,
+        Field(max_length=200, description="File name; by default the last part of the URL's path."),
+    ] = None
+    inputs: Annotated[list[Name], Field(max_length=16, description="Columns to check as inputs.")] = []
+    output: Annotated[Name | None, Field(description="Column to check as the output.")] = None
+    dt: Annotated[FiniteFloat | None, Field(description="Sampling time in seconds.", gt=0.0)] = None
+    reading: Annotated[
+        dict[str, Any], Field(description='Options of reading: `{"names": ["t", "u", "y"]}`.')
+    ] = {}
+
+
 class DatasetView(ResponseModel):
     """Uploaded record."""
 
@@ -78,6 +113,7 @@ class DatasetView(ResponseModel):
     sha256: str
     bytes: int
     created: datetime
+    source: str | None = Field(default=None, description="URL of the download, without its query.")
     preview: Preview
 
 
@@ -89,6 +125,7 @@ class DatasetSummary(ResponseModel):
     sha256: str
     bytes: int
     created: datetime
+    source: str | None = Field(default=None, description="URL of the download, without its query.")
     samples: int | None
     columns: int = Field(description="Number of columns. The data set itself lists them.")
     time: str | None = Field(description="Name of the time column.")

@@ -8,7 +8,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, get_args, over
 
 import httpx
 
-from islands_api.client import calls, diagnosis_calls
+from islands_api.client import calls, dataset_calls, diagnosis_calls
 from islands_api.client.calls import RequestSpec, T
 from islands_api.client.errors import JobFailedError
 from islands_api.client.transport import (
@@ -72,7 +72,8 @@ class BaseClient(Generic[H]):
     The parameters are described in `islands_api.client.synchronous.Client`.
     """
 
-    upload = Endpoint(calls.upload)
+    upload = Endpoint(dataset_calls.upload)
+    fetch = Endpoint(dataset_calls.fetch)
     submit = Endpoint(calls.submit)
     diagnose = Endpoint(diagnosis_calls.diagnose)
     job = Endpoint(calls.job)

@@ -59,31 +59,6 @@ class RequestSpec(Generic[T]):
     repeatable: bool = True
 
 
-def upload(
-    path: str | Path,
-    inputs: str | Sequence[str] = (),
-    output: str | None = None,
-    dt: float | None = None,
-    reading: Mapping[str, Any] | None = None,
-) -> RequestSpec[DatasetView]:
-    """Upload a record in text, XLSX, NPZ, MAT, HDF5, Parquet or TDMS.
-
-    Parameters
-    ----------
-    path : str or Path
-    inputs : str or sequence of str
-        Input columns. If columns are given, the service checks the record as it does for a job.
-    output, dt : str, float, optional
-        Output column, and sampling time in seconds if the record has no time column.
-    reading : mapping, optional
-        Options of `islands.read_record` for all jobs, such as ``{"header": False}``.
-    """
-    options = json.dumps(dict(reading)) if reading else None
-    given: dict[str, Any] = {"inputs": as_list(inputs) or None, "output": output, "dt": dt}
-    form = {name: value for name, value in (given | {"reading": options}).items() if value is not None}
-    return RequestSpec("POST", "/v1/datasets", read_as(DatasetView), data=form, file=Path(path))
-
-
 def submit(
     dataset: DatasetRef,
     inputs: str | Sequence[str],

@@ -25,6 +25,7 @@ from islands_service.domain.job import (
     QuotaError,
 )
 from islands_service.domain.webhook import WebhookNotFoundError
+from islands_service.outbound.addresses import OutboundFailedError
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
@@ -201,6 +202,9 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         ),
         IssuerUnavailableError: ProblemKind(
             HTTPStatus.SERVICE_UNAVAILABLE, "issuer-unavailable", "The issuer of the token does not answer"
+        ),
+        OutboundFailedError: ProblemKind(
+            HTTPStatus.UNPROCESSABLE_ENTITY, "source-failed", "The source does not deliver the record"
         ),
         NotReadyError: ProblemKind(HTTPStatus.SERVICE_UNAVAILABLE, "not-ready", "The service is not ready"),
         CommitUnknownError: ProblemKind(

@@ -87,6 +87,7 @@ def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
         "sha256": dataset.blob,
         "bytes": dataset.bytes,
         "created": _format_time(dataset.created),
+        "source": dataset.source,
         "preview": dataset.preview,
     }
 

@@ -75,7 +75,7 @@ class CheckedClient:
             raise OutboundRefusedError(f"{parsed.port} is no port: give one from 1 to {_LAST_PORT}")
         if parsed.userinfo:
             raise OutboundRefusedError("the URL contains a user name or a password: give one without")
-        if parsed.scheme == "http" and not _is_listed(parsed, self._http):
+        if parsed.scheme == "http" and not is_listed(parsed, self._http):
             raise OutboundRefusedError(
                 f"{parsed.host} would be reached without TLS: give an https URL, or ask the operator of this "
                 "service to list the host in ISLANDS_HTTP_HOSTS"
@@ -142,7 +142,7 @@ class CheckedClient:
             One of them is not public.
         """
         found = await resolve(url.raw_host.decode("ascii"), _get_port(url))
-        if not _is_listed(url, self._private) and not all(map(is_public, found)):
+        if not is_listed(url, self._private) and not all(map(is_public, found)):
             # The address is not named: it would tell a client about the internal network.
             raise OutboundRefusedError(
                 f"{url.host} does not have a public address: give another host, or ask the operator of this "
@@ -230,6 +230,7 @@ def _get_port(url: httpx.URL) -> int:
     return _DEFAULT_PORTS[url.scheme] if url.port is None else url.port
 
 
-def _is_listed(url: httpx.URL, hosts: frozenset[str]) -> bool:
+def is_listed(url: httpx.URL, hosts: frozenset[str]) -> bool:
+    """Return whether a list of hosts has the host of a URL, with its port or without one."""
     name = f"[{url.host}]" if ":" in url.host else url.raw_host.decode("ascii").lower()
     return not hosts.isdisjoint({name, f"{name}:{_get_port(url)}"})

@@ -2,14 +2,23 @@
 
 import os
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from platformdirs import user_data_path
 from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from islands.errors import SettingsError
-from islands_service.settings.setting_checks import BlobStore, Count, Hosts, Networks, Positive
+from islands_service.settings.setting_checks import (
+    BlobStore,
+    Buckets,
+    Count,
+    Hosts,
+    Networks,
+    Positive,
+    check_separate,
+    read_secret,
+)
 
 #: Addresses that only this machine can reach.
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
@@ -34,6 +43,15 @@ class ServiceSettings(BaseSettings):
         names is deleted.
     blob_cache
         Size of the local copies of what is in the ``blob_store``.
+    dataset_hosts
+        Hosts from which clients may let the service download data sets over HTTPS, separated by commas, each
+        with an optional port: ``data.example.org``. None by default. A host with a private address also has
+        to be one of ``private_hosts``.
+    dataset_buckets
+        Buckets, with optional prefixes, from which clients may do the same: ``s3://measurements/lab``. None
+        by default. The service reads them with its own credentials: every owner can read what is listed.
+    dataset_seconds
+        Longest time of such a download.
     host, port
         Address that the service listens on.
     trusted_proxies
@@ -136,6 +154,9 @@ class ServiceSettings(BaseSettings):
     database_file: Path | None = None
     blob_store: BlobStore = ""
     blob_cache: Count = 10_000_000_000
+    dataset_hosts: Hosts = ""
+    dataset_buckets: Buckets = ""
+    dataset_seconds: Positive = 300.0
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
     trusted_proxies: Networks = ""
@@ -195,10 +216,12 @@ class ServiceSettings(BaseSettings):
             return values
         if values.get("database"):
             raise ValueError("give either ISLANDS_DATABASE or ISLANDS_DATABASE_FILE")
-        try:
-            return {**values, "database": Path(path).read_text(encoding="utf-8").strip()}
-        except (OSError, ValueError) as error:
-            raise ValueError(f"cannot read the file of ISLANDS_DATABASE_FILE, {path}: {error}") from error
+        return {**values, "database": read_secret(Path(path), "ISLANDS_DATABASE_FILE")}
+
+    @model_validator(mode="after")
+    def _check_separate_buckets(self) -> Self:
+        check_separate(self.dataset_buckets, self.blob_store)
+        return self
 
     @property
     def url(self) -> str:
@@ -236,11 +259,9 @@ class ServiceSettings(BaseSettings):
         if self.admin_key_file is None:
             return None
         try:
-            return self.admin_key_file.read_text(encoding="utf-8").strip()
-        except (OSError, ValueError) as error:
-            raise SettingsError(
-                f"cannot read the file of ISLANDS_ADMIN_KEY_FILE, {self.admin_key_file}: {error}"
-            ) from error
+            return read_secret(self.admin_key_file, "ISLANDS_ADMIN_KEY_FILE")
+        except ValueError as error:
+            raise SettingsError(str(error)) from error
 
     def environment(self) -> dict[str, str]:
         """Return environment variables that give a child process the same settings.

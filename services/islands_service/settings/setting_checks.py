@@ -2,12 +2,16 @@
 
 import re
 from ipaddress import ip_network
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
 #: Label of a host name, and an optional port after the name or after an address in brackets.
 _HOST = re.compile(r"(?:[A-Za-z0-9_](?:[A-Za-z0-9._-]{0,252})|\[[0-9A-Fa-f:.]+\])(?::[0-9]{1,5})?")
+
+#: Bucket and prefix.
+_BUCKET = re.compile(r"s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9._-]+)*/?")
 
 
 def split_list(text: str) -> tuple[str, ...]:
@@ -39,13 +43,51 @@ def _check_hosts(text: str) -> str:
 
 
 def _check_blob_store(url: str) -> str:
-    if url and not re.fullmatch(r"s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9._-]+)*/?", url):
+    if url and not _BUCKET.fullmatch(url):
         # Do not repeat the value, which may contain credentials.
         raise ValueError(
             "give s3://BUCKET or s3://BUCKET/PREFIX; credentials belong in AWS_ACCESS_KEY_ID and "
             "AWS_SECRET_ACCESS_KEY, or in AWS_SHARED_CREDENTIALS_FILE"
         )
     return url
+
+
+def _check_buckets(text: str) -> str:
+    buckets = split_list(text)
+    for bucket in buckets:
+        if not _BUCKET.fullmatch(bucket):
+            raise ValueError(f"{bucket!r} is no bucket: give s3://BUCKET or s3://BUCKET/PREFIX")
+    return ",".join(bucket.rstrip("/") for bucket in buckets)
+
+
+def check_separate(buckets: str, store: str) -> None:
+    """Refuse buckets for data sets that contain blobs: an owner could read the uploads of all others.
+
+    Raises
+    ------
+    ValueError
+    """
+    own = f"{store.rstrip('/')}/"
+    for bucket in split_list(buckets) if store else ():
+        if own.startswith(f"{bucket}/") or bucket.startswith(own):
+            raise ValueError(
+                f"ISLANDS_DATASET_BUCKETS lists {bucket}, which contains objects of ISLANDS_BLOB_STORE: "
+                "give another bucket or prefix"
+            )
+
+
+def read_secret(path: Path, setting: str) -> str:
+    """Return the content of a file that a setting names.
+
+    Raises
+    ------
+    ValueError
+        The file cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8").strip()
+    except (OSError, ValueError) as error:
+        raise ValueError(f"cannot read the file of {setting}, {path}: {error}") from error
 
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -59,3 +101,6 @@ Hosts = Annotated[str, AfterValidator(_check_hosts)]
 
 #: Bucket and prefix of an object store; empty for none.
 BlobStore = Annotated[str, AfterValidator(_check_blob_store)]
+
+#: Buckets with optional prefixes, separated by commas.
+Buckets = Annotated[str, AfterValidator(_check_buckets)]

@@ -48,7 +48,7 @@ class AuditEntry:
     address : str
         Address of the client, or ``command line``.
     details : str or None
-        New values of a changed owner, or the host of a new webhook, as JSON.
+        New values of a changed owner, the host of a new webhook, or the source of a data set, as JSON.
     """
 
     at: float

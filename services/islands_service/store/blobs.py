@@ -111,7 +111,7 @@ class Blobs:
         StorageFullError, DataFolderUnavailableError
         """
         with (
-            _translate_folder_errors(),
+            translate_folder_errors(),
             tempfile.NamedTemporaryFile(dir=self._folder, suffix=PART, delete=False) as stream,
         ):
             try:
@@ -127,7 +127,7 @@ class Blobs:
         ------
         StorageFullError, DataFolderUnavailableError
         """
-        with _translate_folder_errors():
+        with translate_folder_errors():
             return tempfile.TemporaryFile(dir=self._folder)
 
     def keep(self, stream: IO[bytes]) -> str:
@@ -138,7 +138,7 @@ class Blobs:
         StorageFullError, DataFolderUnavailableError
         """
         began = monotonic()
-        with _translate_folder_errors():
+        with translate_folder_errors():
             stream.flush()
             blob = hash_file(Path(stream.name))
             self._place(stream, blob)
@@ -233,7 +233,7 @@ def hash_file(path: Path) -> str:
 
 
 @contextmanager
-def _translate_folder_errors() -> Iterator[None]:
+def translate_folder_errors() -> Iterator[None]:
     """Translate the errors of a folder that is full or cannot be written."""
     with translate_disk_full():
         try:

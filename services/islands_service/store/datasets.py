@@ -44,6 +44,8 @@ class StoredDataset:
     preview : mapping
         Columns with units and statistics, sampling, warnings: see `islands.io.records.preview`. Jobs read the
         file with the options ``reading``. In a page it contains only the fields of `summarise_preview`.
+    source : str or None
+        URL of the download without its query; None for an upload.
     """
 
     owner: str
@@ -54,6 +56,7 @@ class StoredDataset:
     bytes: int
     preview: Mapping[str, Any]
     created: float
+    source: str | None = None
 
 
 class Datasets:
@@ -77,6 +80,7 @@ class Datasets:
         preview: Mapping[str, Any],
         most_bytes: int | None = None,
         by: Requester | None = None,
+        source: str | None = None,
     ) -> tuple[StoredDataset, bool]:
         """Add a data set; return it, and whether it is new. One that was deleted is restored.
 
@@ -92,12 +96,13 @@ class Datasets:
             existing = _read_row(connection, owner, identity)
             if existing is not None and existing.deleted is None:
                 return _make_dataset(existing), False
-            record_change(connection, Action.UPLOAD, owner, identity, by)
+            details = None if source is None else json.dumps({"source": source})
+            record_change(connection, Action.UPLOAD, owner, identity, by, details)
             if existing is not None:
                 restore = (
                     update(datasets)
                     .where(datasets.c.owner == owner, datasets.c.id == identity)
-                    .values(deleted=None, name=name, created=now())
+                    .values(deleted=None, name=name, created=now(), source=source)
                     .returning(datasets)
                 )
                 return _make_dataset(connection.execute(restore).one()), True
@@ -113,6 +118,7 @@ class Datasets:
                 "preview": json.dumps(preview),
                 "summary": json.dumps(summarise_preview(preview)),
                 "created": now(),
+                "source": source,
             }
             row = connection.execute(insert(datasets).values(values).returning(datasets)).one()
             return _make_dataset(row), True
@@ -269,7 +275,7 @@ def _read_row(connection: Connection, owner: str, dataset: str) -> Row[Any] | No
 
 #: Rows for a page. Those of earlier versions have no summary, and it is made from their preview.
 _PAGE = select(
-    *(datasets.c[name] for name in ("owner", "id", "name", "suffix", "blob", "bytes", "created", "summary")),
+    *(column for column in datasets.c if column.name not in ("preview", "deleted")),
     case((datasets.c.summary.is_(None), datasets.c.preview)).label("preview"),
 )
 
@@ -283,4 +289,6 @@ def _read_summary(row: Any) -> dict[str, Any]:
 def _make_dataset(row: Any, preview: Mapping[str, Any] | None = None) -> StoredDataset:
     if preview is None:
         preview = json.loads(row.preview)
-    return StoredDataset(row.owner, row.id, row.name, row.suffix, row.blob, row.bytes, preview, row.created)
+    return StoredDataset(
+        *(row.owner, row.id, row.name, row.suffix, row.blob, row.bytes, preview, row.created, row.source)
+    )

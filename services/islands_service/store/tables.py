@@ -133,6 +133,8 @@ datasets = Table(
     Column("created", Float, nullable=False),
     # The preview without its columns, for lists.
     Column("summary", Text),
+    # URL of the download, without its query; null for an upload.
+    Column("source", Text),
     # Time of the deletion by the owner. The row is kept while a job names the data set.
     Column("deleted", Float),
 )

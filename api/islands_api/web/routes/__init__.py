@@ -22,6 +22,7 @@ from islands_api.web.routes import (
 #: All routers of the application.
 ROUTERS: tuple[APIRouter, ...] = (
     datasets.router,
+    datasets.fetching,
     jobs.router,
     diagnoses.router,
     events.router,

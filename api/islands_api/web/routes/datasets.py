@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping
 from dataclasses import fields
-from pathlib import Path
 from typing import Annotated, Any
 
 import fastapi
@@ -12,19 +11,23 @@ from pydantic import FiniteFloat
 
 from islands.errors import SettingsError
 from islands.io.records.reading_options import ReadingOptions
-from islands_api.dataset_schemas import DatasetPage, DatasetView
-from islands_api.web.auth import Principal, Reader, Writer
+from islands_api.dataset_schemas import DatasetPage, DatasetView, FetchRequest
+from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
-from islands_api.web.requests import Cursor, FormRoute, Limit, decode_cursor, encode_cursor
+from islands_api.web.requests import Cursor, FormRoute, JSONRoute, Limit, decode_cursor, encode_cursor
 from islands_api.web.responses import JSONDocument, dataset_document, dataset_summary
-from islands_api.web.uploads.uploaded_file import parse_file_name, receive
+from islands_api.web.uploads.dataset_storage import store_dataset
+from islands_api.web.uploads.remote_file import check_source, fetch, find_file_name
+from islands_api.web.uploads.uploaded_file import parse_file_name
 from islands_service.domain.job_spec import Name
-from islands_service.intake.file_inspection import InspectionRequest, inspect_file
-from islands_service.intake.job_inputs import link_blob
+from islands_service.intake.file_inspection import InspectionRequest
 from islands_service.store.datasets import StoredDataset
 
 router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES, route_class=FormRoute)
+
+#: The same path for requests in JSON.
+fetching = APIRouter(prefix=router.prefix, tags=["data sets"], responses=RESPONSES, route_class=JSONRoute)
 
 _LOCATION_HEADER = {"Location": {"description": "Path of the data set.", "schema": {"type": "string"}}}
 _UPLOAD_RESPONSES: dict[int | str, dict[str, Any]] = {
@@ -72,15 +75,28 @@ async def upload(
     the same data set: the status is then 200 instead of 201.
     """
     name, compressed = parse_file_name(file.filename)
-    stored, new = await _store_upload(
-        state,
-        caller,
-        file,
-        name,
-        compressed,
-        InspectionRequest(tuple(inputs), output, dt, reading=_parse_reading(reading)),
-    )
-    state.metrics.received.inc(stored.bytes if new else 0)
+    request = InspectionRequest(tuple(inputs), output, dt, reading=_parse_reading(reading))
+    stored, new = await store_dataset(state, caller, file.file, name, compressed, request)
+    return _make_response(state, stored, new)
+
+
+@fetching.post("/fetch", status_code=201, response_model=DatasetView, responses=_UPLOAD_RESPONSES)
+async def fetch_dataset(asked: FetchRequest, caller: Writer, state: AppStateDep) -> Any:
+    """Let the service download a record from a host or bucket that its operator has listed.
+
+    The file is checked, stored and counted like an upload. The URL without its query is the `source` of the
+    data set. Without a listed host or bucket, every URL is refused.
+    """
+    source = check_source(asked.url, state.settings)
+    name, compressed = parse_file_name(asked.name or find_file_name(source))
+    reading = _check_reading(asked.reading)
+    request = InspectionRequest(tuple(asked.inputs), asked.output, asked.dt, reading=reading)
+    async with fetch(state, caller, asked.url) as file:
+        stored, new = await store_dataset(state, caller, file, name, compressed, request, source)
+    return _make_response(state, stored, new)
+
+
+def _make_response(state: AppState, stored: StoredDataset, new: bool) -> JSONDocument:
     headers = {"Location": f"{state.settings.root_path}{router.prefix}/{stored.id}"}
     return JSONDocument(dataset_document(stored), 201 if new else 200, headers)
 
@@ -97,6 +113,16 @@ def _parse_reading(text: str) -> Mapping[str, Any]:
         given = json.loads(text)
     except (ValueError, RecursionError):
         given = None
+    return _check_reading(given)
+
+
+def _check_reading(given: Any) -> Mapping[str, Any]:
+    """Return the options of reading that are not at their defaults.
+
+    Raises
+    ------
+    SettingsError
+    """
     if not isinstance(given, dict) or not all(_is_option(name, value) for name, value in given.items()):
         raise SettingsError(
             'reading is a JSON object of options, for example {"names": ["t", "u", "y"], "gaps": "split"}'
@@ -115,42 +141,6 @@ def _is_option(name: str, value: Any) -> bool:
             return isinstance(value, int | float) and not isinstance(value, bool)
         case _:
             return isinstance(value, str) and name in {option.name for option in fields(ReadingOptions)}
-
-
-async def _store_upload(
-    state: AppState,
-    caller: Principal,
-    file: UploadFile,
-    name: str,
-    compressed: bool,
-    inspection: InspectionRequest,
-) -> tuple[StoredDataset, bool]:
-    settings, owner, by = state.settings, caller.owner, caller.requester
-    with state.blobs.receiving() as stream:
-        # Limit the number of uploads in progress: a small file may decompress to a thousand times its size.
-        async with state.inspection_slots.hold(owner):
-            size, blob = await state.run_blocking(
-                receive, file.file, stream, name, compressed, settings.max_unpacked
-            )
-            with link_blob(Path(stream.name), name) as path:
-                preview = await inspect_file(
-                    path, inspection, settings.inspection_memory, settings.inspection_seconds
-                )
-            suffix = Path(name).suffix.lower()
-            await state.run_blocking(
-                state.store.datasets.check_room,
-                owner,
-                suffix,
-                blob,
-                size,
-                settings.max_stored,
-                preview["reading"],
-            )
-            # An upload that was rejected before this line is deleted at the end of the block.
-            await state.run_blocking(state.blobs.keep, stream)
-    return await state.run_blocking(
-        state.store.datasets.add, owner, name, suffix, blob, size, preview, settings.max_stored, by
-    )
 
 
 @router.get("", response_model=DatasetPage)

@@ -19,7 +19,7 @@ from islands_service.store.backends.object_store import (
     ObjectStoreError,
     ObjectStoreRefusedError,
 )
-from islands_service.store.blobs import PART, BlobNotFoundError, Blobs, hash_file, translate_disk_full
+from islands_service.store.blobs import PART, BlobNotFoundError, Blobs, hash_file, translate_folder_errors
 
 log = structlog.get_logger()
 
@@ -78,7 +78,7 @@ class CachedBlobs(Blobs):
         """
         held = self._folder / f"{uuid4().hex}{PART}"
         try:
-            with translate_disk_full():
+            with translate_folder_errors():
                 self._fetch(blob, held)
             yield held
         finally:
@@ -102,7 +102,7 @@ class CachedBlobs(Blobs):
         ObjectStoreError, StorageFullError
         """
         began = monotonic()
-        with translate_disk_full():
+        with translate_folder_errors():
             stream.flush()
             blob = hash_file(Path(stream.name))
             self._objects.put(_key(blob), Path(stream.name))

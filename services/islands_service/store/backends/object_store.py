@@ -5,13 +5,14 @@ Endpoint and credentials are those of the standard environment variables and fil
 """
 
 import os
+import shutil
 from collections.abc import Callable, Iterator
 from datetime import datetime
 from errno import EDQUOT, ENOSPC
 from importlib import import_module
 from pathlib import Path
 from time import monotonic, sleep
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 from islands.errors import IslandsError, SettingsError
 from islands_service.store.database import StoreUnavailableError
@@ -133,6 +134,28 @@ class ObjectStore:
             The disk is full.
         """
         self._call("get", lambda: self._files.get_file(self._at(key), os.fspath(path)))
+
+    def copy(self, key: str, target: IO[bytes], most: int) -> bool:
+        """Write an object to an open file, unless it has more than ``most`` bytes; return whether it was.
+
+        Raises
+        ------
+        ObjectNotFoundError, ObjectStoreError
+        OSError
+            The disk is full.
+        """
+
+        def read() -> bool:
+            target.seek(0)
+            target.truncate()
+            # The size is that at the opening, and the parts are of the version that was opened.
+            with self._files.open(self._at(key), "rb", block_size=_PART_BYTES) as source:
+                fits = source.size <= most
+                if fits:
+                    shutil.copyfileobj(source, target, 1 << 20)
+            return bool(fits)
+
+        return self._call("copy", read)
 
     def move(self, key: str, to: str) -> None:
         """Rename an object.

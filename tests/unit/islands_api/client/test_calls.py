@@ -13,7 +13,7 @@ import pytest
 import islands_api
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.settings import Settings
-from islands_api.client import AsyncClient, Client, ServiceError, calls, diagnosis_calls
+from islands_api.client import AsyncClient, Client, ServiceError, calls, dataset_calls, diagnosis_calls
 from islands_api.client.calls import RequestSpec
 from islands_api.dataset_schemas import DatasetView
 from islands_api.schemas import JobPage, JobRequest, JobView
@@ -71,12 +71,12 @@ def test_upload_with_columns_is_checked_like_a_job(client: Any, me: Any, tmp_pat
 
 def test_upload_sends_all_given_values() -> None:
     for inputs in ("u_V", ["u_V"], ("u_V",)):  # a single name is one input, not one input per letter
-        assert calls.upload("r.csv", inputs, "y_um", 0.0).data == {
+        assert dataset_calls.upload("r.csv", inputs, "y_um", 0.0).data == {
             "inputs": ["u_V"],
             "output": "y_um",
             "dt": 0.0,
         }
-    assert calls.upload("r.csv").data == {}
+    assert dataset_calls.upload("r.csv").data == {}
 
 
 @pytest.mark.parametrize("path", ["nowhere.csv", "."])
@@ -367,5 +367,6 @@ def test_calls_declare_whether_they_are_repeatable() -> None:
     ]
     assert [call.repeatable for call in made] == [True, False, False, False]
     assert all(
-        call.repeatable for call in (calls.job("0"), calls.submit("0", ["u"], "y"), calls.upload("r.csv"))
+        call.repeatable
+        for call in (calls.job("0"), calls.submit("0", ["u"], "y"), dataset_calls.upload("r.csv"))
     )

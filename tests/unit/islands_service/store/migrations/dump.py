@@ -24,7 +24,8 @@ def fill(store: Store) -> None:
     """Add rows to every table, and a job in every state."""
     store.keys.create("revoked", frozenset({"read", "write"}), ALICE, seconds=3600.0)
     store.keys.revoke(store.keys.all()[0].id)
-    store.datasets.add(ALICE, "Bühne.csv", ".csv", BLOB, 12, {"columns": [{"name": "u", "unit": "µm"}]})
+    preview = {"columns": [{"name": "u", "unit": "µm"}]}
+    store.datasets.add(ALICE, "Bühne.csv", ".csv", BLOB, 12, preview, source="https://example.org/a.csv")
     store.webhooks.create(ALICE, "https://hooks.example.org/a", ("job.succeeded",), 1)
     for outcome, owner in ((FOUND, ALICE), (FAILED, BOB)):
         submitted(store, owner, name="it's done; really", idempotency_key="k")

@@ -1,0 +1,65 @@
+"""Inspection and storage of a received file as a data set."""
+
+from pathlib import Path
+from typing import IO
+
+from islands_api.web.auth import Principal
+from islands_api.web.dependencies import AppState
+from islands_api.web.uploads.uploaded_file import receive
+from islands_service.intake.file_inspection import InspectionRequest, inspect_file
+from islands_service.intake.job_inputs import link_blob
+from islands_service.store.datasets import StoredDataset
+
+
+async def store_dataset(
+    state: AppState,
+    caller: Principal,
+    file: IO[bytes],
+    name: str,
+    compressed: bool,
+    inspection: InspectionRequest,
+    source: str | None = None,
+) -> tuple[StoredDataset, bool]:
+    """Inspect a file, and store it as a data set of its owner; return it, and whether it is new.
+
+    Parameters
+    ----------
+    file : file object
+        The bytes as they were received.
+    name, compressed
+        File name and whether the bytes are compressed: see `parse_file_name`.
+    source : str, optional
+        URL that is stored as the origin.
+
+    Raises
+    ------
+    RecordError, QuotaError, PayloadTooLargeError, StorageFullError, ObjectStoreError
+    """
+    settings, owner, by = state.settings, caller.owner, caller.requester
+    with state.blobs.receiving() as stream:
+        # Limit the number of uploads in progress: a small file may decompress to a thousand times its size.
+        async with state.inspection_slots.hold(owner):
+            size, blob = await state.run_blocking(
+                receive, file, stream, name, compressed, settings.max_unpacked
+            )
+            with link_blob(Path(stream.name), name) as path:
+                preview = await inspect_file(
+                    path, inspection, settings.inspection_memory, settings.inspection_seconds
+                )
+            suffix = Path(name).suffix.lower()
+            await state.run_blocking(
+                state.store.datasets.check_room,
+                owner,
+                suffix,
+                blob,
+                size,
+                settings.max_stored,
+                preview["reading"],
+            )
+            # An upload that was rejected before this line is deleted at the end of the block.
+            await state.run_blocking(state.blobs.keep, stream)
+    stored, new = await state.run_blocking(
+        state.store.datasets.add, owner, name, suffix, blob, size, preview, settings.max_stored, by, source
+    )
+    state.metrics.received.inc(stored.bytes if new else 0)
+    return stored, new
