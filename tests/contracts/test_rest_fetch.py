@@ -93,7 +93,7 @@ def service(serve: Any, authority: trustme.CA) -> Iterator[Service]:
         tls = ssl.create_default_context()
         authority.configure_trust(tls)
 
-        async def resolve(_host: str, _port: int) -> tuple[str, ...]:
+        async def resolve(_host: str, _port: int, _threads: object) -> tuple[str, ...]:
             return ("127.0.0.1",)
 
         patch.setattr(checked_client, "resolve", resolve)

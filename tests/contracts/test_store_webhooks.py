@@ -17,10 +17,12 @@ from support.stores import (
     LONG,
     at_once,
     claimed,
+    contents,
     expire_webhooks,
     job_in,
     open_stores,
     submitted,
+    turn_clock,
 )
 
 ALL = ("job.succeeded", "job.failed", "job.cancelled")
@@ -123,8 +125,9 @@ def test_a_delivery_that_was_interrupted_is_repeated_with_its_id(store):
     assert (second.id, second.body) == (first.id, first.body)
     assert (first.attempt, second.attempt) == (1, 2)
     # The first process was only slow: its outcome is ignored, and the lease of the second one stays.
+    before = contents(store)
     store.deliveries.record(first, 500, "failed")
-    assert store.deliveries.claim(LONG, 10) == ()
+    assert contents(store) == before
     store.deliveries.record(second, 200, None)
     (delivery,) = store.webhooks.deliveries(ALICE, store.webhooks.all(ALICE)[0].id)
     assert (delivery.state, delivery.status, delivery.error, delivery.attempts) == ("delivered", 200, None, 2)
@@ -174,6 +177,29 @@ def test_a_failed_attempt_is_repeated_at_growing_intervals_over_hours(store):
     assert intervals == pytest.approx([retry_delay(number) for number in range(1, MAX_ATTEMPTS)], abs=0.5)
     assert intervals[0] < 10.0
     assert 12 * 3600 < sum(intervals) < 24 * 3600
+
+
+def test_deliveries_are_sent_after_the_clock_has_gone_back(store):
+    """Their times, and the lease of a process that has ended, would last for an hour more."""
+    created(store)
+    created(store, BOB)
+    job_in(store, JobState.FAILED)
+    job_in(store, JobState.FAILED, BOB)
+    failed, interrupted = store.deliveries.claim(60.0, 10)
+    store.deliveries.record(failed, 500, "away")
+    assert store.deliveries.claim(60.0, 10) == ()
+    turn_clock(store, -3600.0)
+    found = store.deliveries.claim(60.0, 10)
+    assert {(each.id, each.attempt) for each in found} == {(failed.id, 2), (interrupted.id, 2)}
+    assert store.deliveries.claim(60.0, 10) == ()
+
+
+def test_the_representation_of_a_delivery_hides_the_secret(store):
+    _, secret = store.webhooks.create(ALICE, URL, ALL, 1)
+    job_in(store, JobState.FAILED)
+    (due,) = store.deliveries.claim(LONG, 10)
+    assert due.secret == secret
+    assert secret not in repr(due)
 
 
 def test_deliveries_are_counted_while_they_are_pending(store):

@@ -119,6 +119,8 @@ def turn_clock(store: Store, seconds: float) -> None:
         "jobs": ("created", "updated", "started", "finished", "lease_until", "not_before"),
         "events": ("at",),
         "retired_keys": ("finished",),
+        "webhooks": ("created", "busy_until"),
+        "deliveries": ("created", "next_at", "attempted", "delivered"),
     }
 
     def operation(connection: Connection) -> None:

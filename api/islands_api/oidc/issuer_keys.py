@@ -133,7 +133,7 @@ def _import_keys(documents: Any) -> dict[str, Any]:
     ValueError
         There is no usable key.
     """
-    keys = {}
+    keys: dict[str, Any] = {}
     for document in documents if isinstance(documents, list) else ():
         if (
             not isinstance(document, dict)
@@ -143,13 +143,12 @@ def _import_keys(documents: Any) -> dict[str, Any]:
         ):
             continue
         try:
-            key: Any = JWKRegistry.import_key(document)
-            if document["kty"] == "RSA" and key.public_key.key_size < _MIN_RSA_BITS:
+            # A character has six bits.
+            if document["kty"] == "RSA" and 6 * len(document["n"]) < _MIN_RSA_BITS:
                 raise ValueError(f"it has less than {_MIN_RSA_BITS} bits")
+            keys[document["kid"]] = JWKRegistry.import_key(document)
         except (JoseError, ValueError, TypeError, KeyError) as error:
             log.warning("key of the issuer skipped", key=document["kid"], reason=str(error))
-            continue
-        keys[document["kid"]] = key
     if not keys:
         raise ValueError("its key set has no public key for signatures with an id")
     return keys

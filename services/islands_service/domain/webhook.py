@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
@@ -91,7 +91,7 @@ class DueDelivery:
     id: str
     webhook: str
     url: str
-    secret: str
+    secret: str = field(repr=False)
     body: str
     attempt: int
     leased_until: float

@@ -2,6 +2,8 @@
 
 import asyncio
 import socket
+from concurrent.futures import Executor
+from functools import partial
 from ipaddress import IPv4Address, IPv6Address, IPv6Network, ip_address
 
 from islands.errors import IslandsError, SettingsError
@@ -36,8 +38,13 @@ def is_public(address: str) -> bool:
     return found.is_global and not (found.is_multicast or found.is_reserved)
 
 
-async def resolve(host: str, port: int) -> tuple[str, ...]:
+async def resolve(host: str, port: int, threads: Executor | None = None) -> tuple[str, ...]:
     """Return the addresses of a host in the order of the resolver.
+
+    Parameters
+    ----------
+    threads : Executor, optional
+        Threads that wait for the name server; by default those of the event loop, which are few.
 
     Raises
     ------
@@ -45,7 +52,9 @@ async def resolve(host: str, port: int) -> tuple[str, ...]:
         The name has no address, or no name server answers.
     """
     try:
-        found = await asyncio.get_running_loop().getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        found = await asyncio.get_running_loop().run_in_executor(
+            threads, partial(socket.getaddrinfo, host, port, type=socket.SOCK_STREAM)
+        )
     except (OSError, UnicodeError) as error:
         raise OutboundFailedError(f"the name {host} cannot be resolved: {error}") from error
     return tuple(dict.fromkeys(str(address[0]) for *_, address in found))

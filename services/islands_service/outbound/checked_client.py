@@ -10,6 +10,7 @@ kept.
 import asyncio
 import ssl
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from functools import cache
 
@@ -26,6 +27,9 @@ from islands_service.settings.setting_checks import split_list
 
 #: Largest number of characters of a URL.
 MAX_URL = 2000
+
+#: Maximum number of names that a client resolves at once.
+MAX_RESOLUTIONS = 200
 
 _LAST_PORT = 65_535
 
@@ -55,6 +59,8 @@ class CheckedClient:
         tls: ssl.SSLContext | None = None,
     ) -> None:
         self._private, self._http, self._tls = frozenset(private_hosts), frozenset(http_hosts), tls
+        # A name server that does not answer occupies a thread for half a minute, also after the time limit.
+        self._resolvers = ThreadPoolExecutor(MAX_RESOLUTIONS, "resolver")
 
     def check_url(self, url: str) -> httpx.URL:
         """Parse a URL; refuse one that requests are never sent to. Its host is not resolved.
@@ -141,7 +147,7 @@ class CheckedClient:
         OutboundRefusedError
             One of them is not public.
         """
-        found = await resolve(url.raw_host.decode("ascii"), _get_port(url))
+        found = await resolve(url.raw_host.decode("ascii"), _get_port(url), self._resolvers)
         if not is_listed(url, self._private) and not all(map(is_public, found)):
             # The address is not named: it would tell a client about the internal network.
             raise OutboundRefusedError(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import Connection, Row, delete, exists, func, insert, select, update
+from sqlalchemy import Connection, Row, and_, delete, exists, func, insert, or_, select, update
 
 from islands_service.domain.webhook import EVENTS, Delivery, DueDelivery, make_body, retry_delay
 from islands_service.store.backends.dialect import now
@@ -20,12 +20,20 @@ from islands_service.store.tables import deliveries, webhooks
 #: Largest number of characters of an error that is kept.
 _MAX_ERROR = 500
 
-#: Whether a webhook has a delivery to send now.
-_HAS_DUE = exists(
-    select(deliveries.c.id).where(deliveries.c.webhook_id == webhooks.c.id, deliveries.c.next_at <= now())
+#: Whether a delivery is to be sent now. If the clock of the database has gone back by more than a second
+#: since the last attempt, the time of the next one may lie far in the future.
+_IS_DUE = or_(
+    deliveries.c.next_at <= now(),
+    and_(
+        deliveries.c.next_at.is_not(None),
+        func.coalesce(deliveries.c.attempted, deliveries.c.created) > now() + 1.0,
+    ),
 )
 
-_DUE_WEBHOOKS = select(webhooks).where(webhooks.c.busy_until <= now(), _HAS_DUE)
+#: Webhooks with a delivery to send now.
+_DUE_WEBHOOKS = select(webhooks).where(
+    exists(select(deliveries.c.id).where(deliveries.c.webhook_id == webhooks.c.id, _IS_DUE))
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,13 +89,17 @@ class Deliveries:
         most : int
             Largest number of deliveries.
         """
+        # A lease that lasts for longer was given before the clock of the database went back.
+        free = _DUE_WEBHOOKS.where(
+            or_(webhooks.c.busy_until <= now(), webhooks.c.busy_until > now() + seconds + 1.0)
+        )
         with self._database.read() as connection:
-            if connection.execute(_DUE_WEBHOOKS.limit(1)).one_or_none() is None:
+            if connection.execute(free.limit(1)).one_or_none() is None:
                 return ()
 
         def operation(connection: Connection) -> tuple[DueDelivery, ...]:
-            free = _DUE_WEBHOOKS.order_by(webhooks.c.busy_until, webhooks.c.id).limit(most)
-            rows = connection.execute(free.with_for_update(skip_locked=True)).all()
+            ordered = free.order_by(webhooks.c.busy_until, webhooks.c.id).limit(most)
+            rows = connection.execute(ordered.with_for_update(skip_locked=True)).all()
             return tuple(_lease_webhook(connection, row, seconds) for row in rows)
 
         return self._database.write(operation)
@@ -160,7 +172,7 @@ def _lease_webhook(connection: Connection, webhook: Row[Any], seconds: float) ->
     """Lease a webhook, and begin an attempt at its oldest due delivery."""
     first = (
         select(deliveries.c.id)
-        .where(deliveries.c.webhook_id == webhook.id, deliveries.c.next_at <= now())
+        .where(deliveries.c.webhook_id == webhook.id, _IS_DUE)
         .order_by(deliveries.c.next_at, deliveries.c.id)
         .limit(1)
     )

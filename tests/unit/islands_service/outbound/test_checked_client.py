@@ -1,7 +1,9 @@
 """Requests to named hosts: URLs, addresses, certificates, redirects and time limits."""
 
 import asyncio
+import socket
 import ssl
+import threading
 
 import pytest
 import trustme
@@ -57,7 +59,7 @@ def names(monkeypatch):
     """Addresses by name, which replace the resolver; the names that were resolved."""
     known, asked = {}, []
 
-    async def answer(host, _port):
+    async def answer(host, *_):
         asked.append(host)
         return known[host]
 
@@ -126,6 +128,29 @@ def test_the_name_is_resolved_once_and_the_next_address_is_tried(names):
     response, *_ = exchange(CheckedClient(("hooks.lan",), ("hooks.lan",)), OK, "http://hooks.lan:{port}/")
     assert response.status_code == 200
     assert asked == ["hooks.lan"]
+
+
+def test_names_that_are_not_resolved_delay_no_other_request(monkeypatch):
+    """The threads of an event loop are six on two cores."""
+    released = threading.Event()
+
+    def resolve(host, *arguments, **named):
+        if host == "slow.example.org":
+            released.wait(30.0)
+        return getaddrinfo("127.0.0.1", *arguments, **named)
+
+    getaddrinfo = socket.getaddrinfo
+    monkeypatch.setattr(socket, "getaddrinfo", resolve)
+
+    async def run():
+        slow = [asyncio.create_task(LOCAL.check_host("https://slow.example.org/", 30.0)) for _ in range(50)]
+        await asyncio.sleep(0)
+        await LOCAL.check_host("https://127.0.0.1/", 5.0)
+        assert not any(task.done() for task in slow)
+        released.set()
+        await asyncio.gather(*slow, return_exceptions=True)
+
+    asyncio.run(run())
 
 
 def test_a_redirect_is_not_followed():
