@@ -11,7 +11,7 @@ from islands.evolution.gp.individual import Individual
 from islands.evolution.migration.schedule import Schedule
 from islands.evolution.migration.topology import parse_topology
 from islands.evolution.problem import Problem
-from islands_service.runtime.epoch_scheduler import MAX_EPOCHS_AHEAD, EpochScheduler, EpochTask
+from islands_service.runtime.epoch_scheduler import MAX_EPOCHS_AHEAD, EpochTask, schedule_islands
 from support.searches import SMALL, record
 from support.strategies import layouts, schedule_text, schedules
 
@@ -38,7 +38,7 @@ def posed(text="ring", islands=3, pieces=((0, 4),), generations=10):
 
 def make_scheduler(ahead=MAX_EPOCHS_AHEAD, **changes):
     made = posed(**changes)
-    return EpochScheduler(made, empty_archipelago(made.settings.islands, SEED), keep_epoch, ahead)
+    return schedule_islands(made, empty_archipelago(made.settings.islands, SEED), keep_epoch, ahead)
 
 
 @st.composite
@@ -91,7 +91,7 @@ class PlayedRun:
 
     def __init__(self, problem_, ends, ahead, start=None):
         self.ends, self.ahead = ends, ahead
-        self.scheduler = EpochScheduler(
+        self.scheduler = schedule_islands(
             problem_, start or empty_archipelago(problem_.settings.islands, SEED), keep_epoch, ahead
         )
         self.sources = parse_topology(problem_.settings.topology, problem_.settings.islands, SEED).sources

@@ -68,6 +68,8 @@ class IslandActorPool:
     observe : callable, optional
         Receives the number of islands with and without a separate CPU, when an actor is
         ready or lost, and zeros at the end.
+    share : float
+        Fraction of the CPUs of the cluster that the pool uses.
     """
 
     def __init__(
@@ -78,9 +80,10 @@ class IslandActorPool:
         title: str = "",
         autoscaling: bool = False,
         observe: Callable[[int, int], None] = lambda *_: None,
+        share: float = 1.0,
     ) -> None:
         self._observe = observe
-        self._problem, self._autoscaling = _put(problem), autoscaling
+        self._problem, self._autoscaling, self._share = put_problem(problem), autoscaling, share
         self._islands, self._report, self._title, self._actor_count = islands, progress, title, 0
         self._size = 0
         # By slot: the actor, and a reference that resolves when the actor is prepared (joining) or dies
@@ -152,7 +155,11 @@ class IslandActorPool:
     def _update_members(self, now: float) -> None:
         if now - self._measured_at > _RESIZE_SECONDS:
             self._measured_at = now
-            cpus = self._islands if self._autoscaling else int(ray.cluster_resources().get("CPU", 0))
+            cpus = (
+                self._islands
+                if self._autoscaling
+                else int(self._share * ray.cluster_resources().get("CPU", 0))
+            )
             self._size = max(self._size, min(self._islands, max(1, cpus)))
         for slot in _find_ended(self._members):
             self._handle_loss(slot, self._members.pop(slot)[0])
@@ -220,7 +227,7 @@ class IslandActorPool:
                 self._report(line)
 
 
-def _put(problem: Problem) -> "ray.ObjectRef[Problem]":
+def put_problem(problem: Problem) -> "ray.ObjectRef[Problem]":
     """Put a problem into the object store, with the code of the user's functions.
 
     By default Ray sends the name of a function, and a worker may be unable to import its module.

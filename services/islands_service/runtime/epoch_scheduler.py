@@ -4,7 +4,7 @@ An island waits only for the previous epochs of the islands that it receives fro
 scheduler handles generations and values, and is independent of actors and Ray.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -12,6 +12,7 @@ from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import make_topology
 from islands.evolution.epoch import IslandEpoch, next_stop, select_migrants
 from islands.evolution.problem import Problem
+from islands.evolution.settings import Settings
 
 #: Data that is kept of an island's epoch.
 T = TypeVar("T")
@@ -30,53 +31,74 @@ class EpochTask:
 
 
 class EpochScheduler(Generic[T]):
-    """Tracks the submitted and the completed epochs of a search.
+    """Tracks the submitted and the completed epochs of some islands of a search.
 
     A submitted task may depend on epochs that are not complete yet: Ray passes their values on when they are.
+    Only emigrants of islands that are scheduled elsewhere must have arrived before.
 
     Parameters
     ----------
-    problem : Problem
-    start : Archipelago
-    keep : callable
-        Returns the data to keep of an epoch; also applied to the start.
+    settings : Settings
+    sources : sequence of sequences of int
+        For every island of the search, the islands that it receives from.
+    generation : int
+        Generation of the start.
+    start : mapping
+        Kept data of the islands to schedule, by their index in ascending order.
     ahead : int
-        Epochs that an island may be ahead of the last complete archipelago.
+        Epochs that an island may be ahead of the last complete epoch of all these islands.
     """
 
     def __init__(
         self,
-        problem: Problem,
-        start: Archipelago,
-        keep: Callable[[IslandEpoch], T],
+        settings: Settings,
+        sources: Sequence[Sequence[int]],
+        generation: int,
+        start: Mapping[int, T],
         ahead: int = MAX_EPOCHS_AHEAD,
     ) -> None:
-        self._settings, self._ahead = problem.settings, ahead
-        self.sources = make_topology(problem, start).sources
-        self.completed_generation = start.generation
-        self._sent = [start.generation] * len(start.islands)
-        #: Kept data of each island by generation, from the last complete archipelago on.
-        self.known: list[dict[int, T]] = []
-        for island in start.islands:
-            leaving = select_migrants(island, problem.settings_of(island.index))
-            self.known.append({start.generation: keep(IslandEpoch(island, leaving, ()))})
+        self._settings, self._ahead = settings, ahead
+        self.sources = sources
+        self.completed_generation = generation
+        self._sent = dict.fromkeys(start, generation)
+        #: Kept data of each island by generation, from the last complete epoch on.
+        self.known: dict[int, dict[int, T]] = {island: {generation: kept} for island, kept in start.items()}
+        self._all_here = all(source in start for island in start for source in sources[island])
+        self._received: set[tuple[int, int]] = set()
 
     @property
     def finished(self) -> bool:
-        """Whether the archipelago of the last generation is complete."""
+        """Whether all islands have reached the last generation."""
         return self.completed_generation >= self._settings.generations
+
+    def knows(self, island: int, generation: int) -> bool:
+        """Return whether the data of an island at a generation are known."""
+        return generation in self.known.get(island, ()) or (island, generation) in self._received
+
+    def receive(self, island: int, generation: int) -> None:
+        """Note that the emigrants of an island that is scheduled elsewhere have arrived."""
+        self._received.add((island, generation))
 
     def ready_tasks(self) -> Iterator[EpochTask]:
         """Yield the tasks that may be submitted, earlier epochs first, and mark each as submitted."""
         begin, end = self.completed_generation, self._next_stop(self.completed_generation)
         for _ in range(self._ahead):
-            for island, sent in enumerate(self._sent):
-                if sent == begin:
+            for island, sent in self._sent.items():
+                if sent == begin and (self._all_here or self._can_depend(island, begin)):
                     self._sent[island] = end
                     yield EpochTask(island, begin, end)
             if end >= self._settings.generations:
                 return
             begin, end = end, self._next_stop(end)
+
+    def _can_depend(self, island: int, generation: int) -> bool:
+        """Return whether the epochs before a task are submitted, or have arrived from elsewhere."""
+        return all(
+            self._sent[source] >= generation
+            if source in self._sent
+            else (source, generation) in self._received
+            for source in self.sources[island]
+        )
 
     def reschedule(self, task: EpochTask) -> None:
         """Mark a lost task, and the later tasks of its island, as not submitted."""
@@ -91,12 +113,31 @@ class EpochScheduler(Generic[T]):
         """Yield the results of all islands for each epoch that is now complete, in order."""
         while not self.finished:
             end = self._next_stop(self.completed_generation)
-            if not all(end in known for known in self.known):
+            if not all(end in known for known in self.known.values()):
                 return
-            for known in self.known:
+            for known in self.known.values():
                 del known[self.completed_generation]
             self.completed_generation = end
-            yield tuple(known[end] for known in self.known)
+            self._received = {key for key in self._received if key[1] >= end}
+            yield tuple(known[end] for known in self.known.values())
 
     def _next_stop(self, generation: int) -> int:
         return next_stop(generation, self._settings)
+
+
+def schedule_islands(
+    problem: Problem, start: Archipelago, keep: Callable[[IslandEpoch], T], ahead: int = MAX_EPOCHS_AHEAD
+) -> EpochScheduler[T]:
+    """Return a scheduler of all islands of a search.
+
+    Parameters
+    ----------
+    keep : callable
+        Returns the data to keep of an epoch; also applied to the start.
+    """
+    kept = {}
+    for island in start.islands:
+        leaving = select_migrants(island, problem.settings_of(island.index))
+        kept[island.index] = keep(IslandEpoch(island, leaving, ()))
+    sources = make_topology(problem, start).sources
+    return EpochScheduler(problem.settings, sources, start.generation, kept, ahead)

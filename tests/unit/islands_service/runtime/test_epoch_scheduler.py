@@ -102,7 +102,7 @@ def test_epochs_before_the_last_complete_archipelago_are_dropped(search, choose)
         task = choose.choice(run.ready())
         run.carry(task)
         run.report(task)
-        known = [sorted(each) for each in run.scheduler.known]
+        known = [sorted(each) for each in run.scheduler.known.values()]
         assert {each[0] for each in known} == {run.scheduler.completed_generation}
         assert all(len(each) <= ahead + 1 for each in known)
 
@@ -144,7 +144,7 @@ def test_islands_independent_of_the_slowest_are_not_delayed(search, choose, data
         run.carry(task)
         run.report(task)
     complete, away = ends.index(run.scheduler.completed_generation), distances(run.sources, slowest)
-    for island, known in enumerate(run.scheduler.known):
+    for island, known in run.scheduler.known.items():
         reachable = from_there + away.get(island, len(ends))
         assert ends.index(max(known)) == min(reachable, complete + ahead, len(ends) - 1)
 

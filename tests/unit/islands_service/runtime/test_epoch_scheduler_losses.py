@@ -11,7 +11,7 @@ from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.gp.individual import Individual
 from islands.evolution.problem import make_problem
-from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
+from islands_service.runtime.epoch_scheduler import EpochTask, schedule_islands
 
 #: The record is not used, since numbers replace islands.
 from support.epoch_runs import (
@@ -78,7 +78,7 @@ def test_loss_of_a_complete_task_reschedules_the_later_ones():
 
 def test_second_result_of_a_complete_task_is_ignored():
     scheduler, second = completed_twice()
-    before = [dict(known) for known in scheduler.known]
+    before = {island: dict(known) for island, known in scheduler.known.items()}
     scheduler.complete(second, replace(make_epoch(second), emigrants=(Individual(()),)))
     scheduler.complete(EpochTask(0, -1, 0), make_epoch(EpochTask(0, -1, 0)))
     assert scheduler.known == before
@@ -108,7 +108,7 @@ def evolving():
 def test_scheduler_begins_with_the_emigrants_of_its_start(evolving):
     for epoch in SerialEngine().run(evolving, empty_archipelago(3, SEED), lambda: False):
         start = epoch.archipelago
-        known = EpochScheduler(evolving, start, keep_epoch).known
+        known = schedule_islands(evolving, start, keep_epoch).known.values()
         for island, each in zip(start.islands, known, strict=True):
             leaving = select_migrants(island, evolving.settings_of(island.index))
             assert each == {start.generation: IslandEpoch(island, leaving, ())}
@@ -122,7 +122,7 @@ def test_islands_evolve_as_in_the_serial_engine_despite_losses(evolving, first, 
     start = empty_archipelago(3, SEED) if first is None else whole[first].archipelago
     whole = whole if first is None else whole[first + 1 :]
     scheduler, evaluator, choose = (
-        EpochScheduler(evolving, start, keep_epoch),
+        schedule_islands(evolving, start, keep_epoch),
         Evaluator(evolving.record, evolving.settings),
         random.Random(seed),
     )

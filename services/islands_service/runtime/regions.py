@@ -1,0 +1,284 @@
+"""Regions of a search of thousands of islands: a tree of coordinators with one level.
+
+One process schedules some two thousand islands at epochs of a second. With more of them, every region of a
+few hundred islands has a coordinator of its own, a `RegionActor`. The driver passes the emigrants across the
+borders of regions on, and merges the statistics. The result does not depend on the number of regions.
+"""
+
+from collections.abc import Callable, Generator, Iterator
+from importlib.metadata import version
+from itertools import pairwise
+from time import monotonic
+
+import ray
+from ray.actor import ActorHandle
+from ray.exceptions import RayError, RayTaskError
+
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.engine import ArchipelagoEpoch, Caches, make_topology
+from islands.evolution.epoch import IslandEpoch, next_stop, select_migrants
+from islands.evolution.problem import Problem
+from islands.evolution.progress import ProgressCallback
+from islands_service.runtime.actor_pool import put_problem
+from islands_service.runtime.cluster import LOSS_ERRORS
+from islands_service.runtime.epoch_scheduler import MAX_EPOCHS_AHEAD
+from islands_service.runtime.errors import ClusterError
+from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch
+from islands_service.runtime.region_actor import RegionActor, RegionReport
+from islands_service.runtime.region_islands import RegionIslands
+
+#: Islands for which one coordinator is sufficient at epochs of a second.
+REGION_SIZE = 500
+
+#: Seconds between two checks of the coordinator of a region.
+_CHECK_SECONDS = 1.0
+
+#: Seconds after which a coordinator that does not answer is replaced, and seconds that it has for its start.
+_SILENCE_SECONDS, _START_SECONDS = 15.0, 120.0
+
+#: Seconds to wait for a result between two checks of the stop function.
+_POLL_SECONDS = 0.1
+
+#: Losses of a region, without a completed epoch between them, after which the search fails.
+_MAX_LOSSES = 5
+
+_ACTOR = ray.remote(max_restarts=0, max_task_retries=0, num_cpus=0, concurrency_groups={"watch": 1})(
+    RegionActor
+)
+
+
+def count_regions(islands: int, cpus: int) -> int:
+    """Return the number of regions for a number of islands and of CPUs: what computes at once counts."""
+    return max(1, -(-min(islands, cpus) // REGION_SIZE))
+
+
+def run_regions(
+    problem: Problem,
+    start: Archipelago,
+    stop: Callable[[], bool],
+    regions: int,
+    progress: ProgressCallback,
+    title: str = "",
+    autoscaling: bool = False,
+) -> Generator[ArchipelagoEpoch]:
+    """Yield the epochs of a search in regions of consecutive islands; see `islands.evolution.engine.Engine`.
+
+    Raises
+    ------
+    ClusterError
+        Regions are lost repeatedly or cannot be started, or the islands of a region were lost with their
+        machine. The search can continue from a checkpoint.
+    """
+    if start.generation >= problem.settings.generations:
+        return
+    tree = _Tree(problem, start, regions, progress, title, autoscaling)
+    try:
+        while not (tree.finished or stop()):
+            tree.submit()
+            tree.wait()
+            for epoch in tree.completed_epochs():
+                if stop():
+                    return
+                yield epoch
+    except RayError as error:
+        raise ClusterError(f"Ray failed, and the search cannot continue: {error}") from error
+    finally:
+        tree.shutdown()
+
+
+class _Region:
+    """A region: its actor, its last islands, and its reports since the last epoch of all regions."""
+
+    def __init__(self, index: int, islands: range, generation: int, state: "ray.ObjectRef") -> None:
+        self.index, self.islands = index, islands
+        #: Last generation with a report, and the islands by generation.
+        self.generation = generation
+        self.states = {generation: state}
+        self.reports: dict[int, RegionReport] = {}
+        self.actor: ActorHandle | None = None
+        #: References to the report and to the islands of the epoch in progress.
+        self.pending: tuple[ray.ObjectRef, ray.ObjectRef] | None = None
+        #: Reference to the answer of a check, when it was asked, and the seconds that the actor has for it.
+        self.check: tuple[ray.ObjectRef, float, float] | None = None
+        self.losses = 0
+
+
+class _Tree:
+    """The regions of a search."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        start: Archipelago,
+        regions: int,
+        progress: ProgressCallback,
+        title: str,
+        autoscaling: bool,
+    ) -> None:
+        self._problem, self._settings = put_problem(problem), problem.settings
+        self._progress, self._title, self._autoscaling = progress, title, autoscaling
+        self._sources = make_topology(problem, start).sources
+        self._size, self._generation, self._actor_count = len(start.islands), start.generation, 0
+        bounds = [self._size * number // regions for number in range(regions + 1)]
+        spans = [range(first, last) for first, last in pairwise(bounds)]
+        region_of = {island: index for index, span in enumerate(spans) for island in span}
+        #: For every region, the regions that it receives from.
+        self._neighbours = [
+            sorted({region_of[source] for island in span for source in self._sources[island]} - {index})
+            for index, span in enumerate(spans)
+        ]
+        self._borders = [
+            frozenset(
+                source
+                for island in range(self._size)
+                for source in self._sources[island]
+                if source in span and island not in span
+            )
+            for span in spans
+        ]
+        self._regions = []
+        for index, span in enumerate(spans):
+            state = tuple(_pack_start(problem, start, island) for island in span)
+            region = _Region(index, span, start.generation, ray.put(state))
+            border = {each.index: each.emigrants for each in state if each.index in self._borders[index]}
+            region.reports[start.generation] = RegionReport((), border)
+            self._regions.append(region)
+        self._last: RegionIslands | None = None
+
+    @property
+    def finished(self) -> bool:
+        return self._generation >= self._settings.generations
+
+    def submit(self) -> None:
+        """Submit the next epoch of every region whose neighbours have reported the last one."""
+        for region in self._regions:
+            actor = region.actor or self._start_actor(region)
+            if region.pending is not None or region.generation >= self._settings.generations:
+                continue
+            # Reports of this region that not all others have: how far it is ahead.
+            if sum(generation > self._generation for generation in region.reports) >= MAX_EPOCHS_AHEAD:
+                continue
+            neighbours = [self._regions[index] for index in self._neighbours[region.index]]
+            if all(region.generation in each.reports for each in neighbours):
+                arriving = [each.reports[region.generation].emigrants for each in neighbours]
+                region.pending = tuple(actor.advance.remote(*arriving))
+
+    def wait(self) -> None:
+        """Wait a moment for a report, collect all that are ready, and check the actors."""
+        pending = {region.pending[0]: region for region in self._regions if region.pending is not None}
+        if pending:
+            ray.wait(list(pending), num_returns=1, timeout=_POLL_SECONDS)
+            ready, _ = ray.wait(list(pending), num_returns=len(pending), timeout=0)
+            for reference in ready:
+                self._collect(pending[reference])
+        now = monotonic()
+        for region in self._regions:
+            self._check(region, now)
+
+    def completed_epochs(self) -> Iterator[ArchipelagoEpoch]:
+        """Yield the epochs that all regions have completed, in order."""
+        while not self.finished:
+            end = next_stop(self._generation, self._settings)
+            if not all(end in region.reports for region in self._regions):
+                return
+            for region in self._regions:
+                del region.reports[self._generation], region.states[self._generation]
+                region.losses = 0
+            self._generation = end
+            reports = [region.reports[end] for region in self._regions]
+            self._last = RegionIslands(
+                [region.islands.start for region in self._regions],
+                self._size,
+                [region.states[end] for region in self._regions],
+                self._settings.primitive_table,
+            )
+            steps = tuple(steps for report in reports for steps in report.steps)
+            yield ArchipelagoEpoch(Archipelago(self._last), steps, _sum_caches(reports))
+
+    def shutdown(self) -> None:
+        """Fetch the islands of the last epoch, and kill all actors. Those of islands end with their owner."""
+        try:
+            if self._last is not None:
+                self._last.fetch()
+        finally:
+            for region in self._regions:
+                if region.actor is not None:
+                    ray.kill(region.actor)
+
+    def _start_actor(self, region: _Region) -> ActorHandle:
+        self._actor_count += 1
+        actor = _ACTOR.options(name=f"{self._title}.{self._actor_count}" if self._title else None).remote(
+            self._problem,
+            self._sources,
+            self._borders[region.index],
+            region.generation,
+            region.states[region.generation],
+            len(region.islands) / self._size,
+            self._autoscaling,
+        )
+        region.actor, region.check = actor, (actor.check.remote(), monotonic(), _START_SECONDS)
+        return actor
+
+    def _collect(self, region: _Region) -> None:
+        assert region.pending is not None
+        reference, state = region.pending
+        try:
+            report = ray.get(reference)
+        except LOSS_ERRORS:
+            self._handle_loss(region, "was lost")
+            return
+        except RayTaskError as error:
+            raise error.cause from error
+        region.generation = next_stop(region.generation, self._settings)
+        region.reports[region.generation], region.states[region.generation] = report, state
+        region.pending = None
+
+    def _check(self, region: _Region, now: float) -> None:
+        """Pass messages of a region on, and replace its actor if it does not answer."""
+        if region.check is None or now - region.check[1] < _CHECK_SECONDS:
+            return
+        reference, asked_at, limit = region.check
+        if not ray.wait([reference], timeout=0)[0]:
+            if now - asked_at > limit:
+                self._handle_loss(region, f"did not answer for {now - asked_at:.0f} s")
+            return
+        try:
+            actor_version, messages = ray.get(reference)
+        except LOSS_ERRORS:
+            self._handle_loss(region, "was lost")
+            return
+        if actor_version != version("islands"):
+            raise ClusterError(
+                f"a machine of the cluster has islands {actor_version}, this one {version('islands')}: the "
+                "result would depend on the machine that computes it; install one version on all"
+            )
+        for message in messages:
+            self._progress(message)
+        assert region.actor is not None
+        region.check = region.actor.check.remote(), now, _SILENCE_SECONDS
+
+    def _handle_loss(self, region: _Region, reason: str) -> None:
+        region.losses += 1
+        name = f"the coordinator of the islands {region.islands.start} to {region.islands.stop - 1}"
+        if region.losses > _MAX_LOSSES:
+            raise ClusterError(
+                f"{name} {reason} {region.losses} times, and no epoch was completed: is there enough memory?"
+            )
+        self._progress(f"{name} {reason}: they continue from their last epoch")
+        if region.actor is not None:
+            ray.kill(region.actor)
+        region.actor = region.pending = region.check = None
+
+
+def _pack_start(problem: Problem, start: Archipelago, island: int) -> PackedEpoch:
+    begin = start.islands[island]
+    return pack_epoch(IslandEpoch(begin, select_migrants(begin, problem.settings_of(island)), ()))
+
+
+def _sum_caches(reports: list[RegionReport]) -> Caches:
+    totals: dict[str, tuple[int, int]] = {}
+    for report in reports:
+        for name, (used, limit) in report.caches.items():
+            before = totals.get(name, (0, 0))
+            totals[name] = before[0] + used, before[1] + limit
+    return dict(sorted(totals.items()))
