@@ -71,7 +71,7 @@ def run_identification_job(
     checkpoints = JobCheckpoints(job, blobs)
     start = checkpoints.read()
     notes = notes or JobNotes(lease, store)
-    reporter = _ProgressReporter(lease, store, checkpoints, check, every, start, notes)
+    reporter = ProgressReporter(lease, store, checkpoints, check, every, start, notes)
 
     def stop() -> bool:
         check()
@@ -124,7 +124,7 @@ def make_outcome(found: SearchResult, note: str = "") -> JobOutcome:
     return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
 
 
-class _ProgressReporter:
+class ProgressReporter:
     """Progress callback that stores progress, history and checkpoints of a search."""
 
     def __init__(
@@ -157,6 +157,7 @@ class _ProgressReporter:
         return monotonic() - self._started_at
 
     def __call__(self, state: SearchState, settings: Settings) -> None:
+        """Store the state of the search if a report is due."""
         self._check()
         self._last = state, settings
         if monotonic() >= min(self._report_at, self._checkpoint_at):

@@ -1,6 +1,6 @@
 """Islands on Ray: the only package that imports it. It sets Ray's environment variables before the import.
 
-Read `ray_engine` first, then `actor_pool` and `epoch_scheduler`.
+Read `ray_engine` first, then `epochs_in_flight`, `actor_pool` and `epoch_scheduler`, and `regions` last.
 """
 
 import os
