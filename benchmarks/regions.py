@@ -48,7 +48,7 @@ from islands_service.engines import ENGINES
 from islands_service.runtime import actor_pool, regions
 from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch
 from islands_service.runtime.ray_engine import RayEngine
-from islands_service.runtime.region_actor import RegionReport
+from islands_service.runtime.region_actor import RegionReport, RegionStatus
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from support.stores import claimed, submitted
@@ -126,8 +126,8 @@ class SimulatedRegionActor:
         self._next = time.monotonic()
 
     @ray.method(concurrency_group="watch")
-    def check(self) -> tuple[str, tuple[str, ...]]:
-        return version("islands"), ()
+    def check(self) -> RegionStatus:
+        return RegionStatus(version("islands"))
 
     @ray.method(num_returns=2)
     def advance(self, *_arriving: Any) -> tuple[RegionReport, tuple[PackedEpoch, ...]]:

@@ -179,12 +179,7 @@ class IslandActorPool:
             except RayTaskError as error:
                 raise error.cause from error
             else:
-                if actor_version != version("islands"):
-                    raise ClusterError(
-                        f"a machine of the cluster has islands {actor_version}, this one "
-                        f"{version('islands')}: the result would depend on the machine that computes it; "
-                        "install one version on all"
-                    )
+                check_version(actor_version)
                 self._members[slot] = (actor, actor.wait_until_killed.remote())
                 self._vacant.discard(slot)
             del self._joining[slot]
@@ -244,6 +239,20 @@ def put_problem(problem: Problem) -> "ray.ObjectRef[Problem]":
     finally:
         for module in modules:
             cloudpickle.unregister_pickle_by_value(module)
+
+
+def check_version(found: str) -> None:
+    """Check the version of islands on another machine.
+
+    Raises
+    ------
+    ClusterError
+    """
+    if found != version("islands"):
+        raise ClusterError(
+            f"a machine of the cluster has islands {found}, this one {version('islands')}: the result would "
+            "depend on the machine that computes it; install one version on all"
+        )
 
 
 def _find_ended(actors: dict[int, tuple[ActorHandle, ray.ObjectRef]]) -> list[int]:

@@ -9,6 +9,7 @@ has one function per primitive, which it compiles once.
 
 import io
 import pickle
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, overload
@@ -94,15 +95,24 @@ class _Unpickler(pickle.Unpickler):
         return self._primitives[name]
 
 
-class PackedIslands(Sequence[Island]):
-    """Sequence of the islands of packed epochs, each unpickled at its first access; equal to their tuple."""
+class LazyIslands(Sequence[Island]):
+    """Sequence of islands, each of which is read at its first access; equal to their tuple.
 
-    def __init__(self, reports: Sequence[PackedEpoch], primitives: Mapping[str, Primitive]) -> None:
-        self._reports, self._primitives = tuple(reports), primitives
+    Parameters
+    ----------
+    size : int
+    """
+
+    def __init__(self, size: int) -> None:
+        self._size = size
         self._islands: dict[int, Island] = {}
 
+    @abstractmethod
+    def _read(self, place: int) -> Island:
+        """Return the island at a place from 0 to the size, without it."""
+
     def __len__(self) -> int:
-        return len(self._reports)
+        return self._size
 
     @overload
     def __getitem__(self, place: int) -> Island: ...
@@ -115,7 +125,7 @@ class PackedIslands(Sequence[Island]):
             raise IndexError(place)
         place %= len(self)
         if place not in self._islands:
-            self._islands[place] = unpack_island(self._reports[place].packed, self._primitives)
+            self._islands[place] = self._read(place)
         return self._islands[place]
 
     def __eq__(self, other: object) -> bool:
@@ -126,3 +136,21 @@ class PackedIslands(Sequence[Island]):
 
     def __repr__(self) -> str:
         return repr(tuple(self))
+
+
+class PackedIslands(LazyIslands):
+    """Islands of packed epochs.
+
+    Parameters
+    ----------
+    reports : sequence of PackedEpoch
+    primitives : mapping
+        Primitives of the problem.
+    """
+
+    def __init__(self, reports: Sequence[PackedEpoch], primitives: Mapping[str, Primitive]) -> None:
+        super().__init__(len(reports))
+        self._reports, self._primitives = tuple(reports), primitives
+
+    def _read(self, place: int) -> Island:
+        return unpack_island(self._reports[place].packed, self._primitives)

@@ -50,7 +50,7 @@ class RayEngine:
         cpus = islands if self._autoscaling else int(ray.cluster_resources().get("CPU", 0))
         if (regions := count_regions(islands, cpus)) > 1:
             yield from run_regions(
-                problem, start, stop, regions, self._progress, self._title, self._autoscaling
+                problem, start, stop, regions, self._progress, self._title, self._autoscaling, self._observe
             )
             return
         scheduler = schedule_islands(problem, start, pack_epoch)

@@ -1,4 +1,4 @@
-"""Ray actor that schedules the islands of a region on actors of its own.
+"""Ray actor that schedules the islands of a region on separate actors.
 
 In a search of thousands of islands, the driver exchanges one message per region and epoch with such actors.
 The packed islands of a region stay in the object store of its machine.
@@ -19,6 +19,26 @@ from islands_service.runtime.epoch_deadline import EpochDeadlines
 from islands_service.runtime.epoch_scheduler import EpochScheduler
 from islands_service.runtime.epochs_in_flight import EpochsInFlight
 from islands_service.runtime.packed_epoch import PackedEpoch
+
+
+@dataclass(frozen=True, slots=True)
+class RegionStatus:
+    """Answer of a region to a check.
+
+    Attributes
+    ----------
+    version : str
+        Version of islands on its machine.
+    messages : tuple of str
+        Messages for the user since the last check.
+    placed, waiting : int
+        Number of islands with and without a separate CPU.
+    """
+
+    version: str
+    messages: tuple[str, ...] = ()
+    placed: int = 0
+    waiting: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +94,16 @@ class RegionActor:
     ) -> None:
         self._border = border
         self._messages: deque[str] = deque()
+        self._placement = 0, len(state)
         start = {report.index: report for report in state}
         self._scheduler = EpochScheduler(problem.settings, sources, generation, start)
         self._pool = IslandActorPool(
-            problem, len(state), self._store_message, autoscaling=autoscaling, share=share
+            problem,
+            len(state),
+            self._store_message,
+            autoscaling=autoscaling,
+            observe=self._store_placement,
+            share=share,
         )
         self._deadlines = EpochDeadlines(len(state), problem.settings.population)
         self._in_flight = EpochsInFlight(self._scheduler, self._pool, self._deadlines)
@@ -85,10 +111,14 @@ class RegionActor:
     def _store_message(self, message: str, _fraction: float | None = None, /) -> None:
         self._messages.append(message)
 
+    def _store_placement(self, placed: int, waiting: int) -> None:
+        self._placement = placed, waiting
+
     @ray.method(concurrency_group="watch")
-    def check(self) -> tuple[str, tuple[str, ...]]:
-        """Return the version of islands, and the messages for the user since the last call."""
-        return version("islands"), tuple(self._messages.popleft() for _ in range(len(self._messages)))
+    def check(self) -> RegionStatus:
+        """Return the status since the last call."""
+        messages = tuple(self._messages.popleft() for _ in range(len(self._messages)))
+        return RegionStatus(version("islands"), messages, *self._placement)
 
     @ray.method(num_returns=2)
     def advance(self, *arriving: Mapping[int, bytes]) -> tuple[RegionReport, tuple[PackedEpoch, ...]]:

@@ -1,12 +1,11 @@
 """Regions of a search of thousands of islands: a tree of coordinators with one level.
 
 One process schedules some two thousand islands at epochs of a second. With more of them, every region of a
-few hundred islands has a coordinator of its own, a `RegionActor`. The driver passes the emigrants across the
+few hundred islands has a separate coordinator, a `RegionActor`. The driver passes the emigrants across the
 borders of regions on, and merges the statistics. The result does not depend on the number of regions.
 """
 
 from collections.abc import Callable, Generator, Iterator
-from importlib.metadata import version
 from itertools import pairwise
 from time import monotonic
 
@@ -19,7 +18,7 @@ from islands.evolution.engine import ArchipelagoEpoch, Caches, make_topology
 from islands.evolution.epoch import IslandEpoch, next_stop, select_migrants
 from islands.evolution.problem import Problem
 from islands.evolution.progress import ProgressCallback
-from islands_service.runtime.actor_pool import put_problem
+from islands_service.runtime.actor_pool import check_version, put_problem
 from islands_service.runtime.cluster import LOSS_ERRORS
 from islands_service.runtime.epoch_scheduler import MAX_EPOCHS_AHEAD
 from islands_service.runtime.errors import ClusterError
@@ -60,8 +59,16 @@ def run_regions(
     progress: ProgressCallback,
     title: str = "",
     autoscaling: bool = False,
+    observe: Callable[[int, int], None] = lambda *_: None,
 ) -> Generator[ArchipelagoEpoch]:
     """Yield the epochs of a search in regions of consecutive islands; see `islands.evolution.engine.Engine`.
+
+    Parameters
+    ----------
+    regions : int
+        See `count_regions`.
+    progress, title, autoscaling, observe
+        See `IslandActorPool`.
 
     Raises
     ------
@@ -71,7 +78,7 @@ def run_regions(
     """
     if start.generation >= problem.settings.generations:
         return
-    tree = _Tree(problem, start, regions, progress, title, autoscaling)
+    tree = _Tree(problem, start, regions, progress, title, autoscaling, observe)
     try:
         while not (tree.finished or stop()):
             tree.submit()
@@ -101,6 +108,8 @@ class _Region:
         #: Reference to the answer of a check, when it was asked, and the seconds that the actor has for it.
         self.check: tuple[ray.ObjectRef, float, float] | None = None
         self.losses = 0
+        #: Number of islands with and without a separate CPU.
+        self.placement = 0, len(islands)
 
 
 class _Tree:
@@ -114,9 +123,11 @@ class _Tree:
         progress: ProgressCallback,
         title: str,
         autoscaling: bool,
+        observe: Callable[[int, int], None],
     ) -> None:
         self._problem, self._settings = put_problem(problem), problem.settings
         self._progress, self._title, self._autoscaling = progress, title, autoscaling
+        self._observe = observe
         self._sources = make_topology(problem, start).sources
         self._size, self._generation, self._actor_count = len(start.islands), start.generation, 0
         bounds = [self._size * number // regions for number in range(regions + 1)]
@@ -204,6 +215,7 @@ class _Tree:
             for region in self._regions:
                 if region.actor is not None:
                     ray.kill(region.actor)
+            self._observe(0, 0)
 
     def _start_actor(self, region: _Region) -> ActorHandle:
         self._actor_count += 1
@@ -243,17 +255,16 @@ class _Tree:
                 self._handle_loss(region, f"did not answer for {now - asked_at:.0f} s")
             return
         try:
-            actor_version, messages = ray.get(reference)
+            status = ray.get(reference)
         except LOSS_ERRORS:
             self._handle_loss(region, "was lost")
             return
-        if actor_version != version("islands"):
-            raise ClusterError(
-                f"a machine of the cluster has islands {actor_version}, this one {version('islands')}: the "
-                "result would depend on the machine that computes it; install one version on all"
-            )
-        for message in messages:
+        check_version(status.version)
+        for message in status.messages:
             self._progress(message)
+        region.placement = status.placed, status.waiting
+        placed, waiting = zip(*(each.placement for each in self._regions), strict=True)
+        self._observe(sum(placed), sum(waiting))
         assert region.actor is not None
         region.check = region.actor.check.remote(), now, _SILENCE_SECONDS
 
@@ -268,6 +279,7 @@ class _Tree:
         if region.actor is not None:
             ray.kill(region.actor)
         region.actor = region.pending = region.check = None
+        region.placement = 0, len(region.islands)
 
 
 def _pack_start(problem: Problem, start: Archipelago, island: int) -> PackedEpoch:
