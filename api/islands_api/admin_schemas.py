@@ -92,6 +92,9 @@ class OwnerChanges(BaseModel):
     max_drawings: Annotated[
         Quota, Field(description="Requests whose figures are being drawn, of each API process.")
     ] = None
+    dataset_retention: Annotated[
+        Quota, Field(description="Seconds for which a data set that no job names is kept; 0 for ever.")
+    ] = None
 
 
 class OwnerView(ResponseModel):
@@ -105,6 +108,7 @@ class OwnerView(ResponseModel):
     max_stored: int | None = None
     max_streams: int | None = None
     max_drawings: int | None = None
+    dataset_retention: int | None = None
     queued: int = Field(description="Number of queued jobs.")
     running: int = Field(description="Number of running jobs.")
     stored: int = Field(description="Bytes of data sets.")

@@ -71,6 +71,9 @@ class Preview(ResponseModel):
     )
 
 
+_EXPIRES = "Earliest deletion, if no job names the data set until then. None if it is kept."
+
+
 class FetchRequest(BaseModel):
     """Request for the download of a record."""
 
@@ -114,6 +117,7 @@ class DatasetView(ResponseModel):
     bytes: int
     created: datetime
     source: str | None = Field(default=None, description="URL of the download, without its query.")
+    expires: datetime | None = Field(default=None, description=_EXPIRES)
     preview: Preview
 
 
@@ -126,6 +130,7 @@ class DatasetSummary(ResponseModel):
     bytes: int
     created: datetime
     source: str | None = Field(default=None, description="URL of the download, without its query.")
+    expires: datetime | None = Field(default=None, description=_EXPIRES)
     samples: int | None
     columns: int = Field(description="Number of columns. The data set itself lists them.")
     time: str | None = Field(description="Name of the time column.")

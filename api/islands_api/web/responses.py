@@ -79,8 +79,15 @@ class QueuePositions:
             self._known[job.id] = now, positions.get(job.id)
 
 
-def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
-    """Convert a data set to a document with the fields of `islands_api.dataset_schemas.DatasetView`."""
+def dataset_document(dataset: StoredDataset, retention: int = 0) -> dict[str, Any]:
+    """Convert a data set to a document with the fields of `islands_api.dataset_schemas.DatasetView`.
+
+    Parameters
+    ----------
+    retention : int
+        Seconds for which the owner's data sets without jobs are kept; 0 for ever.
+    """
+    since = dataset.idle_since if retention else None
     return {
         "id": dataset.id,
         "name": dataset.name,
@@ -88,13 +95,14 @@ def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
         "bytes": dataset.bytes,
         "created": _format_time(dataset.created),
         "source": dataset.source,
+        "expires": _format_time(None if since is None else since + retention),
         "preview": dataset.preview,
     }
 
 
-def dataset_summary(dataset: StoredDataset) -> dict[str, Any]:
+def dataset_summary(dataset: StoredDataset, retention: int = 0) -> dict[str, Any]:
     """Convert a data set of a page to a document: `islands_api.dataset_schemas.DatasetSummary`."""
-    document = dataset_document(dataset)
+    document = dataset_document(dataset, retention)
     summary = document.pop("preview")
     return {**document, **summary}
 

@@ -73,6 +73,7 @@ class Sweeper:
         retention = self._store.retention
         if self._settings.retention:
             retention.delete_expired(self._settings.retention)
+        expired = retention.expire_datasets(self._settings.dataset_retention)
         if self._settings.audit_retention:
             retention.delete_old_audit(self._settings.audit_retention)
         self._store.deliveries.delete_old(DELIVERY_RETENTION)
@@ -80,4 +81,4 @@ class Sweeper:
         # after the query is younger than the limit.
         before = time() - ORPHAN_AGE
         removed = self._blobs.sweep(retention.named_blobs(), before)
-        log.info("swept", blobs=removed)
+        log.info("swept", blobs=removed, datasets=expired)

@@ -191,9 +191,14 @@ class Job:
     @property
     def datasets(self) -> tuple[str, ...]:
         """Data sets that the specification names, also one that this version cannot parse."""
-        parts = [self.spec, self.spec.get("validation"), *(self.spec.get("recordings") or ())]
-        named = [part.get("dataset") for part in parts if isinstance(part, dict)]
-        return tuple(dict.fromkeys(name for name in named if isinstance(name, str)))
+        return find_datasets(self.spec)
+
+
+def find_datasets(spec: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the data sets that the specification of a job names."""
+    parts = [spec, spec.get("validation"), *(spec.get("recordings") or ())]
+    named = [part.get("dataset") for part in parts if isinstance(part, dict)]
+    return tuple(dict.fromkeys(name for name in named if isinstance(name, str)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,8 @@ class Quotas:
         Open event streams.
     max_drawings : int
         Requests whose figures are being drawn or wait for it.
+    dataset_retention : int
+        Seconds for which a data set that no job names is kept; 0 for ever.
     """
 
     max_active: int
@@ -43,6 +45,7 @@ class Quotas:
     max_stored: int
     max_streams: int
     max_drawings: int
+    dataset_retention: int
 
 
 #: Names of the quotas.
@@ -82,6 +85,7 @@ def default_quotas(settings: ServiceSettings) -> Quotas:
         settings.max_stored,
         settings.max_streams,
         settings.max_drawings,
+        settings.dataset_retention,
     )
 
 

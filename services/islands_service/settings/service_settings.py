@@ -101,6 +101,8 @@ class ServiceSettings(BaseSettings):
         the machine of the API; set it if the islands run on other machines.
     retention
         Time after which a finished job is deleted; 0 keeps it for ever. An idempotency key is valid as long.
+    dataset_retention
+        Time after which a data set that no job names is deleted; 0 keeps it for ever.
     audit_retention
         Time after which an entry of the audit trail is deleted; 0 keeps it for ever.
     rate, burst
@@ -183,6 +185,7 @@ class ServiceSettings(BaseSettings):
     max_islands: Count = 256
     max_job_memory: Annotated[int, Field(ge=0)] = 0
     retention: Annotated[float, Field(ge=0.0)] = 90 * 86_400.0
+    dataset_retention: Annotated[int, Field(ge=0)] = 0
     audit_retention: Annotated[float, Field(ge=0.0)] = 365 * 86_400.0
     rate: Annotated[float, Field(ge=0.0)] = 50.0
     burst: Count = 200

@@ -24,6 +24,7 @@ class Action(StrEnum):
     DELETE = "delete-job"
     UPLOAD = "upload-dataset"
     DELETE_DATASET = "delete-dataset"
+    EXPIRE_DATASET = "expire-dataset"
     CREATE_KEY = "create-key"
     REVOKE_KEY = "revoke-key"
     CHANGE_OWNER = "change-owner"
@@ -46,7 +47,7 @@ class AuditEntry:
     key_id : str or None
         Key of the request; None if it needed none.
     address : str
-        Address of the client, or ``command line``.
+        Address of the client, ``command line``, or ``retention``.
     details : str or None
         New values of a changed owner, the host of a new webhook, or the source of a data set, as JSON.
     """

@@ -46,6 +46,8 @@ class StoredDataset:
         file with the options ``reading``. In a page it contains only the fields of `summarise_preview`.
     source : str or None
         URL of the download without its query; None for an upload.
+    idle_since : float or None
+        Time at which a sweep found that no job names the data set: see `Retention.expire_datasets`.
     """
 
     owner: str
@@ -57,6 +59,7 @@ class StoredDataset:
     preview: Mapping[str, Any]
     created: float
     source: str | None = None
+    idle_since: float | None = None
 
 
 class Datasets:
@@ -95,14 +98,16 @@ class Datasets:
             dialect.lock_owner(connection, owner)
             existing = _read_row(connection, owner, identity)
             if existing is not None and existing.deleted is None:
-                return _make_dataset(existing), False
+                restart = update(datasets).where(datasets.c.owner == owner, datasets.c.id == identity)
+                row = connection.execute(restart.values(idle_since=None).returning(datasets)).one()
+                return _make_dataset(row), False
             details = None if source is None else json.dumps({"source": source})
             record_change(connection, Action.UPLOAD, owner, identity, by, details)
             if existing is not None:
                 restore = (
                     update(datasets)
                     .where(datasets.c.owner == owner, datasets.c.id == identity)
-                    .values(deleted=None, name=name, created=now(), source=source)
+                    .values(deleted=None, idle_since=None, name=name, created=now(), source=source)
                     .returning(datasets)
                 )
                 return _make_dataset(connection.execute(restore).one()), True
@@ -290,5 +295,6 @@ def _make_dataset(row: Any, preview: Mapping[str, Any] | None = None) -> StoredD
     if preview is None:
         preview = json.loads(row.preview)
     return StoredDataset(
-        *(row.owner, row.id, row.name, row.suffix, row.blob, row.bytes, preview, row.created, row.source)
+        *(row.owner, row.id, row.name, row.suffix, row.blob, row.bytes, preview, row.created),
+        *(row.source, row.idle_since),
     )

@@ -135,7 +135,9 @@ datasets = Table(
     Column("summary", Text),
     # URL of the download, without its query; null for an upload.
     Column("source", Text),
-    # Time of the deletion by the owner. The row is kept while a job names the data set.
+    # Time at which a sweep found that no job names the data set; null if one does, or no sweep looked yet.
+    Column("idle_since", Float),
+    # Time of the deletion by the owner, or by a sweep. The row is kept while a job names the data set.
     Column("deleted", Float),
 )
 

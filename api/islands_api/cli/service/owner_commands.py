@@ -64,6 +64,10 @@ def set_owner(
         int | None,
         typer.Option("--max-drawings", help="Requests whose figures are being drawn, of each API process."),
     ] = None,
+    dataset_retention: Annotated[
+        int | None,
+        typer.Option("--dataset-retention", help="Seconds that a data set without jobs is kept; 0 for ever."),
+    ] = None,
     unset: Annotated[
         list[str] | None,
         typer.Option("--unset", help="Restore a default: weight, or a quota such as max-active. Repeat it."),
@@ -80,6 +84,7 @@ def set_owner(
         "max_stored": max_stored,
         "max_streams": max_streams,
         "max_drawings": max_drawings,
+        "dataset_retention": dataset_retention,
     }
     changes = {name: value for name, value in given.items() if value is not None}
     restored: dict[str, int | None] = {name.replace("-", "_"): None for name in unset or ()}

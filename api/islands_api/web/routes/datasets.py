@@ -1,7 +1,7 @@
 """Data sets: upload, inspect, list, delete."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Annotated, Any
 
@@ -77,7 +77,7 @@ async def upload(
     name, compressed = parse_file_name(file.filename)
     request = InspectionRequest(tuple(inputs), output, dt, reading=_parse_reading(reading))
     stored, new = await store_dataset(state, caller, file.file, name, compressed, request)
-    return _make_response(state, stored, new)
+    return await _make_response(state, stored, new)
 
 
 @fetching.post("/fetch", status_code=201, response_model=DatasetView, responses=_UPLOAD_RESPONSES)
@@ -93,12 +93,13 @@ async def fetch_dataset(asked: FetchRequest, caller: Writer, state: AppStateDep)
     request = InspectionRequest(tuple(asked.inputs), asked.output, asked.dt, reading=reading)
     async with fetch(state, caller, asked.url) as file:
         stored, new = await store_dataset(state, caller, file, name, compressed, request, source)
-    return _make_response(state, stored, new)
+    return await _make_response(state, stored, new)
 
 
-def _make_response(state: AppState, stored: StoredDataset, new: bool) -> JSONDocument:
+async def _make_response(state: AppState, stored: StoredDataset, new: bool) -> JSONDocument:
+    retention = await _find_retention(state, stored.owner, (stored,))
     headers = {"Location": f"{state.settings.root_path}{router.prefix}/{stored.id}"}
-    return JSONDocument(dataset_document(stored), 201 if new else 200, headers)
+    return JSONDocument(dataset_document(stored, retention), 201 if new else 200, headers)
 
 
 def _parse_reading(text: str) -> Mapping[str, Any]:
@@ -149,17 +150,24 @@ async def datasets(caller: Reader, state: AppStateDep, cursor: Cursor = None, li
     page, after = await state.run_blocking(
         state.store.datasets.page, caller.owner, decode_cursor(cursor), limit
     )
+    retention = await _find_retention(state, caller.owner, page)
     return JSONDocument(
-        {"items": [dataset_summary(dataset) for dataset in page], "next": encode_cursor(after)}
+        {"items": [dataset_summary(dataset, retention) for dataset in page], "next": encode_cursor(after)}
     )
 
 
 @router.get("/{dataset}", response_model=DatasetView)
 async def dataset(dataset: Id, caller: Reader, state: AppStateDep) -> Any:
     """Return a data set: columns, units, statistics, sampling, warnings."""
-    return JSONDocument(
-        dataset_document(await state.run_blocking(state.store.datasets.get, caller.owner, dataset))
-    )
+    stored = await state.run_blocking(state.store.datasets.get, caller.owner, dataset)
+    return JSONDocument(dataset_document(stored, await _find_retention(state, caller.owner, (stored,))))
+
+
+async def _find_retention(state: AppState, owner: str, found: Sequence[StoredDataset]) -> int:
+    """Return the retention of an owner if one of the data sets needs it."""
+    if all(dataset.idle_since is None for dataset in found):
+        return 0
+    return (await state.quotas(owner)).dataset_retention
 
 
 @router.delete("/{dataset}", status_code=204)
