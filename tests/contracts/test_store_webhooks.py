@@ -188,7 +188,10 @@ def test_deliveries_are_sent_after_the_clock_has_gone_back(store):
     failed, interrupted = store.deliveries.claim(60.0, 10)
     store.deliveries.record(failed, 500, "away")
     assert store.deliveries.claim(60.0, 10) == ()
+    store.deliveries.sweep(LONG)
+    assert store.deliveries.claim(60.0, 10) == ()
     turn_clock(store, -3600.0)
+    store.deliveries.sweep(LONG)
     found = store.deliveries.claim(60.0, 10)
     assert {(each.id, each.attempt) for each in found} == {(failed.id, 2), (interrupted.id, 2)}
     assert store.deliveries.claim(60.0, 10) == ()
@@ -220,9 +223,9 @@ def test_only_old_finished_deliveries_are_deleted(store):
     job_in(store, JobState.CANCELLED)
     (due,) = store.deliveries.claim(LONG, 10)
     store.deliveries.record(due, 200, None)
-    store.deliveries.delete_old(3600.0)
+    store.deliveries.sweep(3600.0)
     assert len(sent(store, webhook)) == 2
-    store.deliveries.delete_old(-1.0)
+    store.deliveries.sweep(-1.0)
     assert [state for _, state in sent(store, webhook)] == ["pending"]
 
 

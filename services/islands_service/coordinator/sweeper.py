@@ -76,7 +76,7 @@ class Sweeper:
         expired = retention.expire_datasets(self._settings.dataset_retention)
         if self._settings.audit_retention:
             retention.delete_old_audit(self._settings.audit_retention)
-        self._store.deliveries.delete_old(DELIVERY_RETENTION)
+        self._store.deliveries.sweep(DELIVERY_RETENTION)
         # Read the clock before the references, and those before the files: a blob that is referenced only
         # after the query is younger than the limit.
         before = time() - ORPHAN_AGE

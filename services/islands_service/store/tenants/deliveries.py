@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import Connection, Row, and_, delete, exists, func, insert, or_, select, update
+from sqlalchemy import Connection, Row, delete, exists, func, insert, or_, select, update
 
 from islands_service.domain.webhook import EVENTS, Delivery, DueDelivery, make_body, retry_delay
 from islands_service.store.backends.dialect import now
@@ -20,19 +20,11 @@ from islands_service.store.tables import deliveries, webhooks
 #: Largest number of characters of an error that is kept.
 _MAX_ERROR = 500
 
-#: Whether a delivery is to be sent now. If the clock of the database has gone back by more than a second
-#: since the last attempt, the time of the next one may lie far in the future.
-_IS_DUE = or_(
-    deliveries.c.next_at <= now(),
-    and_(
-        deliveries.c.next_at.is_not(None),
-        func.coalesce(deliveries.c.attempted, deliveries.c.created) > now() + 1.0,
-    ),
-)
-
 #: Webhooks with a delivery to send now.
 _DUE_WEBHOOKS = select(webhooks).where(
-    exists(select(deliveries.c.id).where(deliveries.c.webhook_id == webhooks.c.id, _IS_DUE))
+    exists(
+        select(deliveries.c.id).where(deliveries.c.webhook_id == webhooks.c.id, deliveries.c.next_at <= now())
+    )
 )
 
 
@@ -145,10 +137,21 @@ class Deliveries:
             count, oldest = connection.execute(query.where(unfinished)).one()
         return PendingDeliveries(count, oldest)
 
-    def delete_old(self, seconds: float) -> None:
-        """Delete the finished deliveries that were created more than the given seconds ago."""
-        old = deliveries.c.next_at.is_(None) & (deliveries.c.created < now() - seconds)
-        self._database.write(lambda connection: connection.execute(delete(deliveries).where(old)))
+    def sweep(self, seconds: float) -> None:
+        """Delete the finished deliveries that were created more than the given seconds ago.
+
+        If the clock of the database has gone back by more than a second since the last attempt at an
+        unfinished one, its next attempt may lie far in the future: it is made now.
+        """
+        unfinished = deliveries.c.next_at.is_not(None)
+        changed = func.coalesce(deliveries.c.attempted, deliveries.c.created)
+
+        def operation(connection: Connection) -> None:
+            connection.execute(delete(deliveries).where(~unfinished, deliveries.c.created < now() - seconds))
+            late = update(deliveries).where(unfinished, changed > now() + 1.0)
+            connection.execute(late.values(next_at=now()))
+
+        self._database.write(operation)
 
 
 def delivery_from_row(row: Row[Any]) -> Delivery:
@@ -172,7 +175,7 @@ def _lease_webhook(connection: Connection, webhook: Row[Any], seconds: float) ->
     """Lease a webhook, and begin an attempt at its oldest due delivery."""
     first = (
         select(deliveries.c.id)
-        .where(deliveries.c.webhook_id == webhook.id, _IS_DUE)
+        .where(deliveries.c.webhook_id == webhook.id, deliveries.c.next_at <= now())
         .order_by(deliveries.c.next_at, deliveries.c.id)
         .limit(1)
     )
