@@ -28,11 +28,14 @@ class LockedPackage(NamedTuple):
         The name is normalised: lower case, with hyphens.
     needed_by : tuple of str
         Names of the packages that require it; "islands" for a direct requirement.
+    hashes : tuple of str
+        SHA-256 of the files that may be installed.
     """
 
     name: str
     version: str
     needed_by: tuple[str, ...]
+    hashes: tuple[str, ...]
 
 
 def normalise(name: str) -> str:
@@ -46,7 +49,8 @@ def read_lock(path: Path) -> dict[str, LockedPackage]:
     for name, version, rest in _ENTRY.findall(path.read_text("utf-8")):
         comments = re.findall(r"^\s+#(?: via)?\s+([\w.-]+)", rest, re.MULTILINE)
         needed_by = tuple(sorted({normalise(each) for each in comments if each not in ("via", "-c", "-r")}))
-        packages[normalise(name)] = LockedPackage(normalise(name), version, needed_by)
+        hashes = tuple(re.findall(r"--hash=sha256:([0-9a-f]+)", rest))
+        packages[normalise(name)] = LockedPackage(normalise(name), version, needed_by, hashes)
     return packages
 
 

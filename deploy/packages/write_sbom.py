@@ -8,44 +8,65 @@ contains no date and no random number. Nothing leaves the machine.
 
 import argparse
 import json
-import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
 from cyclonedx.schema import SchemaVersion
 from cyclonedx.spdx import is_expression, is_supported_id
 from cyclonedx.validation.json import JsonStrictValidator
-from locked_packages import IMAGE, ROOT, find_program, normalise, read_licences, read_lock
+from locked_packages import IMAGE, ROOT, read_licences, read_lock
 
 
-def list_components(lock: Path) -> dict[str, Any]:
-    """Return the document of `cyclonedx-py`: the packages of a lock file with their hashes."""
-    command = [find_program("cyclonedx-py"), "requirements", "--output-reproducible", "--no-validate"]
-    options = ["--pyproject", ROOT / "pyproject.toml", lock]
-    done = subprocess.run([*command, *options], capture_output=True, text=True, encoding="utf-8", check=True)
-    document: dict[str, Any] = json.loads(done.stdout)
-    return document
-
-
-def complete(document: dict[str, Any], lock: Path) -> None:
-    """Add licences and dependencies to a document, which `cyclonedx-py` does not read from a lock file."""
+def make_document(lock: Path) -> dict[str, Any]:
+    """Return the bill of materials of a lock file."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     packages = read_lock(lock)
     licences = read_licences(packages)
-    root = document["metadata"]["component"]
-    references = {root["name"]: root["bom-ref"]}
-    for component in document["components"]:
-        name = normalise(component["name"])
-        references[name] = component["bom-ref"] = component["purl"]
-        del component["description"]  # a copy of the hashes
-        component["licenses"] = [describe_licence(licences[name])]
-    document["dependencies"] = [
-        {
-            "ref": reference,
-            "dependsOn": [references[each.name] for each in packages.values() if name in each.needed_by],
-        }
-        for name, reference in sorted(references.items())
-    ]
+    references = {"islands": "root-component"}
+    references |= {name: f"pkg:pypi/{name}@{package.version}" for name, package in packages.items()}
+    return {
+        "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.6",
+        "version": 1,
+        "metadata": {
+            "component": {
+                "bom-ref": references["islands"],
+                "type": "application",
+                "name": project["name"],
+                "version": project["version"],
+                "licenses": [describe_licence(project["license"])],
+            }
+        },
+        "components": [
+            {
+                "bom-ref": references[name],
+                "type": "library",
+                "name": name,
+                "version": package.version,
+                "purl": references[name],
+                "licenses": [describe_licence(licences[name])],
+                "externalReferences": [
+                    {
+                        "type": "distribution",
+                        "url": references[name],
+                        "comment": "one of these files",
+                        "hashes": [{"alg": "SHA-256", "content": each} for each in package.hashes],
+                    }
+                ],
+            }
+            for name, package in packages.items()
+        ],
+        "dependencies": [
+            {
+                "ref": reference,
+                "dependsOn": [references[each.name] for each in packages.values() if name in each.needed_by],
+            }
+            for name, reference in sorted(references.items())
+        ],
+    }
 
 
 def describe_licence(licence: str) -> dict[str, Any]:
@@ -60,8 +81,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--lock", type=Path, default=IMAGE)
     arguments = parser.parse_args()
-    document = list_components(arguments.lock)
-    complete(document, arguments.lock)
+    document = make_document(arguments.lock)
     text = json.dumps(document, indent=1, sort_keys=True) + "\n"
     if fault := JsonStrictValidator(SchemaVersion.V1_6).validate_str(text):
         sys.exit(f"the bill of materials does not agree with the schema of CycloneDX 1.6: {fault}")
