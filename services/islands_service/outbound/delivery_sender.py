@@ -30,6 +30,9 @@ LEASE_SECONDS = 30.0
 #: Maximum number of requests at once, each to another webhook.
 MAX_REQUESTS = 100
 
+#: Maximum number of deliveries of one claim: 20 take some 15 ms, for which other writes of SQLite wait.
+MAX_CLAIMS = 20
+
 #: Called with the outcome of each attempt, ``delivered``, ``retried`` or ``failed``, and its seconds.
 Observer = Callable[[str, float], None]
 
@@ -64,7 +67,8 @@ class DeliverySender:
         """Send deliveries. A request that is being sent when this is cancelled is repeated later."""
         try:
             while True:
-                await self._start_due()
+                if await self._start_due():
+                    continue
                 if self._sending:
                     # A webhook is free for its next delivery when a request has ended.
                     await asyncio.wait(
@@ -77,20 +81,22 @@ class DeliverySender:
                 task.cancel()
             await asyncio.gather(*self._sending, return_exceptions=True)
 
-    async def _start_due(self) -> None:
-        free = MAX_REQUESTS - len(self._sending)
+    async def _start_due(self) -> bool:
+        """Start to send due deliveries; return whether there may be more."""
+        free = min(MAX_REQUESTS - len(self._sending), MAX_CLAIMS)
         if free <= 0:
-            return
+            return False
         try:
             due = await self._run_blocking(self._deliveries.claim, LEASE_SECONDS, free)
         except StoreError as error:
             log.warning("deliveries not read", reason=str(error))
             await asyncio.sleep(POLL_SECONDS)
-            return
+            return False
         for each in due:
             task = asyncio.create_task(self._deliver(each))
             self._sending.add(task)
             task.add_done_callback(self._sending.discard)
+        return len(due) == MAX_CLAIMS
 
     async def _deliver(self, due: DueDelivery) -> None:
         began = monotonic()
