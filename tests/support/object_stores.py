@@ -9,6 +9,7 @@ from pathlib import Path
 from time import time
 from typing import Any
 
+import httpx
 import pytest
 
 from islands_service.store.backends.object_store import ObjectNotFoundError, ObjectStoreError
@@ -122,6 +123,11 @@ class CuttingProxy:
     def __exit__(self, *_: object) -> None:
         _close(self._listener, *self._open)
 
+    def vanish(self) -> None:
+        """Cut all connections, and refuse new ones until ``refuse`` is set to False."""
+        self.refuse = True
+        _close(*self._open)
+
     def _accept(self) -> None:
         with suppress(OSError):
             while True:
@@ -156,3 +162,13 @@ def _close(*sockets: socket.socket) -> None:
         with suppress(OSError):
             each.shutdown(socket.SHUT_RDWR)
         each.close()
+
+
+@contextmanager
+def authentication(endpoint: str) -> Iterator[None]:
+    """Let the simulated store refuse all credentials during the block: it knows none."""
+    httpx.post(f"{endpoint}/moto-api/reset-auth", content="0", trust_env=False)
+    try:
+        yield
+    finally:
+        httpx.post(f"{endpoint}/moto-api/reset-auth", content="inf", trust_env=False)

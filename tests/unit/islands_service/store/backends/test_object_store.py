@@ -16,7 +16,14 @@ from islands_service.store.backends.object_store import (
     ObjectStoreRefusedError,
 )
 from islands_service.store.blobs import BlobNotFoundError
-from support.object_stores import CuttingProxy, MemoryObjects, make_bucket, s3_server
+from support.object_stores import (
+    ACCESS,
+    CuttingProxy,
+    MemoryObjects,
+    authentication,
+    make_bucket,
+    s3_server,
+)
 
 pytestmark = pytest.mark.ci
 
@@ -159,6 +166,18 @@ def test_a_missing_bucket_is_refused_with_its_setting(endpoint, file, tmp_path):
     ):
         with pytest.raises(ObjectStoreRefusedError, match="no bucket for s3://absent/prefix: create it"):
             operation()
+
+
+def test_wrong_credentials_are_refused_without_another_attempt(endpoint, file):
+    seen = []
+    objects = ObjectStore(URL)
+    objects.observe = lambda *call: seen.append(call[:2])
+    with authentication(endpoint), pytest.raises(ObjectStoreRefusedError) as caught:
+        objects.put("a", file)
+    assert "(InvalidAccessKeyId): check the credentials" in str(caught.value)
+    assert ACCESS["AWS_SECRET_ACCESS_KEY"] not in str(caught.value)
+    assert seen == [("put", "refused")]
+    objects.put("a", file)
 
 
 def test_missing_credentials_are_named(endpoint, file, monkeypatch):
