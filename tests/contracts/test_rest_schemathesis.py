@@ -29,7 +29,7 @@ DATASET = "9f86d081884c7d659a2feaa0c55ad015-csv"
 JOB = "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
 
 #: Configuration of schemathesis. The listed operations may reject data that are valid by the schema: columns
-#: that the data set does not have, invented cursors, unsuitable file names.
+#: that the data set does not have, invented cursors, unsuitable file names, URLs without a host.
 CONFIGURATION = f"""
 [dictionaries]
 job = {{ values = ["{JOB}"] }}
@@ -44,6 +44,7 @@ rank = {{ values = [1, 2] }}
 [[operations]]
 include-name = [
     "POST /v1/jobs", "POST /v1/discrepancies", "POST /v1/datasets", "GET /v1/jobs", "GET /v1/datasets",
+    "POST /v1/datasets/fetch", "POST /v1/webhooks",
 ]
 checks.positive_data_acceptance.expected-statuses = ["2xx", "401", "403", "404", "409", "422", "429"]
 
