@@ -1,10 +1,11 @@
 """Commands and options that the documentation names exist."""
 
+import re
 import shlex
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from typer.main import get_command
@@ -12,6 +13,7 @@ from typer.main import get_command
 from islands_api.cli.app import app
 from support import pages
 from support.pages import PAGES, page_name
+from support.repository import ROOT
 
 
 @cache
@@ -58,3 +60,74 @@ def test_a_wrong_option_is_found() -> None:
 def test_a_wrong_command_is_found() -> None:
     with pytest.raises(AssertionError, match="no command"):
         find_command(["islands", "jobs", "begin"])
+
+
+class ScriptCommand(NamedTuple):
+    """Command that runs a script or tests of the repository."""
+
+    program: str
+    path: Path
+    words: list[str]
+
+
+def script_commands(page: Path) -> Iterator[ScriptCommand]:
+    """Yield the commands of a page that run a script or tests of the repository."""
+    code = [code for _, code in pages.blocks(page)] + re.findall(r"`([^`\n]+)`", pages.prose(page))
+    for line in "\n".join(code).splitlines():
+        if re.match(r"(python|pytest) .*\b(benchmarks|deploy|tests)/\S+\.py", line.strip()):
+            words = shlex.split(line.split(" #")[0])
+            path = next(word for word in words if word.endswith(".py"))
+            yield ScriptCommand(words[0], ROOT / path, [word for word in words[1:] if word != path])
+
+
+def check_script_command(command: ScriptCommand) -> None:
+    """Check that a script has the measurements and options of a command, and that a test has its marks."""
+    source = command.path.read_text("utf-8")
+    if command.program == "pytest":
+        marks = set(command.words) - {"-m"}
+        assert all(f"pytest.mark.{mark}" in source for mark in marks), command
+        return
+    for module in re.findall(r"^from (\w+) import", source, re.MULTILINE):
+        own = command.path.with_name(f"{module}.py")
+        source += own.read_text("utf-8") if own.exists() else ""
+    for number, word in enumerate(command.words):
+        name = word.partition("=")[0]
+        if name.startswith("--"):
+            field = name[2:].replace("-", "_")
+            options = (f'"{name}"', f"    {field}: float = _option(", "parse_known_args")
+            assert any(option in source for option in options), command
+        elif number == 0 or not command.words[number - 1].startswith("--"):
+            assert f'"{word}": ' in source, command
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_scripts_and_tests_that_a_page_runs_exist(page: Path) -> None:
+    for command in script_commands(page):
+        check_script_command(command)
+
+
+def test_the_figures_of_operation_have_commands() -> None:
+    page = ROOT / "docs/how-to/operate-the-service.md"
+    rows = [line.split("|")[1:-1] for line in page.read_text("utf-8").splitlines() if line.startswith("| ")]
+    speed = [row for row in rows if len(row) == 4 and row[0].strip() != "figure"]
+    assert len(speed) > 25
+    assert all("`" in row[-1] or row[-1].strip() == "the same" for row in speed)
+    assert len(list(script_commands(page))) > 15
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "python benchmarks/absent.py",
+        "python benchmarks/service_load.py accepted",
+        "python benchmarks/service_load.py accept --times 3",
+        "python benchmarks/capacity.py jobs --retain 3",
+        "pytest -m weekly tests/faults/test_service_soak.py",
+    ],
+)
+def test_a_wrong_script_command_is_found(line: str, tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(f"Run `{line}`.\n")
+    (command,) = script_commands(page)
+    with pytest.raises((AssertionError, FileNotFoundError)):
+        check_script_command(command)
