@@ -17,7 +17,7 @@ from support.service_processes import TERMINAL, Service, serving
 pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]
 
 #: Generations of a job of some seconds.
-LONG = 1000
+LONG = 600
 
 #: Health checks of the head as in docs/how-to/deploy-the-service.md: the loss of a node is noticed after four
 #: seconds.
@@ -32,8 +32,12 @@ HEALTH = {
 
 PORT = 6379
 
-#: Longest time in seconds until a node has joined again: it ends, and its start takes as long as Ray does.
-REJOINED = 240.0
+#: Longest time in seconds of a start of a node, and until a node has joined again: it ends first, and is then
+#: started. On a busy machine Ray gives up a start after half a minute, and the next one succeeds.
+STARTED, REJOINED = 180.0, 240.0
+
+#: Longest time in seconds of a job.
+PATIENCE = 300.0
 
 #: Starts a node again whenever it has ended, as systemd and Kubernetes do.
 RESTARTED = 'while :; do "$0" "$@"; sleep 0.5; done'
@@ -60,6 +64,9 @@ class Cluster:
         command = ["bash", "-c", RESTARTED, ray, "start", *options]
         host.start(command, self._environment, self._logs / f"{host.address}.log")
 
+    def has_started(self, host: Host) -> bool:
+        return "Ray runtime started" in (self._logs / f"{host.address}.log").read_text()
+
     def islands(self, host: Host) -> list[int]:
         """Return the island actors of a host."""
         return [pid for pid in host.running() if "IslandActor" in _command(pid)]
@@ -83,6 +90,7 @@ def _cluster(folder: Path, logs: Path) -> Iterator[Cluster]:
         cluster = Cluster(made, folder, logs, environment)
         for host in made:
             cluster.start(host)
+            eventually(lambda: cluster.has_started(host), STARTED)  # noqa: B023
         with (
             cluster.head.entered(),
             serving(
@@ -104,7 +112,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 @pytest.fixture(scope="module")
 def undisturbed(cluster: Cluster) -> bytes:
-    return cluster.service.found(cluster.service.submit(LONG))
+    return cluster.service.found(cluster.service.submit(LONG), PATIENCE)
 
 
 @pytest.fixture
@@ -146,11 +154,11 @@ def test_partition_of_a_worker_delays_a_job_only(
         time.sleep(max(0.0, began + seconds - time.monotonic()))
     finally:
         worker.connect(True)
-    assert service.found(job) == undisturbed
+    assert service.found(job, PATIENCE) == undisturbed
     assert service.job(job)["attempt"] == 1
     print(f"partition of {seconds} s: progress after {taken:.1f} s")
     # The worker is used again.
-    assert service.found(submit_to_both(cluster)) == undisturbed
+    assert service.found(submit_to_both(cluster), PATIENCE) == undisturbed
 
 
 def test_loss_of_a_worker_delays_a_job_only(cluster: Cluster, undisturbed: bytes, job: str) -> None:
@@ -158,7 +166,7 @@ def test_loss_of_a_worker_delays_a_job_only(cluster: Cluster, undisturbed: bytes
     worker.lose()
     taken = progress_after(service, job, 30.0)
     cluster.start(worker)
-    assert service.found(job) == undisturbed
+    assert service.found(job, PATIENCE) == undisturbed
     assert service.job(job)["attempt"] == 1
     print(f"loss of a node: progress after {taken:.1f} s")
 
@@ -170,7 +178,7 @@ def test_partition_of_the_head_from_its_workers_interrupts_a_job_only(
     time.sleep(15.0)
     cluster.head.connect(True)
     taken = progress_after(cluster.service, job, 60.0)
-    assert cluster.service.found(job) == undisturbed
+    assert cluster.service.found(job, PATIENCE) == undisturbed
     print(f"partition of the head: progress {taken:.1f} s after its end")
 
 
@@ -183,6 +191,6 @@ def test_loss_of_the_head_interrupts_a_job_only(cluster: Cluster, undisturbed: b
     eventually(lambda: not alive([coordinator]), 90.0)
     exited = time.monotonic() - began
     cluster.start(head)
-    assert service.found(job) == undisturbed
+    assert service.found(job, PATIENCE) == undisturbed
     assert service.job(job)["attempt"] == 2
     print(f"head lost: the coordinator exits after {exited:.1f} s, result {time.monotonic() - began:.1f} s")

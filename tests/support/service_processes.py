@@ -155,9 +155,9 @@ class Service:
         assert answer.status_code == 200, answer.text
         return answer.content
 
-    def found(self, job: str) -> bytes:
+    def found(self, job: str, seconds: float = 120.0) -> bytes:
         """Wait until a job has succeeded and return its models."""
-        ended = self.ended(job)
+        ended = self.ended(job, seconds)
         assert ended["state"] == "succeeded", ended
         return self.models(job)
 
