@@ -253,13 +253,22 @@ class Coordinator:
         if self._connected:
             return
         self._store.leases.report(lease, ProgressReport({"phase": "starting", "note": "waiting for Ray"}))
+        if self._find_address() is None:
+            # The supervisor kills this process if Ray ends. Five of its starts must not make the job fail.
+            self._store.leases.count_attempt(lease, -1)
+            try:
+                self._wait_for_address(heartbeat)
+            finally:
+                self._store.leases.count_attempt(lease, 1)
+        self._connect()
+
+    def _wait_for_address(self, heartbeat: Heartbeat) -> None:
         until = monotonic() + RAY_STARTUP_TIMEOUT
         while self._find_address() is None:
             heartbeat.check()
             if monotonic() > until:
                 raise ClusterError(f"Ray has not started within {RAY_STARTUP_TIMEOUT:.0f} s")
             self._stopping.wait(POLL_SECONDS)
-        self._connect()
 
     def _find_address(self) -> str | None:
         if self._settings.ray_address is not None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from math import inf
 from threading import Event, Thread
-from time import monotonic
+from time import monotonic, process_time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -36,6 +36,10 @@ CANCEL_GRACE = 0.4
 #: Seconds without a call of `Heartbeat.check` after which a search counts as hanging. A search checks many
 #: times a second; a checkpoint of a thousand islands takes half a minute.
 HANG_TIMEOUT = 600.0
+
+#: The same outside the search, if the process uses less than this fraction of a core meanwhile. Reading
+#: before a search and refinement after it take long without a check if the record is long, but they compute.
+IDLE_TIMEOUT, IDLE_SHARE = 3600.0, 0.05
 
 
 class JobCancelled(IslandsError):  # noqa: N818 - control flow, not an error
@@ -74,7 +78,8 @@ class Heartbeat:
         self._abandon = abandon
         self._over = Event()
         self._lost = self._cancelled = self._completed = self._abandoned = False
-        self._checked_at: float | None = None
+        self._searching = False
+        self._checked_at, self._cpu_at_check = monotonic(), process_time()
         self._thread = Thread(target=self._beat, name="heartbeat", daemon=True)
 
     def __enter__(self) -> "Heartbeat":
@@ -98,8 +103,7 @@ class Heartbeat:
         ------
         LeaseLostError, JobCancelled, CoordinatorStopping
         """
-        if self._checked_at is not None:
-            self._checked_at = monotonic()
+        self._checked_at, self._cpu_at_check = monotonic(), process_time()
         if self._lost:
             raise LeaseLostError(f"the lease of job {self._lease.job.id} is lost")
         if self._cancelled:
@@ -115,16 +119,23 @@ class Heartbeat:
     def search(self) -> Iterator[None]:
         """End the process if `check` is not called for `HANG_TIMEOUT` within the block.
 
-        A call of Ray may block for ever. Reading before a search and refinement after it are outside the
-        block, because both take long without a check if the record is long.
+        A call of Ray may block for ever.
         """
-        self._checked_at = monotonic()
+        self._checked_at, self._searching = monotonic(), True
         try:
             yield
         finally:
-            self._checked_at = None
+            self._searching = False
 
     def _beat(self) -> None:
+        try:
+            self._renew_until_over()
+        except BaseException as error:
+            # For example a lack of memory. Without a heartbeat the job could hang, or run without a lease.
+            log.error("heartbeat ended", job=self._lease.job.id, reason=repr(error))
+            os._exit(1)
+
+    def _renew_until_over(self) -> None:
         period = self._seconds / RENEWALS_PER_LEASE
         renew_at, end_by = 0.0, inf
         while not self._over.wait(min(period, CANCEL_POLL)):
@@ -159,9 +170,16 @@ class Heartbeat:
         self._abandon()
 
     def _exit_if_hanging(self) -> None:
-        checked_at = self._checked_at
-        if checked_at is not None and monotonic() - checked_at > HANG_TIMEOUT:
-            log.error("search hangs", job=self._lease.job.id, seconds=round(monotonic() - checked_at))
+        seconds = monotonic() - self._checked_at
+        computes = process_time() - self._cpu_at_check > IDLE_SHARE * seconds
+        if seconds > (HANG_TIMEOUT if self._searching else IDLE_TIMEOUT) and (
+            self._searching or not computes
+        ):
+            log.error(
+                "search hangs" if self._searching else "job hangs",
+                job=self._lease.job.id,
+                seconds=round(seconds),
+            )
             # A blocked thread cannot be interrupted. The next coordinator continues from the last checkpoint.
             os._exit(1)
 

@@ -112,6 +112,21 @@ class Leases:
         """
         return self._database.write(lambda connection: _report(connection, lease, report))
 
+    def count_attempt(self, lease: Lease, change: int) -> None:
+        """Change the number of attempts of a job without a checkpoint. This is no event.
+
+        Raises
+        ------
+        LeaseLostError
+        """
+
+        def operation(connection: Connection) -> None:
+            counted = update(jobs).where(*_held(lease)).values(stalled=jobs.c.stalled + change)
+            if connection.execute(counted).rowcount == 0:
+                raise _make_lease_lost_error(lease)
+
+        self._database.write(operation)
+
     def release(self, lease: Lease, attempted: bool = False) -> None:
         """Return a job to the queue, to continue from its checkpoint, or cancel it if that was requested.
 

@@ -11,6 +11,7 @@ import pytest
 
 from islands_service.coordinator import coordinator as coordinator_module
 from islands_service.coordinator import sweeper as sweeper_module
+from islands_service.coordinator.coordinator import Coordinator
 from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
@@ -27,6 +28,7 @@ from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StorageFullError, StoreUnavailableError
+from islands_service.store.job_rows.job_claims import ATTEMPTS
 from support.coordinators import (
     DONE,
     SerialCoordinator,
@@ -277,6 +279,50 @@ def test_blob_referenced_during_a_sweep_is_kept(
     sweeper_module.Sweeper(settings, store, blobs, -1.0).sweep_if_due()
     assert blobs.read(written[0]) == b"named meanwhile"
 
+
+@pytest.mark.ci
+def test_starts_of_ray_that_fail_do_not_count_as_attempts(
+    store: Store, job: Job, settings: ServiceSettings, coordinator: Callable[..., Thread]
+) -> None:
+    """The supervisor kills a coordinator if Ray ends, and on a busy machine Ray may not start for minutes."""
+    for _ in range(ATTEMPTS):
+        with child(WAITING, str(settings.data_dir)) as waiting:
+            assert waiting.stdout is not None
+            assert "waiting\n" in waiting.stdout  # the line after those of the log
+            waiting.kill()
+    coordinator(name="waiting")
+    assert wait_until_finished(store, job).state == JobState.SUCCEEDED
+
+
+def test_wait_for_ray_counts_as_an_attempt_if_it_ends(
+    store: Store, job: Job, settings: ServiceSettings, coordinator: Callable[..., Thread]
+) -> None:
+    thread = coordinator(Coordinator)
+    eventually(lambda: "waiting for Ray" in str(store.jobs.get(ALICE, job.id).progress))
+    thread.stop()  # type: ignore[attr-defined]
+    thread.join(10.0)
+    released = store.jobs.get(ALICE, job.id)
+    assert (released.state, released.attempt) == (JobState.QUEUED, 0)
+    lease = store.leases.claim("another", 60.0)
+    assert lease is not None
+    store.leases.count_attempt(lease, ATTEMPTS - 1)
+    store.leases.release(lease, attempted=True)
+    assert store.leases.claim("another", 60.0) is None  # given up
+
+
+#: A coordinator that reports when it waits for Ray.
+WAITING = """
+import sys, time
+from pathlib import Path
+from islands_service.liveness import StopRequest
+from islands_service.coordinator.coordinator import Coordinator
+from islands_service.settings import ServiceSettings
+class Waiting(Coordinator):
+    def _wait_for_address(self, *_):
+        print("waiting", flush=True)
+        time.sleep(60)
+Waiting(ServiceSettings(data_dir=Path(sys.argv[1])), "waiting", StopRequest()).run()
+"""
 
 HANGING = """
 import sys, time

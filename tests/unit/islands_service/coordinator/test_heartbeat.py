@@ -230,20 +230,29 @@ import sys, time
 from islands_service.liveness import StopRequest
 from islands_service.coordinator import heartbeat
 from islands_service.store import Store
-heartbeat.HANG_TIMEOUT = 0.3
+heartbeat.HANG_TIMEOUT = heartbeat.IDLE_TIMEOUT = 0.3
+def compute():
+    until = time.monotonic() + 0.6
+    while time.monotonic() < until:
+        pass
+    print("went on", flush=True)
 def silent():
     time.sleep(0.6)
     print("went on", flush=True)
 with Store(sys.argv[1]) as store:
     lease = store.leases.claim("hanging", 1.0)
     with heartbeat.Heartbeat(store, lease, 0.3, StopRequest()) as beating:
-        silent()  # reading a record
+        compute()  # reading a record
+        beating.check()
         with beating.search():
             for _ in range(12):
                 time.sleep(0.05)
                 beating.check()
-        silent()  # refining
-        if len(sys.argv) > 2:
+        compute()  # refining
+        beating.check()
+        if sys.argv[2:] == ["idle"]:
+            silent()
+        if sys.argv[2:] == ["lost"]:
             store.leases.finish(lease, heartbeat.JobOutcome(heartbeat.JobState.CANCELLED))
             time.sleep(0.1)
         with beating.search():
@@ -251,12 +260,46 @@ with Store(sys.argv[1]) as store:
 """
 
 
-@pytest.mark.parametrize("lost", [pytest.param(False, marks=pytest.mark.ci), True])
-def test_only_a_search_without_checks_ends_the_process(store: Store, lost: bool) -> None:
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        pytest.param("", "search hangs", marks=pytest.mark.ci),
+        pytest.param("lost", "search hangs", marks=pytest.mark.ci),
+        pytest.param("idle", "job hangs", marks=pytest.mark.ci),
+    ],
+)
+def test_job_without_checks_ends_the_process_unless_it_computes(store: Store, how: str, message: str) -> None:
     job = submitted(store)
-    with child(HANGING, store.database.url, *["lost"] * lost) as hanging:
+    with child(HANGING, store.database.url, *filter(None, [how])) as hanging:
         said, _ = hanging.communicate(timeout=30)
-    assert "search hangs" in said
+    assert message in said
     assert (said.count("went on"), hanging.returncode) == (2, 1)
-    if not lost:
+    if how != "lost":
         assert take_over(store).job.id == job.id
+
+
+BROKEN = """
+import sys, time
+from islands_service.liveness import StopRequest
+from islands_service.coordinator import heartbeat
+from islands_service.store import Store
+with Store(sys.argv[1]) as store:
+    lease = store.leases.claim("broken", 60.0)
+    with heartbeat.Heartbeat(store, lease, 0.3, StopRequest()):
+        def fail(*_):
+            raise MemoryError
+        store.leases.renew = store.leases.is_cancel_requested = fail
+        time.sleep(10.0)
+        print("went on", flush=True)
+"""
+
+
+@pytest.mark.ci
+def test_heartbeat_that_fails_unexpectedly_ends_the_process(store: Store) -> None:
+    """Otherwise the job would run on without a lease and without a guard."""
+    submitted(store)
+    with child(BROKEN, store.database.url) as broken:
+        said, _ = broken.communicate(timeout=30)
+    assert "MemoryError" in said
+    assert "went on" not in said
+    assert broken.returncode == 1
