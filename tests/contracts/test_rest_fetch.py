@@ -171,6 +171,9 @@ def test_an_object_of_a_listed_bucket_is_copied(service: Service, monkeypatch: p
         ("file:///etc/passwd.csv", "none of HTTPS"),
         ("s3://measured/lab/../secret/a.csv", "not one of an object"),
         ("s3://measured/lab//a.csv", "not one of an object"),
+        ("https://xn--]data.example.org/a.csv", "none of HTTPS"),
+        ("https://xn--/a.csv", "HTTPS"),
+        ("s3://measured/lab/a.csv?versionId=1", "not one of an object"),
         ("s3://measured/laboratory/a.csv", "ISLANDS_DATASET_BUCKETS"),
         ("s3://other/lab/a.csv", "ISLANDS_DATASET_BUCKETS"),
     ],
@@ -203,7 +206,12 @@ def test_a_listed_host_with_a_private_address_needs_another_permission(service: 
 
 @pytest.mark.parametrize(
     "target",
-    ["https://other.example.org:{port}/a.csv", "http://data.example.org:{port}/a.csv", "s3://other/a.csv"],
+    [
+        "https://other.example.org:{port}/a.csv",
+        "https://xn--]a.org/a.csv",
+        "http://data.example.org:{port}/a.csv",
+        "s3://other/a.csv",
+    ],
 )
 def test_a_redirect_to_an_address_that_is_not_listed_is_refused(
     service: Service, site: Site, target: str

@@ -71,11 +71,12 @@ class CheckedClient:
         """
         try:
             parsed = httpx.URL(url) if len(url) <= MAX_URL else None
-        except httpx.InvalidURL as error:
+            host = "" if parsed is None else parsed.host
+        except (httpx.InvalidURL, UnicodeError) as error:  # the latter for an invalid international name
             raise OutboundRefusedError(f"the URL is not valid ({error}): give https://HOST/PATH") from error
         if parsed is None:
             raise OutboundRefusedError(f"the URL has more than {MAX_URL} characters: give a shorter one")
-        if parsed.scheme not in _DEFAULT_PORTS or not parsed.host:
+        if parsed.scheme not in _DEFAULT_PORTS or not host:
             raise OutboundRefusedError("the URL is not one of HTTPS: give https://HOST/PATH")
         if not 0 < _get_port(parsed) <= _LAST_PORT:
             raise OutboundRefusedError(f"{parsed.port} is no port: give one from 1 to {_LAST_PORT}")
@@ -121,7 +122,10 @@ class CheckedClient:
             async with httpx.AsyncClient(transport=transport, trust_env=False, timeout=seconds) as client:
                 sent = {"User-Agent": "islands", **(headers or {}), "Accept-Encoding": "identity"}
                 request = client.build_request(method, parsed, headers=sent, content=content)
-                response = await client.send(request, stream=True)
+                try:
+                    response = await client.send(request, stream=True)
+                except UnicodeError as error:  # in the header Location
+                    raise OutboundFailedError(f"{parsed.host} redirects to an invalid host") from error
                 try:
                     yield response
                 finally:

@@ -51,8 +51,8 @@ def find_file_name(source: str) -> str:
 
 def _check_bucket(url: str, settings: ServiceSettings) -> None:
     listed = split_list(settings.dataset_buckets)
-    # Some stores resolve these parts like folders.
-    odd = {"", ".", ".."} & set(url.removeprefix("s3://").split("/"))
+    # Some stores resolve these parts like folders; a question mark would select a version.
+    odd = {"", ".", ".."} & set(url.removeprefix("s3://").split("/")) or {*"?#\\"} & {*url}
     if odd or len(url) > MAX_URL or not url.isprintable():
         raise OutboundRefusedError("the URL is not one of an object: give s3://BUCKET/KEY")
     if not any(url.startswith(f"{bucket}/") for bucket in listed):
@@ -65,16 +65,17 @@ def _check_bucket(url: str, settings: ServiceSettings) -> None:
 def _check_host(url: str, settings: ServiceSettings) -> httpx.URL:
     try:
         parsed = httpx.URL(url) if len(url) <= MAX_URL else None
-    except httpx.InvalidURL:
-        parsed = None
-    if parsed is None or parsed.scheme != "https" or not parsed.host or parsed.userinfo:
+        host = "" if parsed is None else parsed.host
+    except (httpx.InvalidURL, UnicodeError):  # the latter for an invalid international name
+        parsed, host = None, ""
+    if parsed is None or parsed.scheme != "https" or not host or parsed.userinfo:
         raise OutboundRefusedError(
             f"the URL is none of HTTPS without a password, of at most {MAX_URL} characters: give "
             "https://HOST/PATH or s3://BUCKET/KEY"
         )
     if not is_listed(parsed, frozenset(split_list(settings.dataset_hosts))):
         raise OutboundRefusedError(
-            f"{parsed.host} is not a host for data sets: ask the operator of this service to list it in "
+            f"{host} is not a host for data sets: ask the operator of this service to list it in "
             "ISLANDS_DATASET_HOSTS, or upload the file"
         )
     return parsed

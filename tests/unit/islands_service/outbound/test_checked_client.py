@@ -82,6 +82,7 @@ def test_an_allowed_host_receives_the_request_and_its_answer_is_streamed():
         ("https:///path", "not one of HTTPS"),
         ("example.org", "not one of HTTPS"),
         ("file:///etc/passwd", "not one of HTTPS"),
+        ("https://xn--]example.org/", "not valid"),
         ("https://me:secret@example.org/", "user name"),
         ("https://example.org:0/", "no port"),
         ("https://example.org:70000/", "no port"),
