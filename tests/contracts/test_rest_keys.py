@@ -40,6 +40,7 @@ GUARDED = {
     ("POST", "/v1/discrepancies"): "write",
     ("GET", "/v1/datasets"): "read",
     ("POST", "/v1/datasets"): "write",
+    ("POST", "/v1/datasets/fetch"): "write",
     ("GET", "/v1/datasets/{dataset}"): "read",
     ("DELETE", "/v1/datasets/{dataset}"): "write",
     ("GET", "/metrics"): "metrics",
@@ -69,7 +70,7 @@ def send_request(service, method, path, headers):
         body = {"json": held("0-csv")}
     if path.startswith("/v1/admin") and method in ("POST", "PATCH"):
         body = {"json": {}}
-    if (method, path) == ("POST", "/v1/webhooks"):
+    if (method, path) in {("POST", "/v1/webhooks"), ("POST", "/v1/datasets/fetch")}:
         body = {"json": {"url": "https://127.0.0.1"}}
     if (method, path) == ("POST", "/v1/datasets"):
         body = {"files": {"file": ("a.csv", b"")}}
