@@ -32,10 +32,10 @@ class ManyJobs:
         48_000, "individuals that a job evaluates: islands x population x generations"
     )
     islands: float = _option(2, "islands of a job, each on one core")
-    cpu_individuals: float = _option(0.21, "seconds of CPU of 1 000 individuals, measured")
-    cpu_job: float = _option(16, "seconds of CPU of a job in addition: actors, coordinator, result")
+    cpu_individuals: float = _option(0.3, "seconds of CPU of 1 000 individuals, measured")
+    cpu_job: float = _option(13, "seconds of CPU of a job in addition: actors, coordinator, result")
     utilisation: float = _option(0.5, "mean share of the cores that is used, assumed: days have peaks", 1.0)
-    memory_idle: float = _option(900, "MB of a service without a job, measured")
+    memory_idle: float = _option(740, "MB of a service without a job, measured")
     memory_actor: float = _option(300, "MB of an actor, measured: a process and its caches")
     record_kb: float = _option(4_500, "kB of the record of a job and of its reading, measured")
     result_kb: float = _option(150, "kB of blobs that a finished job keeps, measured")
