@@ -40,9 +40,11 @@ nightly: setup
 		--hypothesis-profile thorough -m "nightly or hypothesis"
 	$(MAKE) soak fuzz
 
-# 500 random kills of a service: no job may be lost or duplicated, and results must be identical.
+# 500 random kills and suspensions of a service on each database: no job may be lost or duplicated, and results must
+# be identical.
 soak: setup
 	$(BIN)/python benchmarks/service_soak.py --kills 500 --seed $(DAY)
+	$(BIN)/python benchmarks/service_soak.py --kills 500 --seed $(DAY) --database postgresql
 
 # Five minutes of mutated files for all readers of uploads.
 fuzz: setup

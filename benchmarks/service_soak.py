@@ -222,9 +222,10 @@ def soak(folder: Path, database: str, kills: int, seed: int, minutes: float) -> 
                         f"{reported} kills, {len(client.promised)} jobs, {time.monotonic() - began:.0f} s",
                         flush=True,
                     )
-            killer.join()
             client.finish()
             client.judge()
+            killer.may_end.set()
+            killer.join()
             assert alive([service.process.pid])
     found.seconds = time.monotonic() - began
     found.load = os.getloadavg()[1]

@@ -66,7 +66,7 @@ class Killer(Thread):
         self._victims = {**VICTIMS, **({} if database is None else {"database": DATABASE})}
         # Times at which suspended processes are resumed.
         self._suspended: dict[int, float] = {}
-        self.over = Event()
+        self.over, self.may_end = Event(), Event()
 
     def run(self) -> None:
         try:
@@ -76,6 +76,8 @@ class Killer(Thread):
             for pid in list(self._suspended):
                 self._resume(pid)
             self.over.set()
+            # A PostgreSQL server that this thread has started receives a signal when the thread ends.
+            self.may_end.wait()
 
     def _strike_one(self) -> None:
         (role,) = self._chance.choices(list(self._victims), list(self._victims.values()))

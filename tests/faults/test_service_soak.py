@@ -17,10 +17,14 @@ KILLS = 15
 
 
 @pytest.mark.timeout(900)
-def test_soak_with_kills_loses_duplicates_or_changes_no_job(tmp_path: Path) -> None:
+@pytest.mark.parametrize("database", ["sqlite", "postgresql"])
+def test_soak_with_kills_loses_duplicates_or_changes_no_job(tmp_path: Path, database: str) -> None:
     report = tmp_path / "found.json"
     done = subprocess.run(
-        [sys.executable, SOAK, "--kills", str(KILLS), "--json", report, "--folder", tmp_path],
+        [
+            *(sys.executable, SOAK, "--kills", str(KILLS), "--json", report),
+            *("--folder", tmp_path, "--database", database),
+        ],
         capture_output=True,
         text=True,
         check=False,
