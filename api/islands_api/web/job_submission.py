@@ -1,7 +1,8 @@
 """Job submission, and lookup of jobs and results, for all kinds of jobs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fastapi import Header
@@ -58,7 +59,9 @@ async def submit_job(
         The job could only fail, or its owner has used up a quota.
     """
     submission = Submission(caller.owner, request.spec, kind, request.name, request.priority, key)
-    job, new = await _validate_and_store(state, request, submission, caller.requester)
+    accepted = await _validate_and_store(state, request, submission, caller.requester)
+    job, new = accepted.job, accepted.new
+    state.positions.store((job,), accepted.positions)
     if new:
         state.metrics.accepted.inc()
     headers = {
@@ -92,12 +95,21 @@ def etag(job: Job) -> str:
     return f'"{job.version}"'
 
 
+@dataclass(frozen=True, slots=True)
+class _Accepted:
+    """A stored job, whether it is new, and its position in the queue by its id, if it is queued."""
+
+    job: Job
+    new: bool
+    positions: Mapping[str, int]
+
+
 async def _validate_and_store(
     state: AppState, request: Request, submission: Submission, by: Requester
-) -> tuple[Job, bool]:
-    replayed, inspections = await state.run_blocking(_validate_or_replay, state, request, submission)
-    if replayed is not None:
-        return replayed, False
+) -> _Accepted:
+    accepted, inspections = await state.run_blocking(_store_if_valid, state, request, submission, by)
+    if accepted is not None:
+        return accepted
     for inspection in inspections:
         with ExitStack() as files:
             async with state.inspection_slots.hold(submission.owner):
@@ -110,7 +122,28 @@ async def _validate_and_store(
                     state.settings.inspection_memory,
                     state.settings.inspection_seconds,
                 )
-    return await state.run_blocking(state.store.jobs.submit, submission, state.settings.max_active, by)
+    return await state.run_blocking(_store, state, submission, by)
+
+
+def _store_if_valid(
+    state: AppState, request: Request, submission: Submission, by: Requester
+) -> tuple[_Accepted | None, tuple[PendingInspection, ...]]:
+    """Store a job, unless files must be inspected before; return it, or the inspections.
+
+    One call does everything, since a change of the thread takes as long as a query.
+    """
+    replayed, inspections = _validate_or_replay(state, request, submission)
+    if replayed is not None:
+        return _describe(state, replayed, False), ()
+    return (None, inspections) if inspections else (_store(state, submission, by), ())
+
+
+def _store(state: AppState, submission: Submission, by: Requester) -> _Accepted:
+    return _describe(state, *state.store.jobs.submit(submission, state.settings.max_active, by))
+
+
+def _describe(state: AppState, job: Job, new: bool) -> _Accepted:
+    return _Accepted(job, new, state.store.leases.queue_positions((job,)))
 
 
 def _validate_or_replay(

@@ -200,7 +200,10 @@ class Database:
         committing, began = False, monotonic()
         try:
             with translate_db_errors(), self._writing.begin() as connection:
-                results = [_run_operation(operation, connection) for operation in operations]
+                if len(operations) == 1:  # its error ends the transaction
+                    results: list[_OperationResult] = [(operations[0](connection), None)]
+                else:
+                    results = [_run_operation(operation, connection) for operation in operations]
                 committing = True
         except StoreCollisionError:
             raise
