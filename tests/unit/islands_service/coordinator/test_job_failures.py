@@ -62,7 +62,12 @@ def test_failed_job_has_a_typed_problem_and_does_not_block_others(
 
 @pytest.mark.parametrize(
     "error",
-    [OSError(errno.ESTALE, "Stale file handle", "/data/blobs/ab"), MemoryError(), ConnectionResetError()],
+    [
+        OSError(errno.ESTALE, "Stale file handle", "/data/blobs/ab"),
+        MemoryError(),
+        ConnectionResetError(),
+        ImportError("/data/lib.so: failed to map segment from shared object", path="/data/lib.so"),
+    ],
 )
 def test_job_is_tried_again_after_a_transient_error(
     store: Store, job: Job, coordinator: Coordinators, monkeypatch: pytest.MonkeyPatch, error: Exception
