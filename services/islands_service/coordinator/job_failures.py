@@ -11,8 +11,8 @@ from islands.errors import IslandsError
 from islands_service.domain.job import ISLANDS_VERSION
 from islands_service.store.blobs import BlobNotFoundError
 
-#: Errors of the machine, which may pass: the job is tried again. An import fails if there is no memory for the
-#: library, or while the packages of the machine are replaced.
+#: Errors of the machine, which may pass: the job is tried again. An import fails if there is no memory for
+#: the library, or while the packages of the machine are replaced.
 TRANSIENT_ERRORS = (OSError, MemoryError, ImportError)
 
 #: Seconds until the second attempt after a transient error; doubled by every further one.

@@ -81,6 +81,8 @@ class EpochScheduler(Generic[T]):
 
     def ready_tasks(self) -> Iterator[EpochTask]:
         """Yield the tasks that may be submitted, earlier epochs first, and mark each as submitted."""
+        if self.finished:
+            return
         begin, end = self.completed_generation, self._next_stop(self.completed_generation)
         for _ in range(self._ahead):
             for island, sent in self._sent.items():

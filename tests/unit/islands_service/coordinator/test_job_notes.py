@@ -44,7 +44,7 @@ def test_message_about_waiting_is_repeated_while_the_progress_shows_it(monkeypat
     """Otherwise the owner would no longer see it after a minute."""
     assert actor_pool.WAITING_NOTICE_EVERY < job_notes.SHOWN_SECONDS
     said = []
-    monkeypatch.setattr(actor_pool, "_put", lambda problem: problem)
+    monkeypatch.setattr(actor_pool, "put_problem", lambda problem: problem)
     pool = IslandActorPool(None, 2, said.append)
     pool._size, pool._joining = 2, {0: None, 1: None}
     begin = pool._waiting_since
