@@ -86,6 +86,9 @@ class OwnerChanges(BaseModel):
     ] = None
     max_active: Annotated[Quota, Field(description="Queued and running jobs.")] = None
     max_running: Annotated[Quota, Field(description="Running jobs; further ones stay in the queue.")] = None
+    max_islands: Annotated[
+        Quota, Field(description="Islands of the running jobs; further jobs stay in the queue.")
+    ] = None
     max_uploads: Annotated[Quota, Field(description="Uploads in progress, of each API process.")] = None
     max_stored: Annotated[Quota, Field(description="Bytes of data sets.")] = None
     max_streams: Annotated[Quota, Field(description="Open event streams, of each API process.")] = None
@@ -104,6 +107,7 @@ class OwnerView(ResponseModel):
     weight: int
     max_active: int | None = None
     max_running: int | None = None
+    max_islands: int | None = None
     max_uploads: int | None = None
     max_stored: int | None = None
     max_streams: int | None = None
@@ -111,6 +115,7 @@ class OwnerView(ResponseModel):
     dataset_retention: int | None = None
     queued: int = Field(description="Number of queued jobs.")
     running: int = Field(description="Number of running jobs.")
+    running_islands: int = Field(description="Islands of the running jobs.")
     stored: int = Field(description="Bytes of data sets.")
 
 

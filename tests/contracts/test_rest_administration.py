@@ -12,7 +12,7 @@ from support.stores import FOUND, claimed
 
 @pytest.fixture(scope="module")
 def shared(serve):
-    with serve(require_keys=True, rate=0.0, max_active=3) as running:
+    with serve(require_keys=True, rate=0.0, max_active=3, max_running_islands=5) as running:
         yield running
 
 
@@ -87,7 +87,9 @@ def test_owners_are_listed_with_their_quotas_and_use(service, admin, change):
     answer = service.client.get("/v1/admin/owners", headers=admin)
     me, operator = OwnerPage.model_validate(answer.json()).items
     assert (operator.name, operator.weight, operator.queued) == ("operator", 100, 0)
-    assert me == OwnerView(name="me", weight=250, max_running=0, queued=1, running=1, stored=7)
+    assert me == OwnerView(
+        name="me", weight=250, max_running=0, queued=1, running=1, running_islands=1, stored=7
+    )
     assert service.client.get("/v1/admin/owners/me", headers=admin).json() == answer.json()["items"][0]
 
 
@@ -115,6 +117,16 @@ def test_quota_of_active_jobs_of_an_owner_precedes_the_setting(service, mine, ch
     change(max_active=0)
     other = service.key(owner="them")
     assert service.submit(other, **spec(kept(service.store, "them"))).status_code == 202
+
+
+def test_quota_of_running_islands_of_an_owner_precedes_the_setting(service, mine, change):
+    order = spec(kept(service.store, "me"), settings={"islands": 6})
+    answer = service.submit(mine, **order)
+    assert "6 islands, and your running jobs may have 5" in problem_of(answer, 422, "invalid-settings")
+    assert change(max_islands=6).json()["max_islands"] == 6
+    assert service.submit(mine, **order).status_code == 202
+    claimed(service.store)
+    assert change(max_islands=5).json()["running_islands"] == 6
 
 
 @pytest.mark.ci

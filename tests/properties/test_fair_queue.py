@@ -4,6 +4,7 @@ import shutil
 import time
 from collections import Counter
 from itertools import pairwise
+from uuid import uuid4
 
 import pytest
 from hypothesis import given, settings
@@ -12,7 +13,7 @@ from sqlalchemy import delete, insert
 
 from islands_service.store import Store
 from islands_service.store.tables import events, jobs, owners
-from support.stores import claimed
+from support.stores import CANCELLED, LONG, claimed
 
 OWNERS = "abcd"
 
@@ -41,8 +42,8 @@ def start(store, weighted):
     store.database.write(operation)
 
 
-def submit(store, *several, first=0):
-    """Queue jobs of some owners, an owner for each, in one transaction."""
+def submit(store, *several, first=0, islands=None):
+    """Queue jobs of some owners, an owner and optionally islands for each, in one transaction."""
     rows = [
         {
             "id": f"{first + number:032x}",
@@ -55,6 +56,7 @@ def submit(store, *several, first=0):
             "state": "queued",
             "created": float(first + number),
             "updated": 0.0,
+            "islands": 1 if islands is None else islands[number],
         }
         for number, owner in enumerate(several)
     ]
@@ -147,6 +149,42 @@ def test_positions_are_the_order_of_the_claims(fair, weighted, queued, before):
     order = [claimed(fair).job.id for _ in waiting]
     assert sorted(positions, key=positions.__getitem__) == order
     assert sorted(positions.values()) == list(range(1, len(waiting) + 1))
+
+
+@pytest.mark.ci
+@few
+@given(
+    st.lists(st.tuples(st.sampled_from("ab"), st.integers(1, 6)), min_size=1, max_size=12),
+    st.lists(st.integers(0, 3) | st.none(), max_size=30),
+)
+def test_running_islands_keep_the_quota_and_every_job_is_claimed_in_order(fair, several, steps):
+    """Whatever the order of claims (None) and ends: of one owner no job overtakes another."""
+    start(fair, {})
+    submit(fair, *(owner for owner, _ in several), islands=[islands for _, islands in several])
+    waiting = {name: [job for job in enumerate(several) if job[1][0] == name] for name in "ab"}
+    running = []
+
+    def fits(owner):
+        used = sum(islands for _, (name, islands) in running if name == owner)
+        return used == 0 or used + waiting[owner][0][1][1] <= 4
+
+    def claim():
+        ready = {owner for owner, left in waiting.items() if left and fits(owner)}
+        lease = fair.leases.claim(uuid4().hex, LONG, most_islands=4)
+        assert (lease.job.owner in ready) if ready else (lease is None)
+        if lease is not None:
+            number, job = waiting[lease.job.owner].pop(0)
+            assert lease.job.created == number
+            running.append((lease, job))
+
+    for step in steps:
+        if step is None:
+            claim()
+        elif running:
+            fair.leases.finish(running.pop(step % len(running))[0], CANCELLED)
+    while any(waiting.values()):
+        claim()
+        fair.leases.finish(running.pop()[0], CANCELLED)
 
 
 @pytest.mark.ci

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from fastapi import Header
@@ -16,7 +16,7 @@ from islands_api.web.responses import JSONDocument, job_document
 from islands_service.domain.job import Job, JobState, Requester, Submission
 from islands_service.intake.file_inspection import inspect_file
 from islands_service.intake.job_inputs import link_blob
-from islands_service.intake.job_validation import PendingInspection, validate_job
+from islands_service.intake.job_validation import ValidJob, validate_job
 
 #: Path of jobs of every kind.
 JOBS_PATH = "/v1/jobs"
@@ -107,10 +107,10 @@ class _Accepted:
 async def _validate_and_store(
     state: AppState, request: Request, submission: Submission, by: Requester
 ) -> _Accepted:
-    accepted, inspections = await state.run_blocking(_store_if_valid, state, request, submission, by)
-    if accepted is not None:
-        return accepted
-    for inspection in inspections:
+    found = await state.run_blocking(_store_if_valid, state, request, submission, by)
+    if isinstance(found, _Accepted):
+        return found
+    for inspection in found.inspections:
         with ExitStack() as files:
             async with state.inspection_slots.hold(submission.owner):
                 holding = state.blobs.hold(inspection.dataset.blob)
@@ -122,46 +122,46 @@ async def _validate_and_store(
                     state.settings.inspection_memory,
                     state.settings.inspection_seconds,
                 )
-    return await state.run_blocking(_store, state, submission, by)
+    return await state.run_blocking(_store, state, submission, found, by)
 
 
 def _store_if_valid(
     state: AppState, request: Request, submission: Submission, by: Requester
-) -> tuple[_Accepted | None, tuple[PendingInspection, ...]]:
-    """Store a job, unless files must be inspected before; return it, or the inspections.
+) -> _Accepted | ValidJob:
+    """Store a job and return it, unless files must be inspected before.
 
     One call does everything, since a change of the thread takes as long as a query.
     """
-    replayed, inspections = _validate_or_replay(state, request, submission)
-    if replayed is not None:
-        return _describe(state, replayed, False), ()
-    return (None, inspections) if inspections else (_store(state, submission, by), ())
+    found = _validate_or_replay(state, request, submission)
+    if isinstance(found, Job):
+        return _describe(state, found, False)
+    return found if found.inspections else _store(state, submission, found, by)
 
 
-def _store(state: AppState, submission: Submission, by: Requester) -> _Accepted:
-    return _describe(state, *state.store.jobs.submit(submission, state.settings.max_active, by))
+def _store(state: AppState, submission: Submission, valid: ValidJob, by: Requester) -> _Accepted:
+    settings, submission = state.settings, replace(submission, islands=valid.islands)
+    submit = state.store.jobs.submit
+    return _describe(state, *submit(submission, settings.max_active, by, settings.max_running_islands))
 
 
 def _describe(state: AppState, job: Job, new: bool) -> _Accepted:
     return _Accepted(job, new, state.store.leases.queue_positions((job,)))
 
 
-def _validate_or_replay(
-    state: AppState, request: Request, submission: Submission
-) -> tuple[Job | None, tuple[PendingInspection, ...]]:
-    """Return the job that an earlier request with the same key created, and the inspections that are needed.
+def _validate_or_replay(state: AppState, request: Request, submission: Submission) -> Job | ValidJob:
+    """Return the job that an earlier request with the same key created, or what the validation found.
 
     The earlier job is looked up only if it saves an inspection or a rejection: an accepted job stays
     accepted, even if its data set has been deleted since. In all other cases `Jobs.submit` finds it, in the
     transaction that stores the job.
     """
     try:
-        inspections = validate_job(request, submission.owner, state.store, state.settings)
+        valid = validate_job(request, submission.owner, state.store, state.settings)
     except IslandsError:
         if (replayed := state.store.jobs.find_replay(submission)) is not None:
-            return replayed, ()
+            return replayed
         raise
-    return state.store.jobs.find_replay(submission) if inspections else None, inspections
+    return (state.store.jobs.find_replay(submission) if valid.inspections else None) or valid
 
 
 async def get_job_of_kind(state: AppState, caller: Principal, job: str, kind: str) -> Job:

@@ -129,6 +129,7 @@ def owner_document(owner: Owner) -> dict[str, Any]:
         **owner.quotas,
         "queued": owner.queued,
         "running": owner.running,
+        "running_islands": owner.running_islands,
         "stored": owner.stored,
     }
 

@@ -118,7 +118,10 @@ class Coordinator:
         try:
             self._sweeper.sweep_if_due()
             lease = self._store.leases.claim(
-                self._name, self._settings.lease, most_running=self._settings.max_running
+                self._name,
+                self._settings.lease,
+                most_running=self._settings.max_running,
+                most_islands=self._settings.max_running_islands,
             )
             if lease is None:
                 self._idle()

@@ -128,6 +128,8 @@ class Submission:
         Of the jobs of an owner, those of higher priority run first; one of `PRIORITIES`.
     idempotency_key : str, optional
         A repeated request with the same key returns the same job.
+    islands : int
+        Islands that run at once, which count towards the quota of the owner.
     """
 
     owner: str
@@ -136,6 +138,7 @@ class Submission:
     name: str = ""
     priority: int = 0
     idempotency_key: str | None = None
+    islands: int = 1
 
     @property
     def request(self) -> str:

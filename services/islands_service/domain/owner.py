@@ -27,6 +27,8 @@ class Quotas:
         Queued and running jobs.
     max_running : int
         Running jobs. Further ones stay in the queue.
+    max_islands : int or None
+        Islands of the running jobs; None is no limit. Further jobs stay in the queue.
     max_uploads : int
         Uploads in progress.
     max_stored : int
@@ -41,6 +43,7 @@ class Quotas:
 
     max_active: int
     max_running: int
+    max_islands: int | None
     max_uploads: int
     max_stored: int
     max_streams: int
@@ -64,6 +67,8 @@ class Owner:
         Quota by name; None is the default of the settings.
     queued, running : int
         Number of jobs.
+    running_islands : int
+        Islands of the running jobs.
     stored : int
         Total size of the data sets in bytes.
     """
@@ -73,6 +78,7 @@ class Owner:
     quotas: Mapping[str, int | None]
     queued: int
     running: int
+    running_islands: int
     stored: int
 
 
@@ -81,6 +87,7 @@ def default_quotas(settings: ServiceSettings) -> Quotas:
     return Quotas(
         settings.max_active,
         settings.max_running,
+        settings.max_running_islands,
         settings.max_uploads_per_owner,
         settings.max_stored,
         settings.max_streams,

@@ -45,10 +45,18 @@ class PendingInspection:
     request: InspectionRequest
 
 
+@dataclass(frozen=True, slots=True)
+class ValidJob:
+    """Number of islands of a job, and the inspections that its data sets still need."""
+
+    islands: int
+    inspections: tuple[PendingInspection, ...]
+
+
 def validate_job(
     spec: Identification | Discrepancy, owner: str, store: Store, settings: ServiceSettings
-) -> tuple[PendingInspection, ...]:
-    """Reject a job that can only fail; return the inspections that its data sets still need.
+) -> ValidJob:
+    """Reject a job that can only fail.
 
     Raises
     ------
@@ -62,7 +70,8 @@ def validate_job(
         The simulation contains an invalid model.
     """
     pending = []
-    parts = _parts(spec, settings)
+    islands = _check_spec(spec, settings)
+    parts = list(spec.parts)
     datasets = [store.datasets.get(owner, part.dataset) for part in parts]
     _check_disjoint(parts, datasets)
     if spec.dt is None:
@@ -72,21 +81,20 @@ def validate_job(
             reading = dataset.preview.get("reading", {})
             request = InspectionRequest(spec.inputs, spec.output, spec.dt, part.rows, reading)
             pending.append(PendingInspection(dataset, request))
-    return tuple(pending)
+    return ValidJob(islands, tuple(pending))
 
 
-def _parts(spec: Identification | Discrepancy, settings: ServiceSettings) -> list[Part]:
+def _check_spec(spec: Identification | Discrepancy, settings: ServiceSettings) -> int:
+    """Check a job without its data; return the number of its islands, 1 for a diagnosis."""
     if isinstance(spec, Discrepancy):
-        return _check_discrepancy(spec)
-    return _check_identification(spec, settings)
-
-
-def _check_identification(spec: Identification, settings: ServiceSettings) -> list[Part]:
-    """Check the settings of an identification; return the data that it reads."""
+        _check_discrepancy(spec)
+        return 1
     resolved = resolve_job_settings(spec, settings.max_islands, settings.max_evaluations)
     limit = settings.max_job_memory or int(DEFAULT_SHARE * machine_memory())
-    estimate_memory(resolved).check_limit(limit)
-    return list(spec.parts)
+    memory = estimate_memory(resolved)
+    memory.check_limit(limit)
+    # All kinds of the preset auto have the same number.
+    return memory.islands
 
 
 def _check_disjoint(parts: list[Part], datasets: list[StoredDataset]) -> None:
@@ -110,8 +118,8 @@ def _check_sampling(datasets: list[StoredDataset]) -> None:
             )
 
 
-def _check_discrepancy(spec: Discrepancy) -> list[Part]:
-    """Check the simulation and the columns of a discrepancy job; return the recordings that it reads."""
+def _check_discrepancy(spec: Discrepancy) -> None:
+    """Check the simulation and the columns of a discrepancy job."""
     _check_simulation(spec)
     if spec.input in spec.channels:
         raise RecordError(f"channel {spec.input} is the input itself: leave it out")
@@ -121,7 +129,6 @@ def _check_discrepancy(spec: Discrepancy) -> list[Part]:
                 f"column {name} is given as the simulation and also as an input, a channel or the "
                 "output: choose another column for one of them"
             )
-    return list(spec.parts)
 
 
 def _check_simulation(spec: Discrepancy) -> None:

@@ -10,6 +10,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from islands.errors import SettingsError
 from islands_service.settings.setting_checks import (
+    DEFAULT_ROLES,
     BlobStore,
     Buckets,
     Count,
@@ -86,8 +87,9 @@ class ServiceSettings(BaseSettings):
         Largest total size of the data sets of one owner.
     max_active
         Queued and running jobs of one owner.
-    max_running
-        Running jobs of one owner; further ones stay in the queue.
+    max_running, max_running_islands
+        Running jobs of one owner, and the sum of their islands, which is unlimited by default. Further jobs
+        stay in the queue.
     max_streams
         Open event streams of one owner, of each API process.
     max_drawings
@@ -179,6 +181,7 @@ class ServiceSettings(BaseSettings):
     max_stored: Count = 5_000_000_000
     max_active: Count = 10_000
     max_running: Count = 1000
+    max_running_islands: Count | None = None
     max_streams: Count = 1000
     max_drawings: Count = 100
     max_evaluations: Count = 10_000_000_000
@@ -195,10 +198,7 @@ class ServiceSettings(BaseSettings):
     oidc_audience: str = ""
     oidc_owner_claim: Annotated[str, Field(min_length=1)] = "sub"
     oidc_role_claim: Annotated[str, Field(min_length=1)] = "roles"
-    oidc_roles: str = (
-        "islands-reader=reader,islands-submitter=submitter,islands-monitor=monitor,"
-        "islands-administrator=administrator"
-    )
+    oidc_roles: str = DEFAULT_ROLES
     oidc_algorithms: str = "RS256,PS256,ES256,Ed25519"
     oidc_leeway: Annotated[float, Field(ge=0.0, le=300.0)] = 30.0
     tls_certificate: Path | None = None

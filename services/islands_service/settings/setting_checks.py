@@ -7,6 +7,12 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
+#: Roles by the values of the claim of roles, if an issuer is given.
+DEFAULT_ROLES = (
+    "islands-reader=reader,islands-submitter=submitter,islands-monitor=monitor,"
+    "islands-administrator=administrator"
+)
+
 #: Label of a host name, and an optional port after the name or after an address in brackets.
 _HOST = re.compile(r"(?:[A-Za-z0-9_](?:[A-Za-z0-9._-]{0,252})|\[[0-9A-Fa-f:.]+\])(?::[0-9]{1,5})?")
 

@@ -32,7 +32,7 @@ from islands_service.store.job_rows.job_events import append_event, job_from_row
 from islands_service.store.job_rows.queue_statistics import QueueStatistics, read_queue_statistics
 from islands_service.store.job_rows.submission_checks import (
     check_datasets,
-    check_quota,
+    check_quotas,
     find_accepted_job,
     request_digest,
 )
@@ -70,9 +70,15 @@ class Jobs:
         self._database = database
 
     def submit(
-        self, submission: Submission, most_active: int | None = None, by: Requester | None = None
+        self,
+        submission: Submission,
+        most_active: int | None = None,
+        by: Requester | None = None,
+        most_islands: int | None = None,
     ) -> tuple[Job, bool]:
         """Accept a job durably; return it, and whether it is new.
+
+        Quotas of the owner precede ``most_active`` and ``most_islands``.
 
         Raises
         ------
@@ -81,7 +87,9 @@ class Jobs:
         JobDeletedError
             The job of the key was deleted.
         QuotaError
-            The owner has as many unfinished jobs as its quota, ``most_active`` unless another one is set.
+            The owner has as many unfinished jobs as its quota.
+        SettingsError
+            The job has more islands than the running jobs of the owner may have together.
         StoreUnavailableError, StorageFullError
             The job was not accepted.
         """
@@ -91,8 +99,7 @@ class Jobs:
             dialect.lock_owner(connection, submission.owner)
             if (existing := find_accepted_job(connection, submission)) is not None:
                 return existing, False
-            if most_active is not None:
-                check_quota(connection, submission.owner, most_active)
+            check_quotas(connection, submission.owner, most_active, submission.islands, most_islands)
             values = {
                 "id": uuid4().hex,
                 "owner": submission.owner,
@@ -102,6 +109,7 @@ class Jobs:
                 "request_sha256": request_digest(submission),
                 "idempotency_key": submission.idempotency_key,
                 "priority": submission.priority,
+                "islands": submission.islands,
             }
             row = connection.execute(_INSERT_JOB, values).one()
             append_event(connection, row, "queued")
@@ -207,8 +215,7 @@ class Jobs:
                     f"job {job} is {current.state}: only a failed or cancelled job can be resumed"
                 )
             check_datasets(connection, job_from_row(current))
-            if most_active is not None:
-                check_quota(connection, owner, most_active)
+            check_quotas(connection, owner, most_active)
             row = update_job(
                 connection,
                 job,

@@ -48,6 +48,7 @@ class Leases:
         seconds: float,
         version: str = ISLANDS_VERSION,
         most_running: int | None = None,
+        most_islands: int | None = None,
     ) -> Lease | None:
         """Claim a job; None if no job can be claimed.
 
@@ -55,7 +56,8 @@ class Leases:
         process at a time has a name, so the previous one must have ended. Then the owners with queued jobs
         are served in turn, in proportion to their weights (`job_rows.fair_queue`); of each the oldest job of
         the highest priority. A queued job cannot be claimed while it waits for a repeated attempt, or if a
-        coordinator of this version has declined it.
+        coordinator of this version has declined it. While it exceeds the quota of islands, it and the jobs
+        after it wait, unless the owner runs nothing.
 
         Parameters
         ----------
@@ -65,12 +67,12 @@ class Leases:
             Duration of the lease; `renew` extends it.
         version : str
             Version of islands of the coordinator.
-        most_running : int, optional
-            Quota of running jobs of an owner for which none was set; unlimited by default.
+        most_running, most_islands : int, optional
+            Quotas of running jobs, and of their islands, of an owner for which none were set; unlimited by
+            default.
         """
-        return self._database.write(
-            lambda connection: claim_job(connection, coordinator, seconds, version, most_running)
-        )
+        asked = (coordinator, seconds, version, most_running, most_islands)
+        return self._database.write(lambda connection: claim_job(connection, *asked))
 
     def renew(self, lease: Lease, seconds: float) -> bool:
         """Extend a lease; return whether cancellation of the job is requested.
@@ -90,10 +92,7 @@ class Leases:
         return self._database.write(operation)
 
     def queue_positions(self, found: Iterable[Job]) -> dict[str, int]:
-        """Estimate the positions of the queued ones of some jobs in the order of claims; 1 is claimed next.
-
-        They hold if every queued job can be claimed, and no other one arrives.
-        """
+        """Return the positions of the queued ones of some jobs; see `estimate_positions`."""
         with self._database.read() as connection:
             return estimate_positions(connection, found)
 

@@ -70,13 +70,23 @@ jobs = Table(
     Column("not_before", Float, nullable=False, server_default=text("0")),
     # Versions of islands that cannot read the job, each in commas.
     Column("declined", Text, nullable=False, server_default=""),
+    # Islands of the search; 1 for a diagnosis.
+    Column("islands", Integer, nullable=False, server_default=text("1")),
     UniqueConstraint("owner", "idempotency_key"),
     Index(None, "owner", "created", "id"),
     Index(None, "owner", "state", "created", "id"),
 )
 
-#: Owners with queued jobs, and the order of the jobs of each.
-Index("ix_jobs_queue", jobs.c.state, jobs.c.owner, jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
+#: Owners with queued jobs, and the order of the jobs of each. The islands of running jobs are summed in it.
+Index(
+    "ix_jobs_queue",
+    jobs.c.state,
+    jobs.c.owner,
+    jobs.c.priority.desc(),
+    jobs.c.created,
+    jobs.c.id,
+    jobs.c.islands,
+)
 
 #: Events of jobs. The number is the version of the job: without gaps, in the order of the commits.
 events = Table(

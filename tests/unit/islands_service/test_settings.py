@@ -35,6 +35,7 @@ def test_arguments_precede_the_environment_and_that_precedes_defaults(monkeypatc
         ("checkpoint_every", "-1"),
         ("max_upload", "0"),
         ("max_islands", "0"),
+        ("max_running_islands", "0"),
         ("max_active", "many"),
         ("inspection_seconds", "0"),
         ("rate", "-1"),

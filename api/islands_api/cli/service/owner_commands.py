@@ -32,13 +32,13 @@ def list_owners(
         return
     table = Table(
         Column("owner", overflow="fold"),
-        *(Column(name, justify="right") for name in ("weight", "queued", "running", "stored MB")),
+        *(Column(name, justify="right") for name in ("weight", "queued", "running", "islands", "stored MB")),
         Column("quotas", overflow="fold"),
     )
     for owner in found:
         stored = f"{owner.stored / 1e6:.1f}"
         # Names may contain characters that Rich takes for markup.
-        numbers = (str(number) for number in (owner.weight, owner.queued, owner.running))
+        numbers = map(str, (owner.weight, owner.queued, owner.running, owner.running_islands))
         table.add_row(Text(owner.name), *numbers, stored, _describe_quotas(owner))
     output.print(table)
 
@@ -52,6 +52,10 @@ def set_owner(
     max_active: Annotated[int | None, typer.Option("--max-active", help="Queued and running jobs.")] = None,
     max_running: Annotated[
         int | None, typer.Option("--max-running", help="Running jobs; further ones stay in the queue.")
+    ] = None,
+    max_islands: Annotated[
+        int | None,
+        typer.Option("--max-islands", help="Islands of the running jobs; further jobs stay in the queue."),
     ] = None,
     max_uploads: Annotated[
         int | None, typer.Option("--max-uploads", help="Uploads in progress, of each API process.")
@@ -80,6 +84,7 @@ def set_owner(
         "weight": weight,
         "max_active": max_active,
         "max_running": max_running,
+        "max_islands": max_islands,
         "max_uploads": max_uploads,
         "max_stored": max_stored,
         "max_streams": max_streams,

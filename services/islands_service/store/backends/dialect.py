@@ -66,8 +66,8 @@ def lock_owner(connection: Connection, owner: str) -> None:
 def lock_claims(connection: Connection) -> None:
     """Hold the lock of claims until the transaction ends.
 
-    Without it two coordinators could serve the same owner in the same turn, or exceed its quota of running
-    jobs. No transaction that holds it waits for another lock for longer than a commit.
+    Without it two coordinators could serve the same owner in the same turn, or exceed its quotas of
+    running jobs and islands. No transaction that holds it waits for another lock for longer than a commit.
     """
     _lock(connection, _CLAIM_LOCK, "")
 

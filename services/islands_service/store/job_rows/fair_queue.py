@@ -71,18 +71,28 @@ def _select_waiting() -> CTE:
 def _select_ranked() -> Select[Any]:
     waiting = _select_waiting()
     running = (
-        select(jobs.c.owner, func.count().label("count"))
+        select(jobs.c.owner, func.count().label("count"), func.sum(jobs.c.islands).label("islands"))
         .where(jobs.c.state == JobState.RUNNING)
         .group_by(jobs.c.owner)
         .subquery()
     )
     most = func.coalesce(owners.c.max_running, bindparam("most_running", type_=BigInteger))
+    most_islands = func.coalesce(owners.c.max_islands, bindparam("most_islands", type_=BigInteger))
+    islands = func.coalesce(running.c.islands, 0)
     return (
-        select(waiting.c.owner.label("name"), _NEXT.label("next"), _NOW.label("now"))
+        select(
+            waiting.c.owner.label("name"),
+            _NEXT.label("next"),
+            _NOW.label("now"),
+            islands.label("islands"),
+            most_islands.label("most_islands"),
+        )
         .outerjoin(owners, owners.c.name == waiting.c.owner)
         .outerjoin(running, running.c.owner == waiting.c.owner)
         .where(waiting.c.owner.is_not(None))
         .where(or_(most.is_(None), func.coalesce(running.c.count, 0) < most))
+        # Every job has an island.
+        .where(or_(most_islands.is_(None), islands < most_islands))
         .order_by("next", "name")
     )
 
@@ -111,15 +121,26 @@ def _select_own_earlier() -> Select[Any]:
 _RANKED, _BACKLOGS, _OWN_EARLIER = _select_ranked(), _select_backlogs(), _select_own_earlier()
 
 
-def rank_owners(connection: Connection, most_running: int | None) -> CursorResult[Any]:
-    """Return the owners with queued jobs in the order of their turns: ``name``, ``next`` and ``now``.
+def rank_owners(
+    connection: Connection, most_running: int | None, most_islands: int | None
+) -> CursorResult[Any]:
+    """Return the owners with queued jobs in the order of their turns, for `has_room` and `charge_owner`.
 
     Parameters
     ----------
-    most_running : int, optional
-        Quota of running jobs of an owner that has no other one. Owners that have used it up are omitted.
+    most_running, most_islands : int, optional
+        Quotas of running jobs, and of their islands, of an owner that has no other ones. Owners that have
+        used up one of them are omitted.
     """
-    return connection.execute(_RANKED, {"most_running": most_running})
+    return connection.execute(_RANKED, {"most_running": most_running, "most_islands": most_islands})
+
+
+def has_room(turn: Row[Any], islands: int) -> bool:
+    """Return whether an owner may run a job with these islands, given its row of `rank_owners`.
+
+    A job with more islands than the quota, which was lowered after the submission, runs alone.
+    """
+    return turn.most_islands is None or turn.islands == 0 or turn.islands + islands <= turn.most_islands
 
 
 def charge_owner(connection: Connection, turn: Row[Any]) -> None:

@@ -8,19 +8,16 @@ from sqlalchemy import Connection, Row, Select, and_, func, or_, select
 from islands_service.domain.job import JobState, Lease
 from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
-from islands_service.store.job_rows.fair_queue import charge_owner, rank_owners
+from islands_service.store.job_rows.fair_queue import charge_owner, has_room, rank_owners
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document, update_job
 from islands_service.store.tables import jobs
 
 #: Attempts since the last checkpoint after which a job is given up.
 ATTEMPTS = 5
 
-#: A job that no other transaction has locked.
-_CANDIDATE: Select[Any] = (
-    select(jobs.c.id, jobs.c.stalled, jobs.c.cancel_requested, jobs.c.progress)
-    .limit(1)
-    .with_for_update(skip_locked=True)
-)
+_CANDIDATE: Select[Any] = select(
+    jobs.c.id, jobs.c.stalled, jobs.c.cancel_requested, jobs.c.progress, jobs.c.islands
+).limit(1)
 
 #: True if the clock of the database has gone back by more than a second since the last change of a job. Times
 #: that were set before may lie far in the future.
@@ -36,7 +33,12 @@ GAVE_UP = {
 
 
 def claim_job(
-    connection: Connection, coordinator: str, seconds: float, version: str, most_running: int | None
+    connection: Connection,
+    coordinator: str,
+    seconds: float,
+    version: str,
+    most_running: int | None,
+    most_islands: int | None,
 ) -> Lease | None:
     """Claim a lost job, or the first queued job of the owner whose turn it is; see `Leases.claim`."""
     while (found := _select_lost(connection, coordinator, seconds)) is not None:
@@ -44,13 +46,19 @@ def claim_job(
             return _lease_job(connection, found.id, coordinator, seconds)
         _give_up(connection, found)
     dialect.lock_claims(connection)
-    with rank_owners(connection, most_running) as turns:
+    with rank_owners(connection, most_running, most_islands) as turns:
         for turn in turns:
+            if not _fits_first(connection, turn, version):
+                # Smaller jobs behind the first one wait too: otherwise they could delay it for ever.
+                continue
             while (found := _select_queued(connection, turn.name, version)) is not None:
-                if found.stalled < ATTEMPTS:
+                if found.stalled >= ATTEMPTS:
+                    _give_up(connection, found)
+                elif has_room(turn, found.islands):
                     charge_owner(connection, turn)
                     return _lease_job(connection, found.id, coordinator, seconds)
-                _give_up(connection, found)
+                else:
+                    break
     return None
 
 
@@ -60,16 +68,30 @@ def _select_lost(connection: Connection, coordinator: str, seconds: float) -> Ro
     never_expires = and_(jobs.c.lease_until > now() + seconds, _CLOCK_WENT_BACK)
     ended = or_(jobs.c.lease_until < now(), jobs.c.lease_owner == coordinator, never_expires)
     query = _CANDIDATE.where(jobs.c.state == JobState.RUNNING, ended).order_by(jobs.c.created, jobs.c.id)
-    return connection.execute(query).one_or_none()
+    return connection.execute(query.with_for_update(skip_locked=True)).one_or_none()
 
 
-def _select_queued(connection: Connection, owner: str, version: str) -> Row[Any] | None:
+def _fits_first(connection: Connection, turn: Row[Any], version: str) -> bool:
+    """Return whether an owner may run the first of its queued jobs.
+
+    The row is not locked: in PostgreSQL a lock is a write, which each attempt of a coordinator would repeat
+    while the job waits. A job that a client cancels at this moment is not passed over either.
+    """
+    if turn.most_islands is None or turn.islands == 0:
+        return True
+    first = _select_queued(connection, turn.name, version, locked=False)
+    return first is None or first.stalled >= ATTEMPTS or has_room(turn, first.islands)
+
+
+def _select_queued(connection: Connection, owner: str, version: str, locked: bool = True) -> Row[Any] | None:
     query = _CANDIDATE.where(
         jobs.c.state == JobState.QUEUED,
         jobs.c.owner == owner,
         or_(jobs.c.not_before <= now(), _CLOCK_WENT_BACK),
         ~jobs.c.declined.contains(f",{version},", autoescape=True),
     ).order_by(jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
+    if locked:
+        query = query.with_for_update(skip_locked=True)
     return connection.execute(query).one_or_none()
 
 

@@ -1,9 +1,20 @@
-"""Checks inside the transaction that queues a job: idempotency key, data sets and quota."""
+"""Checks inside the transaction that queues a job: idempotency key, data sets and quotas."""
 
 import hashlib
+from typing import Any
 
-from sqlalchemy import BigInteger, BindParameter, Connection, bindparam, func, select
+from sqlalchemy import (
+    BigInteger,
+    BindParameter,
+    Column,
+    ColumnElement,
+    Connection,
+    bindparam,
+    func,
+    select,
+)
 
+from islands.errors import SettingsError
 from islands_service.domain.job import (
     ACTIVE,
     DatasetDeletedError,
@@ -23,13 +34,18 @@ _ACCEPTED = select(jobs).where(jobs.c.owner == _OF_OWNER, jobs.c.idempotency_key
 _RETIRED = select(retired_keys).where(
     retired_keys.c.owner == _OF_OWNER, retired_keys.c.idempotency_key == _OF_KEY
 )
-_QUOTA = (
+
+
+def _select_own(quota: Column[Any], default: str) -> ColumnElement[Any]:
+    own = select(quota).where(owners.c.name == _OF_OWNER).scalar_subquery()
+    return func.coalesce(own, bindparam(default, type_=BigInteger))
+
+
+_QUOTAS = (
     select(
         func.count(),
-        func.coalesce(
-            select(owners.c.max_active).where(owners.c.name == _OF_OWNER).scalar_subquery(),
-            bindparam("most", type_=BigInteger),
-        ),
+        _select_own(owners.c.max_active, "most_active"),
+        _select_own(owners.c.max_islands, "most_islands"),
     )
     .select_from(jobs)
     .where(jobs.c.owner == _OF_OWNER, jobs.c.state.in_(ACTIVE))
@@ -98,15 +114,38 @@ def check_datasets(connection: Connection, job: Job) -> None:
         )
 
 
-def check_quota(connection: Connection, owner: str, most: int) -> None:
-    """Raise an error if an owner already has as many active jobs as its quota, ``most`` by default.
+def check_quotas(
+    connection: Connection,
+    owner: str,
+    most_active: int | None,
+    islands: int = 0,
+    most_islands: int | None = None,
+) -> None:
+    """Raise an error if the quotas of an owner allow no further job, or never allow this one.
+
+    Parameters
+    ----------
+    most_active, most_islands : int, optional
+        Quotas of active jobs and of running islands of an owner for which none were set; unlimited by
+        default.
+    islands : int
+        Islands of a new job. An accepted job remains accepted when the quota is lowered.
 
     Raises
     ------
+    SettingsError
+        The job has more islands than all running jobs of the owner may have.
     QuotaError
+        The owner has as many active jobs as its quota.
     """
-    active, most = connection.execute(_QUOTA, {"owner": owner, "most": most}).one()
-    if active >= most:
+    defaults = {"owner": owner, "most_active": most_active, "most_islands": most_islands}
+    active, most, most_islands = connection.execute(_QUOTAS, defaults).one()
+    if most_islands is not None and islands > most_islands:
+        raise SettingsError(
+            f"the job has {islands} islands, and your running jobs may have {most_islands} islands together: "
+            "take fewer islands, or ask the operator for a larger quota"
+        )
+    if most is not None and active >= most:
         raise QuotaError(
             f"{active} jobs are waiting or running, and {most} is the most: wait for some, or cancel some"
         )

@@ -106,10 +106,11 @@ def _read_owners(connection: Connection, name: str | None = None) -> tuple[Owner
 
     columns = (owners.c.name, keys.c.owner, jobs.c.owner, datasets.c.owner)
     names = connection.execute(union(*(of(select(column), column) for column in columns))).scalars()
-    counted = select(jobs.c.owner, jobs.c.state, func.count()).where(jobs.c.state.in_(ACTIVE))
-    counts: dict[tuple[str, str], int] = {
-        (owner, state): count
-        for owner, state, count in connection.execute(
+    active = select(jobs.c.owner, jobs.c.state, func.count(), func.sum(jobs.c.islands))
+    counted = active.where(jobs.c.state.in_(ACTIVE))
+    counts: dict[tuple[str, str], tuple[int, int]] = {
+        (owner, state): (count, islands)
+        for owner, state, count, islands in connection.execute(
             of(counted, jobs.c.owner).group_by(jobs.c.owner, jobs.c.state)
         )
     }
@@ -122,8 +123,8 @@ def _read_owners(connection: Connection, name: str | None = None) -> tuple[Owner
             each,
             own[each].get("weight", DEFAULT_WEIGHT),
             {quota: own[each].get(quota) for quota in QUOTA_NAMES},
-            counts.get((each, JobState.QUEUED), 0),
-            counts.get((each, JobState.RUNNING), 0),
+            counts.get((each, JobState.QUEUED), (0, 0))[0],
+            *counts.get((each, JobState.RUNNING), (0, 0)),
             stored.get(each, 0),
         )
         for each in sorted(names)

@@ -183,6 +183,22 @@ def test_coordinator_with_the_same_name_takes_a_job_over_at_once(
     assert wait_until_finished(store, job).attempt == 2  # long before the lease of an hour has expired
 
 
+@pytest.mark.parametrize("quota", ["max_running", "max_running_islands"])
+def test_coordinator_keeps_the_quotas_of_its_settings(
+    store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch, quota: str
+) -> None:
+    monkeypatch.setattr(coordinator_module, "POLL_SECONDS", 0.0)
+    claims: list[tuple[str, str]] = []
+    monkeypatch.setattr(
+        Coordinator, "_process", lambda self, lease: claims.append((self._name, lease.job.id))
+    )
+    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
+    limited = settings.model_copy(update={quota: 1})
+    for name, changed in (("one", limited), ("two", limited), ("three", settings)):
+        Coordinator(changed, name, StopRequest())._claim_next()
+    assert claims == [("one", job.id), ("three", second.id)]
+
+
 def test_unreferenced_blobs_are_swept_after_an_hour(
     store: Store, blobs: Blobs, job: Job, coordinator: Callable[..., Thread]
 ) -> None:

@@ -39,6 +39,10 @@ def dataset(identity=ONE, time="t_s", dt=0.01, warnings=(), **columns):
 
 def pending_inspections(*datasets, **changes):
     """Return the pending inspections of a job on data sets."""
+    return validated(*datasets, **changes).inspections
+
+
+def validated(*datasets, **changes):
     known = {each.id: each for each in datasets}
 
     def get(owner, identity):
@@ -49,6 +53,12 @@ def pending_inspections(*datasets, **changes):
     store = SimpleNamespace(datasets=SimpleNamespace(get=get))
     order = Identification.model_validate(spec(ONE, **changes))
     return validate_job(order, "me", store, ServiceSettings())
+
+
+def test_islands_are_those_of_the_resolved_settings():
+    for preset in ("auto", "hysteresis"):
+        assert validated(dataset(), preset=preset, settings={"islands": 7}).islands == 7
+        assert validated(dataset(), preset=preset, settings={"islands": None}).islands == 1
 
 
 def test_clean_record_needs_no_inspection():

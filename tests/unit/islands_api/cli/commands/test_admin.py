@@ -75,9 +75,9 @@ def test_audit_is_limited_to_an_owner_a_time_and_a_number(run: Run, subjects: li
 
 def test_owners_are_listed_and_changed(run: Run, subjects: list[str], command_line: Run) -> None:
     owners = partial(command_line, "admin", "owners")
-    assert owners("set", "bob", "--weight", 200, "--max-running", 2) == (
+    assert owners("set", "bob", "--weight", 200, "--max-running", 2, "--max-islands", 8) == (
         0,
-        "owner bob: weight 200, max_running 2\n",
+        "owner bob: weight 200, max_running 2, max_islands 8\n",
         "",
     )
     code, out, _ = owners("list", "--json")
@@ -85,17 +85,17 @@ def test_owners_are_listed_and_changed(run: Run, subjects: list[str], command_li
     assert (code, set(listed)) == (0, {"bob"})
     assert (listed["bob"]["weight"], listed["bob"]["quotas"]["max_running"]) == (200, 2)
     assert "200" in owners("list")[1]
-    assert owners("set", "bob", "--unset", "max-running", "--unset", "weight")[1] == (
-        "owner bob: weight 100, default quotas\n"
-    )
+    assert owners("set", "bob", "--unset", "max-running", "--unset", "max-islands", "--unset", "weight")[
+        1
+    ] == ("owner bob: weight 100, default quotas\n")
     restored, changed = read(run, "--limit", "2")
     assert (changed["action"], changed["owner"], changed["address"]) == (
         "change-owner",
         "bob",
         "command line",
     )
-    assert json.loads(str(changed["details"])) == {"weight": 200, "max_running": 2}
-    assert json.loads(str(restored["details"])) == {"weight": 100, "max_running": None}
+    assert json.loads(str(changed["details"])) == {"weight": 200, "max_running": 2, "max_islands": 8}
+    assert json.loads(str(restored["details"])) == {"weight": 100, "max_running": None, "max_islands": None}
 
 
 @pytest.mark.parametrize(

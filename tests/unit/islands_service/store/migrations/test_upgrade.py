@@ -1,5 +1,6 @@
 """Migrations: a database of any revision is upgraded to the current tables with its rows."""
 
+import json
 import sqlite3
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -161,6 +162,27 @@ def test_migrated_database_works_like_a_new_one(old):
         failed = theirs[JobState.FAILED]
         again, new = store.jobs.submit(asked(BOB, spec=failed.spec, name=failed.name, idempotency_key="k"))
         assert (again.id, new) == (failed.id, False)
+
+
+def test_islands_of_earlier_jobs_are_those_of_their_specification(empty_database):
+    stated = {"a": {"islands": 8}, "b": {"islands": None}, "c": {"population": 9}, "d": None}
+    database = Database(empty_database)
+    with database.exclusive() as connection:
+        upgrade(connection, "0006")
+        table = tables_of(connection)["jobs"]
+        for name, settings in stated.items():
+            spec = json.dumps({"settings": settings} if settings else {"channels": ["islands"]})
+            texts = {"owner": ALICE, "kind": "", "name": "", "request_sha256": "", "state": "queued"}
+            numbers = ("priority", "version", "attempt", "stalled", "lease_epoch", "lease_until")
+            values = {**texts, **dict.fromkeys(numbers, 0), "created": 0.0, "updated": 0.0}
+            connection.execute(
+                table.insert(), {**values, "id": name, "spec": spec, "cancel_requested": False}
+            )
+        upgrade(connection)
+        table = tables_of(connection)["jobs"]
+        found = connection.execute(select(table.c.id, table.c.islands)).all()
+    database.close()
+    assert dict(map(tuple, found)) == {"a": 8, "b": 1, "c": 1, "d": 1}
 
 
 def test_running_process_of_an_earlier_release_can_write_after_the_migration(old):
