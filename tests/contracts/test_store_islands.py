@@ -1,5 +1,6 @@
 """Contract of the quota of running islands: what may be submitted, and when a queued job is claimed."""
 
+import time
 from uuid import uuid4
 
 import pytest
@@ -37,7 +38,10 @@ def size(lease):
 
 def queue(store, owner, *sizes):
     """Submit jobs with these numbers of islands, in this order."""
-    return [submitted(store, owner, islands=each, spec={"islands": each}) for each in sizes]
+    for each in sizes:
+        # The clock of SQLite has a resolution of a millisecond.
+        time.sleep(0.002)
+        submitted(store, owner, islands=each, spec={"islands": each})
 
 
 @pytest.mark.parametrize("own", [None, 6])

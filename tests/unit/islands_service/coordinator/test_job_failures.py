@@ -158,13 +158,17 @@ def test_job_of_a_newer_version_waits_for_a_coordinator_of_it(
 
 
 def test_coordinators_of_two_old_versions_decline_a_job_once_each(store: Store, job: Job) -> None:
-    for version in ("1.1", "1.2"):
+    for version in ("1.1", "1.2", "1x3"):
         lease = store.leases.claim("me", 60.0, version)
         assert lease is not None
         store.leases.decline(lease, "no", version)
     assert store.leases.claim("me", 60.0, "1.1") is None
     assert store.leases.claim("me", 60.0, "1.2") is None
-    assert store.leases.claim("me", 60.0, "1.11") is not None
+    # Neither a part of a version nor a wildcard.
+    for version in ("1.11", "1_3"):
+        lease = store.leases.claim("me", 60.0, version)
+        assert lease is not None
+        store.leases.release(lease)
 
 
 def test_job_of_this_version_fails_and_a_job_without_a_version_too(
