@@ -128,7 +128,8 @@ def test_the_settings_in_deployment_files_exist():
         "ISLANDS_WORKER_CPUS",
         "ISLANDS_WORKER_MEMORY",
     }
-    files = [path for path in DEPLOY.rglob("*") if path.is_file() and path.suffix not in (".lock", ".json")]
+    others = (".lock", ".json", ".pyc")
+    files = [path for path in DEPLOY.rglob("*") if path.is_file() and path.suffix not in others]
     named = {name for path in files for name in re.findall(r"\bISLANDS_[A-Z_]+", path.read_text())}
     assert {"ISLANDS_RAY_ADDRESS", "ISLANDS_TRUSTED_PROXIES"} <= named
     assert named <= known
