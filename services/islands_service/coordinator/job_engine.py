@@ -10,7 +10,7 @@ from islands.evolution.progress import ProgressCallback
 from islands_service.domain.job import IDENTIFICATION, Job, Lease
 from islands_service.domain.job_memory import estimate_memory, machine_memory
 from islands_service.domain.job_spec import parse_identification, resolve_job_settings
-from islands_service.runtime.actor_pool import kill_stale_actors
+from islands_service.runtime.actor_pool import ignore_placement, kill_stale_actors
 from islands_service.runtime.cluster import cluster_memory
 from islands_service.runtime.ray_engine import RayEngine
 
@@ -21,7 +21,7 @@ def make_job_engine(
     lease: Lease,
     progress: ProgressCallback,
     autoscaling: bool = False,
-    observe: Callable[[int, int], None] = lambda *_: None,
+    observe: Callable[[int, int], None] = ignore_placement,
 ) -> Engine:
     """Return an engine for a job, and end the actors of its earlier leases.
 

@@ -15,7 +15,7 @@ from ray.exceptions import RayActorError, RayTaskError
 from islands.evolution.problem import Problem
 from islands.evolution.progress import ProgressCallback
 from islands.model.primitives import PRIMITIVES
-from islands_service.runtime.cluster import LOSS_ERRORS
+from islands_service.runtime.cluster import LOSS_ERRORS, cluster_cpus
 from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.island_actor import IslandActor
 
@@ -45,6 +45,10 @@ _MAX_LOSSES = 5
 
 #: Ray's own restarts would lose the state of an actor silently. Islands are recovered from values instead.
 _ACTOR = ray.remote(max_restarts=0, max_task_retries=0, concurrency_groups={"watch": 1})(IslandActor)
+
+
+def ignore_placement(_placed: int, _waiting: int) -> None:
+    """Do nothing with the numbers of islands with and without a separate CPU; the default of observers."""
 
 
 class IslandActorPool:
@@ -79,7 +83,7 @@ class IslandActorPool:
         progress: ProgressCallback,
         title: str = "",
         autoscaling: bool = False,
-        observe: Callable[[int, int], None] = lambda *_: None,
+        observe: Callable[[int, int], None] = ignore_placement,
         share: float = 1.0,
     ) -> None:
         self._observe = observe
@@ -155,11 +159,7 @@ class IslandActorPool:
     def _update_members(self, now: float) -> None:
         if now - self._measured_at > _RESIZE_SECONDS:
             self._measured_at = now
-            cpus = (
-                self._islands
-                if self._autoscaling
-                else int(self._share * ray.cluster_resources().get("CPU", 0))
-            )
+            cpus = self._islands if self._autoscaling else int(self._share * cluster_cpus())
             self._size = max(self._size, min(self._islands, max(1, cpus)))
         for slot in _find_ended(self._members):
             self._handle_loss(slot, self._members.pop(slot)[0])

@@ -85,6 +85,11 @@ def cluster_memory() -> float:
     return float(ray.cluster_resources().get("memory", inf))
 
 
+def cluster_cpus() -> float:
+    """Return the number of CPUs that the machines of the connected cluster offer."""
+    return float(ray.cluster_resources().get("CPU", 0.0))
+
+
 @contextmanager
 def _remote_cluster(address: str) -> Iterator[None]:
     try:

@@ -11,6 +11,7 @@ from typing import Generic, TypeVar
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import make_topology
 from islands.evolution.epoch import IslandEpoch, next_stop, select_migrants
+from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.evolution.settings import Settings
 
@@ -127,6 +128,11 @@ class EpochScheduler(Generic[T]):
         return next_stop(generation, self._settings)
 
 
+def begin_epoch(problem: Problem, island: Island) -> IslandEpoch:
+    """Return an island of a start with its emigrants, as if an epoch had ended there."""
+    return IslandEpoch(island, select_migrants(island, problem.settings_of(island.index)), ())
+
+
 def schedule_islands(
     problem: Problem, start: Archipelago, keep: Callable[[IslandEpoch], T], ahead: int = MAX_EPOCHS_AHEAD
 ) -> EpochScheduler[T]:
@@ -137,9 +143,6 @@ def schedule_islands(
     keep : callable
         Returns the data to keep of an epoch; also applied to the start.
     """
-    kept = {}
-    for island in start.islands:
-        leaving = select_migrants(island, problem.settings_of(island.index))
-        kept[island.index] = keep(IslandEpoch(island, leaving, ()))
+    kept = {island.index: keep(begin_epoch(problem, island)) for island in start.islands}
     sources = make_topology(problem, start).sources
     return EpochScheduler(problem.settings, sources, start.generation, kept, ahead)

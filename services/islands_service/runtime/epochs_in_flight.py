@@ -11,7 +11,7 @@ from islands_service.runtime.actor_pool import IslandActorPool
 from islands_service.runtime.cluster import LOSS_ERRORS
 from islands_service.runtime.epoch_deadline import EpochDeadlines
 from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
-from islands_service.runtime.packed_epoch import PackedEpoch
+from islands_service.runtime.packed_epoch import PackedEpoch, sum_caches
 
 #: Seconds to wait for a result between two checks of the stop function.
 _POLL_SECONDS = 0.1
@@ -45,14 +45,7 @@ class EpochsInFlight:
     @property
     def memory(self) -> Caches:
         """Memory of the caches of all actors."""
-        names = {name for caches in self._caches.values() for name in caches}
-        return {
-            name: (
-                sum(caches[name][0] for caches in self._caches.values()),
-                sum(caches[name][1] for caches in self._caches.values()),
-            )
-            for name in sorted(names)
-        }
+        return sum_caches(self._caches.values())
 
     def submit(self) -> None:
         """Submit all tasks that are ready. Ray passes the emigrants on as soon as they are computed."""

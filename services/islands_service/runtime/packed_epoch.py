@@ -10,7 +10,7 @@ has one function per primitive, which it compiles once.
 import io
 import pickle
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, overload
 
@@ -58,6 +58,16 @@ def pack_epoch(
     """Pickle the island and the emigrants of an epoch and keep the rest."""
     packed, emigrants = _pack(epoch.island), _pack(epoch.emigrants)
     return PackedEpoch(epoch.island.index, packed, emigrants, epoch.steps, actor, caches or {}, seconds)
+
+
+def sum_caches(parts: Iterable[Caches]) -> Caches:
+    """Return the memory of the caches of several actors, by name."""
+    totals: dict[str, tuple[int, int]] = {}
+    for part in parts:
+        for name, (used, limit) in part.items():
+            before = totals.get(name, (0, 0))
+            totals[name] = before[0] + used, before[1] + limit
+    return dict(sorted(totals.items()))
 
 
 def unpack_island(packed: bytes, primitives: Mapping[str, Primitive]) -> Island:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Generator, Mapping
 
-import ray
 from ray.exceptions import RayError
 
 from islands.evolution.archipelago import Archipelago
@@ -10,7 +9,8 @@ from islands.evolution.engine import ArchipelagoEpoch, Stop
 from islands.evolution.problem import Problem
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.model.expression import Primitive
-from islands_service.runtime.actor_pool import IslandActorPool
+from islands_service.runtime.actor_pool import IslandActorPool, ignore_placement
+from islands_service.runtime.cluster import cluster_cpus
 from islands_service.runtime.epoch_deadline import EpochDeadlines
 from islands_service.runtime.epoch_scheduler import EpochScheduler, schedule_islands
 from islands_service.runtime.epochs_in_flight import EpochsInFlight
@@ -39,7 +39,7 @@ class RayEngine:
         progress: ProgressCallback = ignore_progress,
         title: str = "",
         autoscaling: bool = False,
-        observe: Callable[[int, int], None] = lambda *_: None,
+        observe: Callable[[int, int], None] = ignore_placement,
     ) -> None:
         self._progress, self._title, self._autoscaling = progress, title, autoscaling
         self._observe = observe
@@ -47,7 +47,7 @@ class RayEngine:
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Yield the epochs of a search; see `islands.evolution.engine.Engine`."""
         islands = len(start.islands)
-        cpus = islands if self._autoscaling else int(ray.cluster_resources().get("CPU", 0))
+        cpus = islands if self._autoscaling else int(cluster_cpus())
         if (regions := count_regions(islands, cpus)) > 1:
             yield from run_regions(
                 problem, start, stop, regions, self._progress, self._title, self._autoscaling, self._observe

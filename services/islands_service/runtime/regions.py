@@ -14,15 +14,15 @@ from ray.actor import ActorHandle
 from ray.exceptions import RayError, RayTaskError
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch, Caches, make_topology
-from islands.evolution.epoch import IslandEpoch, next_stop, select_migrants
+from islands.evolution.engine import ArchipelagoEpoch, make_topology
+from islands.evolution.epoch import next_stop
 from islands.evolution.problem import Problem
 from islands.evolution.progress import ProgressCallback
-from islands_service.runtime.actor_pool import check_version, put_problem
+from islands_service.runtime.actor_pool import check_version, ignore_placement, put_problem
 from islands_service.runtime.cluster import LOSS_ERRORS
-from islands_service.runtime.epoch_scheduler import MAX_EPOCHS_AHEAD
+from islands_service.runtime.epoch_scheduler import MAX_EPOCHS_AHEAD, begin_epoch
 from islands_service.runtime.errors import ClusterError
-from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch
+from islands_service.runtime.packed_epoch import pack_epoch, sum_caches
 from islands_service.runtime.region_actor import RegionActor, RegionReport
 from islands_service.runtime.region_islands import RegionIslands
 
@@ -59,7 +59,7 @@ def run_regions(
     progress: ProgressCallback,
     title: str = "",
     autoscaling: bool = False,
-    observe: Callable[[int, int], None] = lambda *_: None,
+    observe: Callable[[int, int], None] = ignore_placement,
 ) -> Generator[ArchipelagoEpoch]:
     """Yield the epochs of a search in regions of consecutive islands; see `islands.evolution.engine.Engine`.
 
@@ -149,7 +149,7 @@ class _Tree:
         ]
         self._regions = []
         for index, span in enumerate(spans):
-            state = tuple(_pack_start(problem, start, island) for island in span)
+            state = tuple(pack_epoch(begin_epoch(problem, start.islands[island])) for island in span)
             region = _Region(index, span, start.generation, ray.put(state))
             border = {each.index: each.emigrants for each in state if each.index in self._borders[index]}
             region.reports[start.generation] = RegionReport((), border)
@@ -204,7 +204,9 @@ class _Tree:
                 self._settings.primitive_table,
             )
             steps = tuple(steps for report in reports for steps in report.steps)
-            yield ArchipelagoEpoch(Archipelago(self._last), steps, _sum_caches(reports))
+            yield ArchipelagoEpoch(
+                Archipelago(self._last), steps, sum_caches(report.caches for report in reports)
+            )
 
     def shutdown(self) -> None:
         """Fetch the islands of the last epoch, and kill all actors. Those of islands end with their owner."""
@@ -280,17 +282,3 @@ class _Tree:
             ray.kill(region.actor)
         region.actor = region.pending = region.check = None
         region.placement = 0, len(region.islands)
-
-
-def _pack_start(problem: Problem, start: Archipelago, island: int) -> PackedEpoch:
-    begin = start.islands[island]
-    return pack_epoch(IslandEpoch(begin, select_migrants(begin, problem.settings_of(island)), ()))
-
-
-def _sum_caches(reports: list[RegionReport]) -> Caches:
-    totals: dict[str, tuple[int, int]] = {}
-    for report in reports:
-        for name, (used, limit) in report.caches.items():
-            before = totals.get(name, (0, 0))
-            totals[name] = before[0] + used, before[1] + limit
-    return dict(sorted(totals.items()))
