@@ -311,10 +311,10 @@ WEIGHT = """
 import sys
 from islands_api.web.app import create_app
 from islands_api.schemas import DiscrepancyRequest
-from islands_service.intake.job_validation import _parts
+from islands_service.intake.job_validation import _check_spec
 from islands_service.settings import ServiceSettings
 import json
-_parts(DiscrepancyRequest.model_validate(json.loads(sys.argv[1])), ServiceSettings())
+_check_spec(DiscrepancyRequest.model_validate(json.loads(sys.argv[1])), ServiceSettings())
 heavy = {"numba", "llvmlite", "scipy", "matplotlib", "h5py", "ray"}
 print(sorted(heavy & {name.partition(".")[0] for name in sys.modules}))
 print([name for name in sys.modules if name.startswith(("islands.kernels", "islands.discrepancy"))])
