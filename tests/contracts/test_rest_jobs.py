@@ -35,9 +35,10 @@ def test_an_accepted_job_is_at_the_location_of_the_response(service, order):
     assert answer.headers["retry-after"] == "1"
     assert "idempotent-replayed" not in answer.headers
     looked = service.client.get(answer.headers["location"])
-    job = looked.json()
-    assert job["progress"] == {"phase": "queued", "position": 1}
-    assert (job, looked.headers["etag"]) == (answer.json(), answer.headers["etag"])
+    job, accepted = looked.json(), answer.json()
+    assert job["progress"] == {**accepted["progress"], "position": 1} == {"phase": "queued", "position": 1}
+    assert job == {**accepted, "progress": job["progress"]}
+    assert looked.headers["etag"] == answer.headers["etag"]
     assert (job["state"], job["name"], job["priority"], job["version"]) == ("queued", "first", 5, 1)
     assert job["spec"] == {key: value for key, value in order.items() if key != "name"}
 

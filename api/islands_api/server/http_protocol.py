@@ -1,16 +1,14 @@
-"""HTTP protocol of a connection: problems instead of plain text errors, and a deadline for each request."""
+"""HTTP protocol of a connection: limits of a request, and problems instead of plain text errors."""
 
 import asyncio
 import json
 import secrets
 import sys
-from http import HTTPStatus
 from typing import Any
 
-import h11
 import structlog
 from starlette.exceptions import HTTPException
-from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from islands_api.web.middleware import SECURITY_HEADERS
 from islands_api.web.problems import (
@@ -30,16 +28,25 @@ log = structlog.get_logger()
 HEADER_TIMEOUT = 10.0
 
 
-class HTTPProtocol(H11Protocol):
-    """HTTP/1.1 protocol of uvicorn with problem documents and a deadline for the headers of a request.
+#: Maximum size in bytes of the request line and the headers of a request, and of the trailers of a body.
+_MAX_HEADER_BYTES = 65_536
+
+
+class HTTPProtocol(HttpToolsProtocol):
+    """HTTP/1.1 protocol of uvicorn with problem documents, and with limits on the headers of a request.
 
     uvicorn closes a kept connection that is idle, but waits for ever for the first request and for the rest
-    of an incomplete one. Many such connections would use up the open files.
+    of an incomplete one. Many such connections would use up the open files. The parser has no limit on the
+    size of headers.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._deadline: asyncio.TimerHandle | None = None
+        # Whether the headers of a request are incomplete, the bytes received of them, and the size of all
+        # complete headers and trailers of the request.
+        self._in_headers = False
+        self._received_bytes = self._header_bytes = 0
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Start the deadline of the first request."""
@@ -47,8 +54,12 @@ class HTTPProtocol(H11Protocol):
         self._update_deadline()
 
     def data_received(self, data: bytes) -> None:
-        """Handle received bytes, and start or stop the deadline."""
+        """Handle received bytes, limit incomplete headers, and start or stop the deadline."""
         super().data_received(data)
+        if self._in_headers and not self.transport.is_closing():
+            self._received_bytes += len(data)
+            if self._received_bytes > _MAX_HEADER_BYTES:
+                self._refuse(_headers_too_large())
         self._update_deadline()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -56,18 +67,38 @@ class HTTPProtocol(H11Protocol):
         super().connection_lost(exc)
         self._stop_deadline()
 
+    def on_message_begin(self) -> None:
+        """Start a request."""
+        super().on_message_begin()
+        self._in_headers, self._received_bytes, self._header_bytes = True, 0, 0
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """Add a header or a trailer."""
+        self._header_bytes += len(name) + len(value)
+        if self._header_bytes > _MAX_HEADER_BYTES:
+            raise _headers_too_large()
+        if self._in_headers:
+            super().on_header(name, value)
+
+    def on_headers_complete(self) -> None:
+        """Check the headers, and start the response."""
+        self._in_headers = False
+        hosts = sum(name == b"host" for name, _ in self.headers)
+        if hosts > 1 or (hosts == 0 and self.parser.get_http_version() == "1.1"):  # RFC 9112, section 3.2
+            raise MalformedBodyError(f"the request is not valid HTTP: it has {hosts} Host headers: send one")
+        super().on_headers_complete()
+
     def send_400_response(self, msg: str) -> None:
         """Send the problem of a request that cannot be parsed, and close the connection.
 
         uvicorn calls it while it handles the error of the parser.
         """
         error = sys.exception()
-        if getattr(error, "error_status_hint", None) == HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE:
-            self._refuse(
-                HeadersTooLargeError("the headers of the request are too large: send fewer or shorter ones")
-            )
+        cause = error and error.__context__  # an error of `on_header` and the like
+        if isinstance(cause, HTTPException):
+            self._refuse(cause)
         else:
-            self._refuse(MalformedBodyError(f"the request is not valid HTTP: {error or msg}"))
+            self._refuse(MalformedBodyError(f"the request is not valid HTTP: {cause or error or msg}"))
 
     def _awaits_request(self) -> bool:
         """Return whether the connection is open, and no request is in progress."""
@@ -88,7 +119,7 @@ class HTTPProtocol(H11Protocol):
         self._deadline = None
         if not self._awaits_request():
             return
-        if self.conn.trailing_data[0]:
+        if self._in_headers:
             self._refuse(
                 RequestTimeoutError(
                     f"the headers of the request were not complete within {HEADER_TIMEOUT:.0f} s: "
@@ -99,7 +130,7 @@ class HTTPProtocol(H11Protocol):
             self.transport.close()
 
     def _refuse(self, error: HTTPException) -> None:
-        """Send a problem, unless a response has been started, and close the connection."""
+        """Send a problem, unless other responses are due or started, and close the connection."""
         request_id = secrets.token_hex(8)
         log.info(
             "request",
@@ -108,9 +139,20 @@ class HTTPProtocol(H11Protocol):
             reason=error.detail,
             request_id=request_id,
         )
-        if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+        in_body = self.cycle is not None and self.cycle.more_body
+        if self._awaits_request() or (in_body and not self.cycle.response_started):
             self.transport.write(_format_response(lookup_problem(error), error.detail, request_id))
-        self.transport.close()
+            self.transport.close()
+        elif in_body:
+            self.transport.close()
+        else:
+            # The client has sent it behind requests without waiting for their responses, which precede.
+            self.cycle.keep_alive = False
+            self.flow.pause_reading()
+
+
+def _headers_too_large() -> HeadersTooLargeError:
+    return HeadersTooLargeError("the headers of the request are too large: send fewer or shorter ones")
 
 
 def _format_response(problem: ProblemKind, detail: str, request_id: str) -> bytes:

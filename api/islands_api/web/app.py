@@ -109,9 +109,9 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
         redoc_url=None,
         redirect_slashes=False,  # each resource has exactly one path
         openapi_url="/openapi.json",
+        # `include_router` would match each request twice, against its router and against the routes in it.
+        routes=[route for router in ROUTERS for route in router.routes],
     )
-    for router in ROUTERS:
-        app.include_router(router)
     exception_handlers.install_handlers(app)
     # Compression reduces figures and the dashboard to a third. A single job is too small to gain from it.
     # Event streams are not buffered.

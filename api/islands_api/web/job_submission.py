@@ -1,8 +1,8 @@
 """Job submission, and lookup of jobs and results, for all kinds of jobs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 from fastapi import Header
@@ -59,9 +59,7 @@ async def submit_job(
         The job could only fail, or its owner has used up a quota.
     """
     submission = Submission(caller.owner, request.spec, kind, request.name, request.priority, key)
-    accepted = await _validate_and_store(state, request, submission, caller.requester)
-    job, new = accepted.job, accepted.new
-    state.positions.store((job,), accepted.positions)
+    job, new = await _validate_and_store(state, request, submission, caller.requester)
     if new:
         state.metrics.accepted.inc()
     headers = {
@@ -71,7 +69,8 @@ async def submit_job(
     }
     if not new:
         headers["Idempotent-Replayed"] = "true"
-    return JSONDocument(await describe_job(state, job), 202, headers)
+    # Without the position, since the time to find it is proportional to the length of the queue.
+    return JSONDocument(job_document(job), 202, headers)
 
 
 async def describe_job(state: AppState, job: Job) -> dict[str, Any]:
@@ -95,20 +94,12 @@ def etag(job: Job) -> str:
     return f'"{job.version}"'
 
 
-@dataclass(frozen=True, slots=True)
-class _Accepted:
-    """A stored job, whether it is new, and its position in the queue by its id, if it is queued."""
-
-    job: Job
-    new: bool
-    positions: Mapping[str, int]
-
-
 async def _validate_and_store(
     state: AppState, request: Request, submission: Submission, by: Requester
-) -> _Accepted:
+) -> tuple[Job, bool]:
+    """Return a stored job, and whether it is new."""
     found = await state.run_blocking(_store_if_valid, state, request, submission, by)
-    if isinstance(found, _Accepted):
+    if isinstance(found, tuple):
         return found
     for inspection in found.inspections:
         with ExitStack() as files:
@@ -127,25 +118,20 @@ async def _validate_and_store(
 
 def _store_if_valid(
     state: AppState, request: Request, submission: Submission, by: Requester
-) -> _Accepted | ValidJob:
-    """Store a job and return it, unless files must be inspected before.
+) -> tuple[Job, bool] | ValidJob:
+    """Store a job and return it, and whether it is new, unless files must be inspected before.
 
     One call does everything, since a change of the thread takes as long as a query.
     """
     found = _validate_or_replay(state, request, submission)
     if isinstance(found, Job):
-        return _describe(state, found, False)
+        return found, False
     return found if found.inspections else _store(state, submission, found, by)
 
 
-def _store(state: AppState, submission: Submission, valid: ValidJob, by: Requester) -> _Accepted:
+def _store(state: AppState, submission: Submission, valid: ValidJob, by: Requester) -> tuple[Job, bool]:
     settings, submission = state.settings, replace(submission, islands=valid.islands)
-    submit = state.store.jobs.submit
-    return _describe(state, *submit(submission, settings.max_active, by, settings.max_running_islands))
-
-
-def _describe(state: AppState, job: Job, new: bool) -> _Accepted:
-    return _Accepted(job, new, state.store.leases.queue_positions((job,)))
+    return state.store.jobs.submit(submission, settings.max_active, by, settings.max_running_islands)
 
 
 def _validate_or_replay(state: AppState, request: Request, submission: Submission) -> Job | ValidJob:

@@ -1,8 +1,9 @@
 """Database access with concurrent reads, group commit and translated errors.
 
 Every write waits until it is durable. Writes that arrive while a group is being committed form the next
-group, each in its own savepoint. With sixteen clients this accepts three times as many jobs as one
-transaction per job, and the longest wait is a twentieth (decision 0009).
+group. If one of them fails, the group is repeated with a savepoint for each. With sixteen clients this
+accepts three times as many jobs as one transaction per job, and the longest wait is a twentieth (decision
+0009).
 """
 
 import sqlite3
@@ -115,7 +116,8 @@ class Database:
     def write(self, operation: Callable[[Connection], T]) -> T:
         """Run an operation in a transaction; return its value once the transaction is durable.
 
-        An error of the operation is raised here, and rolls back only the work of this operation.
+        An error of the operation is raised here, and rolls back only the work of this operation. The
+        operation must have no effect but that on the database, since it is repeated if another one fails.
 
         Raises
         ------
@@ -178,8 +180,9 @@ class Database:
                 return
 
     def _write_group(self, group: list[_Waiting], tries: int = _MAX_TRIES) -> None:
+        operations = [operation for operation, _ in group]
         try:
-            results = self._run_transaction([operation for operation, _ in group])
+            results = self._run_group(operations)
         except StoreCollisionError as error:
             if tries > 1:
                 # Retry one by one: shorter transactions hold fewer locks.
@@ -195,15 +198,26 @@ class Database:
             else:
                 done.set_exception(failure)
 
-    def _run_transaction(self, operations: list[Callable[[Connection], Any]]) -> list[_OperationResult]:
-        """Run a group of operations in one transaction; return their results once it is durable."""
+    def _run_group(self, operations: list[Callable[[Connection], Any]]) -> list[_OperationResult]:
+        """Run operations in one transaction; return their results, including errors, once it is durable."""
+        try:
+            return self._run_transaction(operations, _run_operation)
+        except (StoreUnavailableError, StorageFullError):
+            raise
+        except Exception as error:
+            if len(operations) == 1:
+                return [(None, error)]
+            return self._run_transaction(operations, _run_in_savepoint)
+
+    def _run_transaction(
+        self,
+        operations: list[Callable[[Connection], Any]],
+        run: Callable[[Callable[[Connection], Any], Connection], _OperationResult],
+    ) -> list[_OperationResult]:
         committing, began = False, monotonic()
         try:
             with translate_db_errors(), self._writing.begin() as connection:
-                if len(operations) == 1:  # its error ends the transaction
-                    results: list[_OperationResult] = [(operations[0](connection), None)]
-                else:
-                    results = [_run_operation(operation, connection) for operation in operations]
+                results = [run(operation, connection) for operation in operations]
                 committing = True
         except StoreCollisionError:
             raise
@@ -223,6 +237,11 @@ def ignore_duration(_seconds: float) -> None:
 
 
 def _run_operation(operation: Callable[[Connection], Any], connection: Connection) -> _OperationResult:
+    """Run an operation; its error ends the transaction."""
+    return operation(connection), None
+
+
+def _run_in_savepoint(operation: Callable[[Connection], Any], connection: Connection) -> _OperationResult:
     """Run an operation in its own savepoint, so that its error rolls back nothing else."""
     savepoint = connection.begin_nested()
     try:

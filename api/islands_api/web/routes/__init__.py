@@ -19,11 +19,11 @@ from islands_api.web.routes import (
     webhooks,
 )
 
-#: All routers of the application.
+#: All routers of the application, the most used one first: requests are matched against the routes in order.
 ROUTERS: tuple[APIRouter, ...] = (
+    jobs.router,
     datasets.router,
     datasets.fetching,
-    jobs.router,
     diagnoses.router,
     events.router,
     models.router,

@@ -10,6 +10,10 @@ import pytest
 from islands_api.server import http_protocol
 from support.service import PROBLEM, Service, served
 
+#: Start of a request with a body in chunks, and headers that are too large together.
+CHUNKED = b"POST /v1/jobs HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n"
+LARGE = 70 * (b"X: " + 1000 * b"x" + b"\r\n")
+
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
@@ -48,7 +52,11 @@ def exchange(service: Service, *sent: bytes, pause: float = 0.0) -> tuple[int, d
         (b"GET / HTTP/9\r\n\r\n", 400, "bad-request"),
         (b"GET / HTTP/1.1\r\n\r\n", 400, "bad-request"),
         (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: x\r\n\r\n", 400, "bad-request"),
+        (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nHost: 127.0.0.2\r\n\r\n", 400, "bad-request"),
+        (CHUNKED + b"Content-Length: 2\r\n\r\n2\r\n{}\r\n0\r\n\r\n", 400, "bad-request"),
         (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + 70_000 * b"x", 431, "headers-too-large"),
+        (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + LARGE + b"\r\n", 431, "headers-too-large"),
+        (CHUNKED + b"\r\n2\r\n{}\r\n0\r\n" + LARGE + b"\r\n", 431, "headers-too-large"),
     ],
 )
 def test_a_request_that_is_not_http_is_a_problem(
@@ -64,6 +72,14 @@ def test_a_request_that_is_not_http_is_a_problem(
     assert headers["x-content-type-options"] == "nosniff"
     described = service.client.get(f"/problems/{kind}").json()
     assert (described["title"], described["status"]) == (document["title"], status)
+
+
+def test_a_request_before_one_that_is_not_http_is_answered(service: Service) -> None:
+    status, headers, body, _ = exchange(
+        service, b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n?!\r\n\r\n"
+    )
+    assert (status, json.loads(body)["status"]) == (200, "alive")
+    assert headers["connection"] == "close"
 
 
 @pytest.mark.usefixtures("short_deadline")
