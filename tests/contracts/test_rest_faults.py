@@ -38,7 +38,7 @@ def make_large_record(word):
 def test_a_full_disk_rejects_writes_until_space_is_freed(disk, serve):
     with serve(disk) as service:
         dataset = service.upload(csv()).json()["id"]
-        job = service.submit(**spec(dataset)).json()
+        job = service.client.get(service.submit(**spec(dataset)).headers["location"]).json()
         filler = filled(disk)
         refused = [
             service.upload(make_large_record(b"y_mm")),
@@ -133,7 +133,8 @@ def test_the_service_survives_a_database_outage(tmp_path, own_postgres):
     own = own_postgres
     with served(tmp_path, database=own.url) as service:
         dataset = service.upload(csv()).json()["id"]
-        job = service.submit({"Idempotency-Key": "k"}, **spec(dataset)).json()
+        submitted = service.submit({"Idempotency-Key": "k"}, **spec(dataset))
+        job = service.client.get(submitted.headers["location"]).json()
         events = []
         watcher = threading.Thread(target=lambda: events.extend(_read_events(service, job["id"])))
         watcher.start()
