@@ -1,10 +1,8 @@
 """Screening: a simulation extended by each effect in turn, calibrated and sorted by score."""
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from operator import attrgetter, itemgetter
-from typing import TypeAlias
 
 import numpy as np
 
@@ -12,20 +10,17 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     DIFFERENCE_STEP,
     CalibrationResult,
     Target,
-    calibrate,
     evaluate_fit,
     prior_precision,
 )
 from islands.discrepancy.effects import catalogue_order
+from islands.discrepancy.inference.starts_calibrator import StartsCalibrator
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.extended import ExtendedSimulator, invalid_effect_error
 
 #: Maximum number of starting points per effect that are calibrated.
 MAX_STARTS = 3
-
-#: Iterations of each start before the best one is calibrated to convergence.
-FIRST_ITERATIONS = 6
 
 #: Largest factor by which the strength of a starting point is scaled.
 MAX_SCALING = 5.0
@@ -37,9 +32,6 @@ SCORE_TIE = 0.5
 #: Minimum number of effects that are calibrated in addition to others, even if their linear responses promise
 #: no gain.
 MIN_CALIBRATED_EFFECTS = 5
-
-#: A simulation to be calibrated, and its starting points.
-CalibrationTask: TypeAlias = tuple[ExtendedSimulator, Sequence[Signal]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +87,7 @@ def screen_effects(
             or projection.score_decrease(candidate[0]) > bic_penalty(candidate[1], base)
         ]
     calibrated = parallel_map(
-        partial(_calibrate_from_starts, target),
+        StartsCalibrator(target),
         [(simulation, starts) for _, _, simulation, starts in candidates],
     )
     screened = [
@@ -106,25 +98,6 @@ def screen_effects(
         for (_, effect, simulation, _), ends in zip(candidates, calibrated, strict=True)
     ]
     return sorted(screened, key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
-
-
-def _calibrate_from_starts(target: Target, task: CalibrationTask) -> list[Signal]:
-    """Calibrate from several starts, and return the values of those that were calibrated to convergence.
-
-    These are all starts under model error, and otherwise the best one after a few iterations.
-    """
-    simulation, starts = task
-    if target.effective_samples is not None:
-        # Model error causes many minima, and the first iterations do not show which is the best.
-        return [calibrate(simulation, target, start).values for start in starts]
-    fits = [calibrate(simulation, target, start, max_iterations=FIRST_ITERATIONS) for start in starts]
-    return [calibrate(simulation, target, min(fits, key=attrgetter("score")).values).values]
-
-
-def make_task_key(task: CalibrationTask) -> Hashable:
-    """Return a key that is equal for tasks with equal results, given the same simulator and target."""
-    simulation, starts = task
-    return tuple(effect.name for effect in simulation.effects), *(start.tobytes() for start in starts)
 
 
 def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSimulator) -> Signal:

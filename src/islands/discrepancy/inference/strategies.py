@@ -20,7 +20,8 @@ from islands.discrepancy.calibration.noise_model import estimate_effective_sampl
 from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.noise_floor import explainable_variance, noise_variance_from_periods
 from islands.discrepancy.inference.residual_structure import find_residual_structure
-from islands.discrepancy.inference.screening import ScreenedEffect, make_task_key, screen_effects
+from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
+from islands.discrepancy.inference.starts_calibrator import make_task_key
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN, stepwise_search
 from islands.discrepancy.inference.verdict import (
     Verdict,

@@ -1,0 +1,114 @@
+"""Journal of the fits of a diagnosis, with which an interrupted diagnosis continues."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from islands.discrepancy.inference.starts_calibrator import CalibrationTask, StartsCalibrator
+from islands.discrepancy.interfaces.effect import Signal
+from islands.discrepancy.interfaces.parallel import ParallelMap
+
+A = TypeVar("A")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedFit:
+    """Result of a calibration task.
+
+    Attributes
+    ----------
+    digest : str
+        Digest of the task, see `StartsCalibrator.make_digest`.
+    values : list of ndarray, each of shape (parameters,)
+        What the calibrator returned.
+    """
+
+    digest: str
+    values: list[Signal]
+
+
+class FitJournal:
+    """Fits of a diagnosis in their order, recorded by a parallel map.
+
+    A diagnosis is deterministic: its fits depend on its arguments and on the fits before them. A diagnosis
+    with the same arguments and the known fits of an interrupted one therefore continues where that one
+    ended, and gives the same result, bit for bit. A known fit whose task differs from the one that is due is
+    dropped together with all later ones, so that a journal of another diagnosis costs only time.
+
+    Parameters
+    ----------
+    known : sequence of RecordedFit
+        Fits of an interrupted diagnosis.
+
+    Attributes
+    ----------
+    computed : int
+        Number of fits that were not known.
+    dropped : int
+        Number of known fits that belong to another diagnosis.
+    """
+
+    def __init__(self, known: Sequence[RecordedFit] = ()) -> None:
+        self._known, self._ended = deque(known), list[RecordedFit]()
+        self.computed = self.dropped = 0
+
+    def record(self, parallel_map: ParallelMap) -> ParallelMap:
+        """Return a map that takes known fits from the journal and records the others."""
+
+        def recorded_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
+            if isinstance(function, StartsCalibrator):
+                return self._continue(function, list(arguments), parallel_map)  # type: ignore[arg-type, return-value]
+            return parallel_map(function, arguments)
+
+        return recorded_map
+
+    def _continue(
+        self, calibrator: StartsCalibrator, tasks: Sequence[CalibrationTask], parallel_map: ParallelMap
+    ) -> Iterator[list[Signal]]:
+        first = 0
+        while first < len(tasks) and (known := self._take_known(calibrator, tasks[first])):
+            self._ended.append(known)
+            first += 1
+            yield known.values
+        remaining = tasks[first:]
+        if remaining:
+            for task, values in zip(remaining, parallel_map(calibrator, remaining), strict=True):
+                self._ended.append(RecordedFit(calibrator.make_digest(task), values))
+                self.computed += 1
+                yield values
+
+    def _take_known(self, calibrator: StartsCalibrator, task: CalibrationTask) -> RecordedFit | None:
+        """Return the next known fit if it is that of a task; otherwise drop all known fits."""
+        if not self._known:
+            return None
+        if self._known[0].digest == calibrator.make_digest(task):
+            return self._known.popleft()
+        self.dropped = len(self._known)
+        self._known.clear()
+        return None
+
+    def to_document(self) -> list[Any]:
+        """Return the fits as JSON values; floats are exact."""
+        return [
+            [fit.digest, [values.tolist() for values in fit.values]] for fit in (*self._ended, *self._known)
+        ]
+
+
+def journal_from_document(document: Sequence[Any]) -> FitJournal:
+    """Make a journal from the list that `FitJournal.to_document` returns.
+
+    Raises
+    ------
+    TypeError, ValueError
+        The list does not describe fits.
+    """
+    return FitJournal(
+        [
+            RecordedFit(str(digest), [np.array(values, dtype=np.float64) for values in results])
+            for digest, results in document
+        ]
+    )
