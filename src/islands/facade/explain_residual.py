@@ -9,9 +9,10 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
-from islands.evolution.engine import Engine
+from islands.evolution.engine import Engine, Stop
+from islands.evolution.search_state import SearchState
 from islands.facade.engine_choice import Ray
-from islands.facade.identify import identify
+from islands.facade.identify import SearchCallback, identify
 from islands.model.equations import named_equation
 from islands.simulation.predictors import free_run
 
@@ -46,11 +47,22 @@ SIMULATED = "simulated"
 
 
 def explain_residual(
-    found: Diagnosis, seed: int = 0, engine: Engine | Ray | str | None = None
+    found: Diagnosis,
+    seed: int = 0,
+    engine: Engine | Ray | str | None = None,
+    progress: SearchCallback | None = None,
+    stop: Stop | None = None,
+    start: SearchState | None = None,
 ) -> ResidualFormula | None:
     """Search for a formula of the residual of the best simulation of a diagnosis.
 
     The search uses the estimation part of the record; the hold-out part decides which formula is returned.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    seed, engine, progress, stop, start
+        Arguments of `identify`; ``start`` is a state of the search for the same residual.
 
     Returns
     -------
@@ -75,7 +87,16 @@ def explain_residual(
         segments=record.segments,
         recordings=record.recordings,
     )
-    result = identify(dataset[: found.estimation_samples], preset="narx", seed=seed, engine=engine, **SEARCH)
+    result = identify(
+        dataset[: found.estimation_samples],
+        preset="narx",
+        seed=seed,
+        engine=engine,
+        progress=progress,
+        stop=stop,
+        start=start,
+        **SEARCH,
+    )
     best, explained = None, MIN_EXPLAINED_FRACTION
     for each in result.models:
         run = free_run(each.model, dataset)
