@@ -1,6 +1,7 @@
 """Discrepancy jobs of a running service: the injected effect is found, also after kills and cancellations."""
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -65,24 +66,46 @@ def test_injected_effect_is_found_as_by_the_command_line(service: Service, tmp_p
         assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
 
 
-def test_killed_coordinator_does_not_change_the_diagnosis(service: Service, tmp_path: Path) -> None:
+def wait_for_checkpoint(service: Service, job: str) -> None:
+    """Wait until a diagnosis has screened all effects and has a checkpoint."""
+    eventually(lambda: "in addition" in str((service.job(job)["progress"] or {}).get("phase")))
+    assert service.job(job)["versions"]["checkpoint"]
+
+
+def known_fits(service: Service, job: str) -> list[int]:
+    """Return the number of fits with which each further attempt at a diagnosis continued."""
+    return [
+        int(each)
+        for each in re.findall(f"diagnosis continues .*fits=(\\d+) job={job}", service.log.read_text())
+    ]
+
+
+def test_killed_coordinator_continues_and_does_not_change_the_diagnosis(
+    service: Service, tmp_path: Path
+) -> None:
     undisturbed = found(service, submitted(service, tmp_path, LONG))
     job = submitted(service, tmp_path, LONG)
-    eventually(lambda: "effects" in str((service.job(job)["progress"] or {}).get("phase")))
+    wait_for_checkpoint(service, job)
     kill(service.one("coordinator"))
     assert found(service, job) == undisturbed
     assert service.job(job)["attempt"] == 2
+    (known,) = known_fits(service, job)
+    assert known > 0
 
 
-def test_running_diagnosis_is_cancelled_within_seconds_and_restarts(service: Service, tmp_path: Path) -> None:
+def test_running_diagnosis_is_cancelled_within_seconds_and_continues(
+    service: Service, tmp_path: Path
+) -> None:
     job = submitted(service, tmp_path, LONG)
-    eventually(lambda: "effects" in str((service.job(job)["progress"] or {}).get("phase")))
+    wait_for_checkpoint(service, job)
     assert service.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 202
     assert service.ended(job, seconds=5.0)["state"] == "cancelled"
     # No process continues to compute: those of the fits have another name while they are idle.
     eventually(lambda: "ray::_call" not in str(descendants(service.process.pid)), seconds=5.0)
     assert service.ask("POST", f"/v1/jobs/{job}/resume").status_code == 202
     assert [effect["name"] for effect in found(service, job)[0]["effects"]] == [HIDDEN]
+    (known,) = known_fits(service, job)
+    assert known > 0
 
 
 def test_cancelled_step_without_checks_is_abandoned(service: Service, tmp_path: Path) -> None:

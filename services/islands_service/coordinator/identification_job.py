@@ -21,6 +21,7 @@ from islands.io.models import model_json
 from islands.io.result_folder import result_document
 from islands.io.result_text.model_description import describe
 from islands.model.equations import equation
+from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import JobOutcome, JobState, Lease, ProgressReport
@@ -34,9 +35,6 @@ log = structlog.get_logger()
 
 #: Seconds between two reports of progress.
 REPORT_EVERY = 0.5
-
-#: Largest fraction of a run that checkpoints may take: one of a thousand islands takes half a minute.
-CHECKPOINT_SHARE = 0.05
 
 
 def run_identification_job(

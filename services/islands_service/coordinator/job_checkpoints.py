@@ -1,13 +1,8 @@
-"""Checkpoints of an identification job: read, written, and deleted when they are superseded."""
+"""Checkpoints of an identification job."""
 
-import gzip
-import zlib
 from dataclasses import dataclass
 from typing import Any
 
-import structlog
-
-from islands.errors import IslandsError
 from islands.evolution.search_state import SearchState
 from islands.facade.automatic.kind_choice import Choice, choice_from_document
 from islands.io.checkpoints import (
@@ -16,18 +11,7 @@ from islands.io.checkpoints import (
     state_document,
     state_from_document,
 )
-from islands_service.coordinator.job_failures import check_readable
-from islands_service.domain.job import Job
-from islands_service.store.blobs import BlobNotFoundError, Blobs
-from islands_service.store.database import StoreError
-
-log = structlog.get_logger()
-
-#: Errors of a lost or damaged checkpoint. Other errors of the operating system may pass.
-_LOSS_ERRORS = (
-    *(BlobNotFoundError, FileNotFoundError, gzip.BadGzipFile, EOFError, zlib.error),
-    *(IslandsError, KeyError, TypeError, ValueError),
-)
+from islands_service.coordinator.checkpoint_blobs import CheckpointBlobs
 
 #: Note in the progress and the summary of a job whose checkpoint was lost.
 RESTARTED = "the last checkpoint was lost or damaged: the search started again, which gives the same result"
@@ -55,20 +39,8 @@ class JobStart:
     note: str = ""
 
 
-class JobCheckpoints:
-    """Checkpoints of a job while this process has its lease.
-
-    Parameters
-    ----------
-    job : Job
-        The job at the time of the claim.
-    blobs : Blobs
-    """
-
-    def __init__(self, job: Job, blobs: Blobs) -> None:
-        self._job, self._blobs = job, blobs
-        # Blobs that the job named, or may have named, before its current checkpoint.
-        self._earlier = set() if job.checkpoint is None else {job.checkpoint}
+class JobCheckpoints(CheckpointBlobs):
+    """Checkpoints of an identification job."""
 
     def read(self) -> JobStart:
         """Return the state at the last checkpoint of the job.
@@ -78,25 +50,15 @@ class JobCheckpoints:
 
         Raises
         ------
-        JobDeclinedError
-            A newer version of islands wrote the checkpoint, and this one cannot read it.
-        OSError, StoreError
-            The file cannot be read now.
+        JobDeclinedError, OSError, StoreError
+            See `load`.
         """
-        job = self._job
-        if job.checkpoint is None:
-            return JobStart()
-        try:
-            text = gzip.decompress(self._blobs.read(job.checkpoint)).decode()
-            archipelago, about = archipelago_from_document(text, f"the checkpoint of job {job.id}")
-            choice = choice_from_document(about["choice"]) if about.get("choice") else None
-            return JobStart(state_from_document(archipelago, about), float(about["wall_s"]), choice)
-        except StoreError:
-            raise
-        except _LOSS_ERRORS as error:
-            check_readable(job.versions["checkpoint"], "checkpoint", error)
-            log.error("checkpoint lost", job=job.id, reason=str(error))
-            return JobStart(note=RESTARTED)
+        return self.load(self._parse) or JobStart(note=RESTARTED if self._job.checkpoint else "")
+
+    def _parse(self, text: str) -> JobStart:
+        archipelago, about = archipelago_from_document(text, f"the checkpoint of job {self._job.id}")
+        choice = choice_from_document(about["choice"]) if about.get("choice") else None
+        return JobStart(state_from_document(archipelago, about), float(about["wall_s"]), choice)
 
     def write(self, state: SearchState, spent: float, choice: Choice | None) -> str:
         """Write a checkpoint; return its blob.
@@ -111,18 +73,4 @@ class JobCheckpoints:
             "choice": None if choice is None else choice.to_document(),
             **state_document(state),
         }
-        text = checkpoint_text(state.archipelago, about)
-        return self._blobs.write(gzip.compress(text.encode(), compresslevel=1, mtime=0))
-
-    def remember(self, blob: str) -> None:
-        """Remember a blob of which it is unknown whether the job names it."""
-        self._earlier.add(blob)
-
-    def supersede(self, blob: str) -> None:
-        """Delete the earlier checkpoints after the job durably names a new one.
-
-        The lease was valid then, so that any later reader of the job finds the new one.
-        """
-        for earlier in self._earlier - {blob}:
-            self._blobs.discard(earlier)
-        self._earlier = {blob}
+        return self.save(checkpoint_text(state.archipelago, about))

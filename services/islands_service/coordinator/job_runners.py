@@ -48,7 +48,7 @@ def _run_identification(*arguments: Any) -> JobOutcome:
 
 
 def _run_diagnosis(*arguments: Any) -> JobOutcome:
-    from islands_service.coordinator.diagnosis_job import run_diagnosis_job  # noqa: PLC0415
+    from islands_service.coordinator.diagnosis.diagnosis_job import run_diagnosis_job  # noqa: PLC0415
 
     return run_diagnosis_job(*arguments)
 

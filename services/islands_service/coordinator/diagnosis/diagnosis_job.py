@@ -1,7 +1,7 @@
 """Discrepancy job: diagnose a simulation, write the report and the extended simulation."""
 
 from collections.abc import Callable
-from time import monotonic, sleep
+from time import sleep
 
 import structlog
 
@@ -12,7 +12,8 @@ from islands.facade.explain_residual import explain_residual
 from islands.io.diagnosis_json import diagnosis_document
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
-from islands_service.coordinator.diagnosis_progress import DiagnosisProgress
+from islands_service.coordinator.diagnosis.diagnosis_checkpoints import DiagnosisCheckpoints
+from islands_service.coordinator.diagnosis.diagnosis_progress import DiagnosisProgress
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, Lease
 from islands_service.domain.job_spec import parse_discrepancy
@@ -35,18 +36,18 @@ def run_diagnosis_job(
     blobs: Blobs,
     _engine: Engine,
     check: Callable[[], None],
-    _every: float,
+    every: float,
     _notes: JobNotes | None = None,
     map_cases: ParallelMap | None = None,
 ) -> JobOutcome:
-    """Run a discrepancy job.
-
-    It takes seconds to minutes and has no checkpoints: after an interruption it starts again.
+    """Run a discrepancy job from its last checkpoint.
 
     Parameters
     ----------
     check : callable
         Raises the reason if the job must end early.
+    every : float
+        Least number of seconds between two checkpoints.
     map_cases : ParallelMap, optional
         Fits the effects; by default on the Ray cluster to which this process is connected.
 
@@ -55,8 +56,9 @@ def run_diagnosis_job(
     IslandsError
         The record or the simulation is unusable, or any error that ``check`` raises.
     """
-    started = monotonic()
-    report = DiagnosisProgress(lease, store, check)
+    checkpoints = DiagnosisCheckpoints(lease.job, blobs)
+    state = checkpoints.read()
+    report = DiagnosisProgress(lease, store, check, checkpoints, state, every)
     spec = parse_discrepancy(lease.job.spec)
     datasets = {
         part.dataset: store.datasets.get(lease.job.owner, part.dataset, deleted=True) for part in spec.parts
@@ -64,23 +66,25 @@ def run_diagnosis_job(
     report("reading the record", 0.0)
     record, columns = read_record_and_columns(spec, datasets, blobs)
     simulator = make_simulator(spec.simulation, record, columns)
-    fits = map_cases or ray_map(check=check)
+    fits = state.journal.record(map_cases or ray_map(check=check))
     found = diagnose(record, simulator, spec.tolerance, spec.seed, report, report.count(fits))
     report("a formula for the unexplained residual", 0.95)
-    formula = explain_residual(found, spec.seed)
-    wall_s = monotonic() - started
+
+    def stop() -> bool:
+        check()
+        return False
+
+    start = state.begin_search(found)
+    formula = explain_residual(found, spec.seed, progress=report.count_epochs, stop=stop, start=start)
+    wall_s = report.spent
     report("writing the report", 0.98)
     names = ", ".join(datasets[part.dataset].name for part in spec.parts)
     artefacts = {REPORT: _keep(diagnosis_report(names, found, proposal=formula), blobs, check)}
     if found.gain is not None:
         artefacts[EXTENDED] = _keep(extended_json(found.best, found.record).encode(), blobs, check)
     document = diagnosis_document(found, wall_s, proposal=formula)
-    return JobOutcome(
-        JobState.SUCCEEDED,
-        document,
-        summary=_summary(found, formula, simulator.name, wall_s),
-        artefacts=artefacts,
-    )
+    summary = _make_summary(found, formula, simulator.name, wall_s, state.note)
+    return JobOutcome(JobState.SUCCEEDED, document, summary=summary, artefacts=artefacts)
 
 
 def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
@@ -94,14 +98,16 @@ def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
             sleep(_RETRY_SECONDS)
 
 
-def _summary(
-    found: Diagnosis, formula: ResidualFormula | None, simulation: str, wall_s: float
+def _make_summary(
+    found: Diagnosis, formula: ResidualFormula | None, simulation: str, wall_s: float, note: str
 ) -> dict[str, object]:
+    words = summarise(found, formula)
     return {
         "simulation": simulation,
         "verdict": str(found.verdict),
         "effects": [finding.name for finding in found.effects],
         "reduction_percent": None if found.gain is None else found.gain.reduction_percent,
-        "words": summarise(found, formula),
+        "words": f"{words}\nNote: {note}." if note else words,
         "wall_s": wall_s,
+        **({"note": note} if note else {}),
     }

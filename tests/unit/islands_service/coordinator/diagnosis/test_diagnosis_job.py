@@ -1,7 +1,6 @@
-"""Discrepancy job: progress, result, and reproducibility after interruptions."""
+"""Discrepancy job: progress, result, and unusable input."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -11,28 +10,19 @@ import pytest
 
 from islands.discrepancy.inference import noise_floor
 from islands.errors import RecordError, SettingsError
-from islands.evolution.engine import SerialEngine
-from islands.io.records.preview import preview
-from islands_service.coordinator import diagnosis_job
-from islands_service.coordinator.diagnosis_job import run_diagnosis_job
+from islands_service.coordinator.diagnosis import diagnosis_job
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_failures import make_problem_document
 from islands_service.domain.job import (
-    DISCREPANCY,
-    EXTENDED,
-    REPORT,
     Job,
-    JobOutcome,
     JobState,
-    Lease,
-    Submission,
 )
 from islands_service.store import Store
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreUnavailableError
 from support.command_line import write_offset
-from support.service import held
+from support.diagnosis_jobs import claim, run_job, submit_diagnosis
 from support.stores import ALICE
 from support.undrawn import undrawn_figures
 
@@ -63,63 +53,13 @@ def _cheap_analysis(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 @pytest.fixture
 def submit(store: Store, blobs: Blobs, measured: Path) -> Submit:
     """Submit jobs on the record that differs from its simulation by an offset."""
-    data, described = measured.read_bytes(), asdict(preview(measured))
-    dataset, _ = store.datasets.add(ALICE, "record.csv", ".csv", blobs.write(data), len(data), described)
-
-    def submitted(**changes: Any) -> Job:
-        spec = held(dataset.id, **{"channels": ["T_K"], "simulation": COLUMN, **changes})
-        return store.jobs.submit(Submission(ALICE, spec, DISCREPANCY))[0]
-
-    return submitted
-
-
-def claim(store: Store) -> Lease:
-    lease = store.leases.claim("me", 60.0)
-    assert lease is not None
-    return lease
-
-
-def run_job(lease: Lease, store: Any, blobs: Blobs, check: Callable[[], None] = lambda: None) -> JobOutcome:
-    return run_diagnosis_job(lease, store, blobs, SerialEngine(), check, 1.0, map_cases=map)
+    return lambda **changes: submit_diagnosis(store, blobs, measured, **{"channels": ["T_K"], **changes})
 
 
 def phases(store: Store, job: Job) -> list[str]:
     """Return the phases of a job; one with several reports counts once."""
     reported = [each.data["phase"] for each in store.jobs.events(job.id) if each.kind == "progress"]
     return [phase for phase, _ in groupby(reported)]
-
-
-def without_time(outcome: JobOutcome) -> JobOutcome:
-    document, summary = dict(outcome.document or {}), dict(outcome.summary or {})
-    assert document.pop("wall_s") == summary.pop("wall_s") > 0.0
-    return replace(outcome, document=document, summary=summary)
-
-
-class Interruption:
-    """A check that raises at its n-th call."""
-
-    def __init__(self, at: int) -> None:
-        self.left = at
-
-    def __call__(self) -> None:
-        self.left -= 1
-        if self.left == 0:
-            raise JobCancelled("enough")
-
-
-@pytest.mark.ci
-def test_interrupted_diagnosis_gives_the_same_bytes(store: Store, blobs: Blobs, submit: Submit) -> None:
-    job = submit()
-    first = without_time(run_job(claim(store), store, blobs))
-    stored_phases = phases(store, job)
-    assert (first.document or {})["effects"][0]["name"] == "offset"
-    assert set(first.artefacts) == {REPORT, EXTENDED}
-    for at in (1, len(stored_phases)):
-        with pytest.raises(JobCancelled):
-            run_job(claim(store), store, blobs, Interruption(at))
-    # Blobs are named by content: report and extended simulation are equal, too.
-    assert without_time(run_job(claim(store), store, blobs)) == first
-    assert phases(store, job)[-len(stored_phases) :] == stored_phases
 
 
 def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs, submit: Submit) -> None:

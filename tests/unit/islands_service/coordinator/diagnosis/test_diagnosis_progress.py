@@ -2,8 +2,9 @@
 
 import pytest
 
-from islands_service.coordinator import diagnosis_progress
-from islands_service.coordinator.diagnosis_progress import STEP, DiagnosisProgress
+from islands_service.coordinator.diagnosis import diagnosis_progress
+from islands_service.coordinator.diagnosis.diagnosis_checkpoints import DiagnosisState
+from islands_service.coordinator.diagnosis.diagnosis_progress import STEP, DiagnosisProgress
 from support.stores import ALICE, claimed, submitted
 
 
@@ -16,7 +17,9 @@ def clock(monkeypatch):
 
 def test_time_left_follows_the_fraction_of_steps_and_fits(store, clock):
     job = submitted(store)
-    report, seen = DiagnosisProgress(claimed(store), store, lambda: None), []
+    lease, state, seen = claimed(store), DiagnosisState(spent=3.0), []
+    # Without new fits no checkpoint is written: the job would never be given up.
+    report = DiagnosisProgress(lease, store, lambda: None, None, state, 1e-9)
 
     def look(_):
         clock[0] += 1.0
@@ -28,7 +31,6 @@ def test_time_left_follows_the_fraction_of_steps_and_fits(store, clock):
         "fraction": 0.0,
         "seconds_left": None,
     }
-    clock[0] += 3.0
     report("screening 4 effects", 0.3)
     assert list(report.count(map)(look, range(4))) == [None] * 4
     assert [each["fraction"] for each in seen] == pytest.approx([0.3 + STEP * k / 4 for k in range(4)])

@@ -1,0 +1,1 @@
+"""Discrepancy jobs: diagnosis of a simulation, its progress and its checkpoints."""
