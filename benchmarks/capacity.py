@@ -107,7 +107,12 @@ class LargeJob:
         0.0005, "the same of the coordinator of a region, measured with 500 individuals"
     )
     driver: float = _option(0.00002, "seconds of CPU of the driver of all regions for each island, measured")
-    checkpoint: float = _option(0.04, "seconds of the driver for each island of a checkpoint, measured")
+    checkpoint: float = _option(
+        0.025, "seconds of the process that renders it for each island of a checkpoint, measured"
+    )
+    collection: float = _option(
+        0.0002, "seconds of the driver of all regions for each island of a checkpoint, measured"
+    )
     share: float = _option(0.05, "largest share of the time for checkpoints, a constant of the service", 1.0)
     checkpoint_every: float = _option(
         5, "seconds between two checkpoints at least (ISLANDS_CHECKPOINT_EVERY)"
@@ -142,14 +147,21 @@ class LargeJob:
         return max(self.epoch + self.latency, self.coordinator_busy, self.driver_busy)
 
     @property
+    def stall(self) -> float:
+        """Seconds of a checkpoint. Regions are rendered at the same time, by a task each."""
+        if self.regions == 1:
+            return self.checkpoint * self.cores
+        return self.checkpoint * math.ceil(self.cores / self.regions) + self.collection * self.cores
+
+    @property
     def interval(self) -> float:
         """Seconds between two checkpoints."""
-        return max(self.checkpoint_every, self.checkpoint * self.cores / self.share)
+        return max(self.checkpoint_every, self.stall / self.share)
 
     @property
     def waiting(self) -> float:
         """Share of the time in which actors wait for a checkpoint, with empty queues."""
-        return max(0.0, self.checkpoint * self.cores - self.ahead * self.period) / self.interval
+        return max(0.0, self.stall - self.ahead * self.period) / self.interval
 
     @property
     def efficiency(self) -> float:
@@ -166,7 +178,7 @@ class LargeJob:
         yield "coordinator of a region, busy", f"{100 * self.coordinator_busy / self.period:.0f} %"
         yield "driver, busy", f"{100 * self.driver_busy / self.period:.0f} %"
         yield "shortest epoch without loss", f"{max(0.0, shortest):.2f} s"
-        yield "a checkpoint takes", f"{self.checkpoint * self.cores:.0f} s"
+        yield "a checkpoint takes", f"{self.stall:.0f} s"
         yield "actors wait for checkpoints", f"{100 * self.waiting:.1f} % of the time"
         yield "interval of checkpoints, at least", f"{self.interval:.0f} s"
         yield "network of the coordinator of a region", f"{collected:.0f} MB/s"

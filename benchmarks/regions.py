@@ -1,6 +1,6 @@
-"""CPU time of the coordinators of 10 000 islands, measured with simulated epochs.
+"""CPU time of the coordinators of 10 000 islands, measured with simulated epochs; cost of a checkpoint.
 
-    python benchmarks/regions.py [region] [driver] [--pace SECONDS] [--json FILE]
+    python benchmarks/regions.py [region] [driver] [checkpoint] [--pace SECONDS] [--islands N] [--json FILE]
 
 The tree has a driver, coordinators of regions of 500 islands each, and the actors of islands. Two levels are
 measured, each with the real code of the level and with actors that answer without computing. Their answers
@@ -12,6 +12,10 @@ are those of a real epoch of an island of 500 individuals: packed bytes, emigran
 the statistics and stores progress and history in a database on the disk, as a job of the service does. The
 islands of a region stay with its actor and are not sent.
 
+``checkpoint``: the driver, while it writes a checkpoint of ``--islands`` islands of 500 individuals whose
+regions are in the object store, and one of 256 islands that are in its memory. The peak of the memory
+includes the pages of the object store that the driver reads.
+
 CPU times include all threads of the process. Epochs of a second are feasible if each level takes less.
 """
 
@@ -20,7 +24,7 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import version
@@ -35,9 +39,10 @@ import numpy as np
 import ray
 
 from islands.data.dataset import Dataset
-from islands.evolution.archipelago import empty_archipelago
+from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.epoch import IslandEpoch, select_migrants
+from islands.evolution.island import Island
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem
 from islands.evolution.search_state import SearchState, advance
@@ -46,9 +51,10 @@ from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.engines import ENGINES
 from islands_service.runtime import actor_pool, regions
-from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch
+from islands_service.runtime.packed_epoch import PackedEpoch, PackedIslands, pack_epoch
 from islands_service.runtime.ray_engine import RayEngine
 from islands_service.runtime.region_actor import RegionReport, RegionStatus
+from islands_service.runtime.region_islands import RegionIslands
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from support.stores import claimed, submitted
@@ -58,6 +64,9 @@ ISLANDS, REGIONS = regions.REGION_SIZE, 20
 
 #: Number of timed epochs, after the first one.
 TIMED = 10
+
+#: Islands of the checkpoint of a search without regions.
+FLAT = 256
 
 
 def never() -> bool:
@@ -219,10 +228,49 @@ def measure_driver(answer: PackedEpoch, pace: float) -> dict[str, float]:
     }
 
 
+def measure_checkpoint(answer: PackedEpoch, size: int) -> dict[str, float]:
+    """Measure a checkpoint of islands in regions, and one of islands in this process."""
+    problem = make_problem(1)
+    reports = [replace(answer, index=index, packed=bytes([*answer.packed])) for index in range(size)]
+    starts = range(0, size, ISLANDS)
+    states = [ray.put(tuple(reports[start : start + ISLANDS])) for start in starts]
+    flat = PackedIslands(reports[:FLAT], problem.settings.primitive_table)
+    del reports
+    found = _write_checkpoint(RegionIslands(starts, size, states, problem, ray.put(problem)))
+    local = _write_checkpoint(flat)
+    return {"islands": size, **found, **{f"{FLAT} local islands: {name}": local[name] for name in local}}
+
+
+def _write_checkpoint(islands: Sequence[Island]) -> dict[str, float]:
+    """Measure this process while it writes a checkpoint."""
+    with tempfile.TemporaryDirectory() as folder:
+        store, blobs = Store(f"sqlite:///{folder}/islands.db"), Blobs(Path(folder) / "blobs")
+        submitted(store)
+        checkpoints = JobCheckpoints(claimed(store).job, blobs)
+        Path("/proc/self/clear_refs").write_text("5")  # forget the peak so far
+        memory, wall, cpu = _read_memory("VmRSS"), time.perf_counter(), time.process_time()
+        blob = checkpoints.write(SearchState(Archipelago(islands)), 0.0, None)
+        found = {
+            "time, s": time.perf_counter() - wall,
+            "CPU, s": time.process_time() - cpu,
+            "peak of the memory in addition, MB": _read_memory("VmHWM") - memory,
+            "file, MB": blobs.path(blob).stat().st_size / 1e6,
+        }
+        store.close()
+        return found
+
+
+def _read_memory(name: str) -> float:
+    """Return a figure of the memory of this process in MB."""
+    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith(name))
+    return float(line.split()[1]) * 1024 / 1e6
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("levels", nargs="*", help="region, driver; both by default")
+    parser.add_argument("levels", nargs="*", help="region, driver, checkpoint; all by default")
     parser.add_argument("--pace", type=float, default=1.0, help="seconds between two reports of a region")
+    parser.add_argument("--islands", type=int, default=1_000, help="islands of the checkpoint")
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
     found: dict[str, dict[str, float]] = {}
@@ -232,9 +280,11 @@ def main() -> None:
             found["region"] = measure_region(answer)
         if "driver" in given.levels or not given.levels:
             found["driver"] = measure_driver(answer, given.pace)
+        if "checkpoint" in given.levels or not given.levels:
+            found["checkpoint"] = measure_checkpoint(answer, given.islands)
     for level, figures in found.items():
         for name, value in figures.items():
-            print(f"{level:7s} {name:45s} {value:10.3g}")
+            print(f"{level:10s} {name:60s} {value:10.3g}")
     if given.json:
         given.json.write_text(json.dumps(found, indent=2))
 

@@ -52,7 +52,11 @@ def test_cores_beyond_the_capacity_of_the_driver_are_of_no_use() -> None:
 def test_checkpoints_take_no_more_than_their_share(cores: int) -> None:
     job = LargeJob(cores=cores)
     assert job.waiting <= job.share
-    assert job.checkpoint * cores <= job.share * job.interval + 1e-9
+    assert job.stall <= job.share * job.interval + 1e-9
+
+
+def test_checkpoints_of_regions_are_rendered_at_the_same_time() -> None:
+    assert LargeJob(cores=10_000).stall - LargeJob(cores=500).stall == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("jobs", [1, 1_000, 50_000])
@@ -95,7 +99,9 @@ def test_coefficients_are_options_that_change_the_table(
     }
     # A single coordinator and regions exclude each other.
     assert (
-        without_effect <= {"flat"} if "1000" in start else without_effect <= {"region", "regional", "driver"}
+        without_effect <= {"flat"}
+        if "1000" in start
+        else without_effect <= {"region", "regional", "driver", "collection"}
     )
 
 

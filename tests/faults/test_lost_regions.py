@@ -1,16 +1,20 @@
 """Searches in regions: the result equals that of the serial engine, bit for bit, also after losses."""
 
+import gzip
 import os
 import signal
 from dataclasses import replace
 
 import pytest
 
-from islands.evolution.archipelago import empty_archipelago
+from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
+from islands.io.checkpoints import compressed_checkpoint, read_checkpoint, write_checkpoint
 from islands_service.engines import ENGINES
 from islands_service.runtime import regions
+from islands_service.runtime.errors import ClusterError
+from islands_service.runtime.region_islands import RegionIslands
 from islands_service.runtime.regions import run_regions
 from support.processes import actors, alive, descendants, eventually, kill
 from support.searches import SMALL, exactly, record
@@ -43,29 +47,58 @@ def messages(ray_address):
     eventually(lambda: not actors())
 
 
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "checkpoint.json"
+
+
+def checkpoint(epoch):
+    """Return the text of a checkpoint of the service."""
+    return gzip.decompress(b"".join(compressed_checkpoint(epoch.archipelago, {"seed": SEED})))
+
+
 def coordinators():
     """Return the processes of the coordinators of regions."""
     return [pid for pid, line in descendants(os.getpid()).items() if "RegionActor" in line]
 
 
 @pytest.mark.ci
-def test_a_killed_coordinator_of_a_region_does_not_change_the_result(posed, whole, messages):
-    found = []
+def test_a_killed_coordinator_of_a_region_changes_neither_result_nor_checkpoint(posed, whole, messages, path):
+    found, texts = [], []
     for epoch in run_regions(posed, empty_archipelago(6, SEED), never, 2, messages.append):
         found.append(epoch)
         if len(found) == 3:
             kill(victim := min(eventually(coordinators)))
             eventually(lambda: not alive([victim]))
+            texts.append(checkpoint(epoch))
+            assert not epoch.archipelago.islands._regions  # they are rendered where they are
     assert [epoch.steps for epoch in found] == [epoch.steps for epoch in whole]
     # The actors have ended, and the islands of the last epoch are still here.
     eventually(lambda: not (actors() or coordinators()))
     assert exactly(found[-1].archipelago) == exactly(whole[-1].archipelago)
+    texts.append(checkpoint(found[-1]))
+    for text, epoch in zip(texts, (whole[2], whole[-1]), strict=True):
+        write_checkpoint(epoch.archipelago, path, {"seed": SEED})
+        assert text == path.read_bytes()
     assert sum("the coordinator of the islands" in message for message in messages) == 1
 
 
+@pytest.mark.ci
+def test_lost_islands_are_a_loss_of_the_cluster(posed, whole, messages):
+    import ray
+
+    gone = ray.remote(max_retries=0)(lambda: os._exit(1)).remote()
+    islands = RegionIslands([0, 3], 6, [ray.put(()), gone], posed, ray.put(posed))
+    lost = replace(whole[0], archipelago=Archipelago(islands))
+    for access in (lambda: checkpoint(lost), lambda: islands[4]):
+        with pytest.raises(ClusterError, match="islands were lost"):
+            access()
+
+
 @pytest.mark.nightly
-def test_a_search_in_regions_continues_from_any_archipelago(posed, whole, messages):
-    start = whole[3].archipelago
+def test_a_search_in_regions_continues_from_any_checkpoint(posed, whole, messages, path):
+    write_checkpoint(whole[3].archipelago, path, {})
+    start, _ = read_checkpoint(path)
     found = list(run_regions(posed, start, never, 2, messages.append))
     assert [epoch.steps for epoch in found] == [epoch.steps for epoch in whole[4:]]
     assert exactly(found[-1].archipelago) == exactly(whole[-1].archipelago)

@@ -27,6 +27,7 @@ from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
+from islands_service.runtime.errors import ClusterError
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
@@ -195,22 +196,26 @@ class ProgressReporter:
                 blob = self._checkpoints.write(state, self.spent, self.choice)
                 report = replace(report, checkpoint=blob)
             self._store.leases.report(self._lease, report)
-        except StoreError as error:
+        except (StoreError, ClusterError) as error:
             # Continue the search. The next report contains the same points.
             log.warning("report failed", job=self._lease.job.id, reason=str(error))
-            self._report_at = monotonic() + REPORT_EVERY
             if report.checkpoint is not None:
                 self._checkpoints.remember(report.checkpoint)
-                # The checkpoint stays on disk until the next one is stored: do not write that at once.
-                self._checkpoint_at = monotonic() + self._every
+            self._schedule(started)
             return False
         self._stored_points = len(state.history) - 1
-        now = monotonic()
-        self._report_at = now + REPORT_EVERY
         if report.checkpoint is not None:
             self._checkpoints.supersede(report.checkpoint)
-            self._checkpoint_at = now + max(self._every, (now - started) / CHECKPOINT_SHARE)
+        self._schedule(started)
         return True
+
+    def _schedule(self, started: float) -> None:
+        """Set the times of the next report and, if one was due, of the next checkpoint."""
+        now = monotonic()
+        self._report_at = now + REPORT_EVERY
+        if started >= self._checkpoint_at:
+            # Also after a failure: a checkpoint of thousands of islands takes long, and may fail at its end.
+            self._checkpoint_at = now + max(self._every, (now - started) / CHECKPOINT_SHARE)
 
     def _progress(self, state: SearchState, settings: Settings) -> dict[str, Any]:
         last = state.history[-1]

@@ -7,7 +7,7 @@ from islands.evolution.search_state import SearchState
 from islands.facade.automatic.kind_choice import Choice, choice_from_document
 from islands.io.checkpoints import (
     archipelago_from_document,
-    checkpoint_text,
+    compressed_checkpoint,
     state_document,
     state_from_document,
 )
@@ -66,6 +66,8 @@ class JobCheckpoints(CheckpointBlobs):
         Raises
         ------
         StorageFullError, ObjectStoreError
+        ClusterError
+            Islands that are not in this process were lost.
         """
         about: dict[str, Any] = {
             "job": self._job.id,
@@ -73,4 +75,4 @@ class JobCheckpoints(CheckpointBlobs):
             "choice": None if choice is None else choice.to_document(),
             **state_document(state),
         }
-        return self.save(checkpoint_text(state.archipelago, about))
+        return self.save(compressed_checkpoint(state.archipelago, about))

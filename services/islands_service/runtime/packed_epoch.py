@@ -10,7 +10,7 @@ has one function per primitive, which it compiles once.
 import io
 import pickle
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, overload
 
@@ -108,6 +108,8 @@ class _Unpickler(pickle.Unpickler):
 class LazyIslands(Sequence[Island]):
     """Sequence of islands, each of which is read at its first access; equal to their tuple.
 
+    An iteration over all islands does not keep them: thousands take gigabytes.
+
     Parameters
     ----------
     size : int
@@ -123,6 +125,9 @@ class LazyIslands(Sequence[Island]):
 
     def __len__(self) -> int:
         return self._size
+
+    def __iter__(self) -> Iterator[Island]:
+        return (self._islands.get(place) or self._read(place) for place in range(self._size))
 
     @overload
     def __getitem__(self, place: int) -> Island: ...

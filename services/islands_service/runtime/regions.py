@@ -125,7 +125,7 @@ class _Tree:
         autoscaling: bool,
         observe: Callable[[int, int], None],
     ) -> None:
-        self._problem, self._settings = put_problem(problem), problem.settings
+        self._problem, self._shared, self._settings = problem, put_problem(problem), problem.settings
         self._progress, self._title, self._autoscaling = progress, title, autoscaling
         self._observe = observe
         self._sources = make_topology(problem, start).sources
@@ -201,7 +201,8 @@ class _Tree:
                 [region.islands.start for region in self._regions],
                 self._size,
                 [region.states[end] for region in self._regions],
-                self._settings.primitive_table,
+                self._problem,
+                self._shared,
             )
             steps = tuple(steps for report in reports for steps in report.steps)
             yield ArchipelagoEpoch(
@@ -222,7 +223,7 @@ class _Tree:
     def _start_actor(self, region: _Region) -> ActorHandle:
         self._actor_count += 1
         actor = _ACTOR.options(name=f"{self._title}.{self._actor_count}" if self._title else None).remote(
-            self._problem,
+            self._shared,
             self._sources,
             self._borders[region.index],
             region.generation,

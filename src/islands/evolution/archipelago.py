@@ -1,10 +1,20 @@
 """Archipelago: the state of all islands at one generation."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 from islands.evolution.hall_of_fame import HallOfFame, merge
 from islands.evolution.island import Island
+
+
+@runtime_checkable
+class RemoteIslands(Protocol):
+    """Interface of sequences of islands some of which are in other processes."""
+
+    def render(self, function: Callable[[Island], bytes]) -> Iterator[bytes]:
+        """Yield the bytes that a function returns for each island, and call it where the islands are."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +38,20 @@ class Archipelago:
     def hall_of_fame(self) -> HallOfFame:
         """Merged halls of fame of all islands."""
         return merge(*(island.hall_of_fame for island in self.islands))
+
+    def render(self, function: Callable[[Island], bytes]) -> Iterator[bytes]:
+        """Yield the bytes that a function returns for each island, in order.
+
+        Islands in other processes are not fetched.
+
+        Parameters
+        ----------
+        function : callable
+            Can be pickled.
+        """
+        if isinstance(self.islands, RemoteIslands):
+            return self.islands.render(function)
+        return map(function, self.islands)
 
 
 def empty_archipelago(islands: int, seed: int) -> Archipelago:

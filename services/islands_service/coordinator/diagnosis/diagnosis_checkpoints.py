@@ -14,6 +14,7 @@ from islands.evolution.search_state import SearchState
 from islands.io.checkpoints import (
     archipelago_from_document,
     checkpoint_text,
+    compress_text,
     state_document,
     state_from_document,
 )
@@ -117,4 +118,4 @@ class DiagnosisCheckpoints(CheckpointBlobs):
         if (search := state.search) is not None:
             text = checkpoint_text(search.archipelago, state_document(search))
             document["search"] = {"residual": state.residual, "state": text}
-        return self.save(json.dumps(document))
+        return self.save([compress_text(json.dumps(document))])

@@ -1,5 +1,6 @@
 """Checkpoints: exact round trips, atomic writes, and errors for damaged files."""
 
+import gzip
 import json
 import os
 from dataclasses import replace
@@ -13,8 +14,15 @@ from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.gp.individual import Individual, make_regressor
 from islands.evolution.hall_of_fame import HallOfFame, merge, with_entries
 from islands.evolution.island import Island
-from islands.io.checkpoints import HALL_SCHEMA, SCHEMA, read_checkpoint, write_checkpoint, write_hall
-from islands.model.expression import Apply
+from islands.io.checkpoints import (
+    HALL_SCHEMA,
+    SCHEMA,
+    compressed_checkpoint,
+    read_checkpoint,
+    write_checkpoint,
+    write_hall,
+)
+from islands.model.expression import Apply, Constant
 from islands.model.model import canonical_order
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
@@ -46,7 +54,8 @@ def archipelago():
     failed = individual(
         "u1(k-1)", fitness=inf, outcome=EvaluationOutcome(Status.INFEASIBLE, 'no "y" at rest \u2013 add it')
     )
-    unevaluated = Individual((parse("phi1(u1(k-1), u1(k-1))"),))
+    # Equal genes with different texts.
+    unevaluated = Individual((parse("phi1(u1(k-1), u1(k-1))"), Constant(0.0), Constant(-0.0)))
     abandoned = individual(
         "y(k-3)", fitness=inf, outcome=EvaluationOutcome(Status.ABANDONED, "beyond the bar")
     )
@@ -108,6 +117,13 @@ def test_a_checkpoint_is_strict_json(document, path):
     assert [island["bar"] for island in document["islands"]] == [0.1 + 0.2, None]
     assert "Infinity" not in path.read_text()
     assert "NaN" not in path.read_text()
+
+
+@pytest.mark.parametrize("kept", [archipelago(), EMPTY, Archipelago()])
+def test_parts_of_a_checkpoint_form_the_text_of_the_whole(path, kept):
+    write_checkpoint(kept, path, ABOUT)
+    assert path.read_text() == json.dumps(json.loads(path.read_text()))
+    assert gzip.decompress(b"".join(compressed_checkpoint(kept, ABOUT))) == path.read_bytes()
 
 
 def test_user_defined_primitives_are_read_back_from_their_table(path):

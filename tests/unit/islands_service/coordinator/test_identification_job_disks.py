@@ -50,6 +50,7 @@ def test_search_continues_without_checkpoints_while_its_disk_fails(
     fault: Callable[[Path], AbstractContextManager[None]],
 ) -> None:
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    monkeypatch.setattr(work, "CHECKPOINT_SHARE", 1e9)
     lease = store.leases.claim("me", 60.0)
     assert lease is not None
     checks, checkpoints, failure = [], [], ExitStack()

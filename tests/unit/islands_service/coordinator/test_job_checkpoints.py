@@ -1,19 +1,23 @@
 """Checkpoints of identification jobs: a lost one costs only time, a superseded one is deleted."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import pytest
 from sqlalchemy import update
 
-from islands.evolution.engine import SerialEngine
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.engine import ArchipelagoEpoch, SerialEngine
+from islands.evolution.island import Island
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.coordinator.job_checkpoints import RESTARTED, JobCheckpoints
 from islands_service.coordinator.job_failures import JobDeclinedError
 from islands_service.domain.job import ISLANDS_VERSION, Job, Lease, LeaseLostError, ProgressReport
+from islands_service.runtime.errors import ClusterError
 from islands_service.store import Store
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import Blobs
@@ -160,6 +164,37 @@ def test_named_checkpoint_exists_whatever_the_store_acknowledges(
     assert flaky.reports > 10
 
 
+class LostIslands(tuple[Island, ...]):
+    """Islands that are lost while a checkpoint is written."""
+
+    def render(self, function: Callable[[Island], bytes]) -> Iterator[bytes]:
+        yield function(self[0])
+        raise ClusterError("a machine was lost")
+
+
+class LosingEngine(SerialEngine):
+    """Engine that loses the islands of some epochs."""
+
+    def run(self, *search: Any) -> Iterator[ArchipelagoEpoch]:
+        for number, epoch in enumerate(super().run(*search)):
+            lost = Archipelago(LostIslands(epoch.archipelago.islands))
+            yield replace(epoch, archipelago=lost) if number in {0, 2, 3} else epoch
+
+
+@pytest.mark.ci
+def test_search_continues_without_a_checkpoint_whose_islands_were_lost(
+    store: Store, blobs: Blobs, job: Job, undisturbed: Found, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "CHECKPOINT_SHARE", 1e9)
+    named, before = set(), set(dict(blobs.all()))
+    look = lambda: named.add(store.jobs.get(ALICE, job.id).checkpoint)  # noqa: E731
+    outcome = run_identification_job(claim(store), store, blobs, LosingEngine(), look, 1e-9)
+    assert [json.loads(json.dumps(document)) for document, _ in outcome.models] == undisturbed[0]
+    assert store.results.history(job.id) == undisturbed[1]
+    assert len(named) > 5
+    assert set(dict(blobs.all())) - before == {store.jobs.get(ALICE, job.id).checkpoint}
+
+
 def test_checkpoint_that_cannot_be_read_now_is_not_lost(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -168,9 +203,9 @@ def test_checkpoint_that_cannot_be_read_now_is_not_lost(
     lease = claim(store)
     store.leases.report(lease, ProgressReport({}, checkpoint=checkpoint))
 
-    def fail(_blob: str) -> bytes:
+    def fail(_blob: str) -> IO[bytes]:
         raise ObjectStoreError("it does not answer")
 
-    monkeypatch.setattr(blobs, "read", fail)
+    monkeypatch.setattr(blobs, "open", fail)
     with pytest.raises(ObjectStoreError):
         JobCheckpoints(store.jobs.get(ALICE, job.id), blobs).read()

@@ -91,3 +91,9 @@ def test_island_is_unpacked_once_at_its_first_access(monkeypatch, islands):
     assert not opened
     assert found[2] is found[2]
     assert len(opened) == 1
+
+
+def test_iteration_keeps_no_island(packed):
+    kept = packed[2]
+    assert all(one is not other for one, other in zip(packed, packed, strict=True) if one is not kept)
+    assert [*packed][2] is kept
