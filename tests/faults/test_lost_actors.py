@@ -15,6 +15,7 @@ from islands.evolution.problem import Problem
 from islands_service.engines import ENGINES
 from islands_service.runtime import actor_pool
 from islands_service.runtime.cluster import LOSS_ERRORS, ClusterError
+from islands_service.runtime.island_actor import IslandActor
 from islands_service.runtime.ray_engine import RayEngine
 from support.processes import actors, alive, eventually, kill
 from support.searches import SMALL, exactly, record
@@ -83,6 +84,33 @@ def test_frozen_actor_is_replaced_and_does_not_change_the_result(posed, undistur
     assert time.monotonic() - began < 60.0
     assert any("did not answer" in message for message in messages)
     eventually(lambda: not alive([frozen]))
+
+
+@pytest.mark.ci
+def test_actor_that_is_frozen_during_its_preparation_is_replaced(
+    posed, engine, messages, monkeypatch, tmp_path
+):
+    import ray
+
+    frozen = tmp_path / "frozen"
+
+    class FreezingActor(IslandActor):
+        def prepare(self, started=None):
+            if not frozen.exists():
+                frozen.write_text(str(os.getpid()))
+                os.kill(os.getpid(), signal.SIGSTOP)
+            return super().prepare(started)
+
+    actor = ray.remote(max_restarts=0, concurrency_groups={"watch": 1})(FreezingActor)
+    monkeypatch.setattr(actor_pool, "_ACTOR", actor)
+    monkeypatch.setattr(actor_pool, "PREPARATION_TIMEOUT", 3.0)
+    found = actor_pool.IslandActorPool(posed, 1, messages.append)
+    try:
+        eventually(lambda: found.maintain(at_once=True))
+        assert "an actor was not prepared within 3 s: its islands continue from their last epoch" in messages
+        assert not alive([int(frozen.read_text())])
+    finally:
+        found.shutdown()
 
 
 @pytest.mark.nightly

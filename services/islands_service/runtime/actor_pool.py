@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from importlib.metadata import version
 from math import inf
 from time import monotonic
 
@@ -15,12 +14,15 @@ from ray.exceptions import RayActorError, RayTaskError
 from islands.evolution.problem import Problem
 from islands.evolution.progress import ProgressCallback
 from islands.model.primitives import PRIMITIVES
-from islands_service.runtime.cluster import LOSS_ERRORS, cluster_cpus
+from islands_service.runtime.cluster import LOSS_ERRORS, check_version, cluster_cpus
 from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.island_actor import IslandActor
 
 #: Seconds that a search waits for all actors before it begins with those that are ready.
 STARTUP_TIMEOUT = 10.0
+
+#: Seconds that the preparation of an actor may take. The compilation of all kernels takes a fifth of it.
+PREPARATION_TIMEOUT = 300.0
 
 #: Seconds after which the user is informed that actors are not ready; starting one takes one or two.
 WAITING_NOTICE_AFTER = 5.0
@@ -94,6 +96,9 @@ class IslandActorPool:
         # (members).
         self._joining: dict[int, tuple[ActorHandle, ray.ObjectRef]] = {}
         self._members: dict[int, tuple[ActorHandle, ray.ObjectRef]] = {}
+        # By slot of a joining actor: a reference that resolves when its process runs, and the time of that.
+        self._unstarted: dict[int, tuple[ActorHandle, ray.ObjectRef]] = {}
+        self._started: dict[int, float] = {}
         self._created_at = self._waiting_since = monotonic()
         self._updated_at = self._measured_at = -_RESIZE_SECONDS
         self._started_at = inf
@@ -182,7 +187,14 @@ class IslandActorPool:
                 check_version(actor_version)
                 self._members[slot] = (actor, actor.wait_until_killed.remote())
                 self._vacant.discard(slot)
-            del self._joining[slot]
+            self._forget_joining(slot)
+        for slot in _find_ended(self._unstarted):
+            del self._unstarted[slot]
+            self._started[slot] = now
+        for slot in [each for each, begin in self._started.items() if now - begin > PREPARATION_TIMEOUT]:
+            reason = f"an actor was not prepared within {PREPARATION_TIMEOUT:.0f} s"
+            self._handle_loss(slot, self._joining[slot][0], reason)
+            self._forget_joining(slot)
         standby = [STANDBY] if now - self._started_at > STANDBY_AFTER else []
         for slot in (*range(self._size), *standby):
             if slot not in self._members and slot not in self._joining:
@@ -191,10 +203,17 @@ class IslandActorPool:
                     name=f"{self._title}.{self._actor_count}" if self._title else None,
                     num_cpus=0 if slot == STANDBY else 1,
                 ).remote(self._problem)
-                self._joining[slot] = (actor, actor.prepare.remote())
+                started = actor.confirm_start.remote()
+                self._unstarted[slot] = (actor, started)
+                self._joining[slot] = (actor, actor.prepare.remote(started))
         self._report_waiting(now)
         ready = len(self._members.keys() - {STANDBY})
         self._observe(ready, self._islands - ready)
+
+    def _forget_joining(self, slot: int) -> None:
+        del self._joining[slot]
+        self._unstarted.pop(slot, None)
+        self._started.pop(slot, None)
 
     def _handle_loss(self, slot: int, actor: ActorHandle, reason: str = "an actor was lost") -> None:
         # The actor may only be unreachable; kill it so that its replacement gets the CPU.
@@ -239,20 +258,6 @@ def put_problem(problem: Problem) -> "ray.ObjectRef[Problem]":
     finally:
         for module in modules:
             cloudpickle.unregister_pickle_by_value(module)
-
-
-def check_version(found: str) -> None:
-    """Check the version of islands on another machine.
-
-    Raises
-    ------
-    ClusterError
-    """
-    if found != version("islands"):
-        raise ClusterError(
-            f"a machine of the cluster has islands {found}, this one {version('islands')}: the result would "
-            "depend on the machine that computes it; install one version on all"
-        )
 
 
 def _find_ended(actors: dict[int, tuple[ActorHandle, ray.ObjectRef]]) -> list[int]:

@@ -8,6 +8,7 @@ import socket
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.metadata import version
 from math import inf
 from pathlib import Path
 
@@ -88,6 +89,20 @@ def cluster_memory() -> float:
 def cluster_cpus() -> float:
     """Return the number of CPUs that the machines of the connected cluster offer."""
     return float(ray.cluster_resources().get("CPU", 0.0))
+
+
+def check_version(found: str) -> None:
+    """Check the version of islands on another machine.
+
+    Raises
+    ------
+    ClusterError
+    """
+    if found != version("islands"):
+        raise ClusterError(
+            f"a machine of the cluster has islands {found}, this one {version('islands')}: the result would "
+            "depend on the machine that computes it; install one version on all"
+        )
 
 
 @contextmanager

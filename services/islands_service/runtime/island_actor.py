@@ -31,10 +31,19 @@ class IslandActor:
         self._islands: dict[int, tuple[bytes, Island]] = {}
         self._name = str(ray.get_runtime_context().get_actor_id())
 
-    def prepare(self) -> str:
+    @ray.method(concurrency_group="watch")
+    def confirm_start(self) -> None:
+        """Do nothing. The reference to this call resolves when the actor has a CPU and its process runs."""
+
+    def prepare(self, _started: None = None) -> str:
         """Compile kernels, build the evaluator, and return the version of islands.
 
         An error in the problem is raised here.
+
+        Parameters
+        ----------
+        _started : None
+            Result of `confirm_start`, so that this call begins after that one has ended.
         """
         warm_up(lambda _line: None)
         self._evaluator = Evaluator(self._problem.record, self._problem.settings)
