@@ -2,7 +2,8 @@
 
     python benchmarks/service_recovery.py [MEASURE ...] [--repeat 5] [--json FILE]
 
-Measures: start, cancel, api, coordinator, hung, island, frozen, ray, node; all of them by default.
+Measures: start, cancel, api, coordinator, hung, diagnosis, island, frozen, ray, node; all of them by
+default.
 Results are printed, not asserted; the targets are those of the service's design.
 """
 
@@ -24,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from service_table import Figure, percentile, run
 
 from support.processes import alive, descendants, eventually, kill
+from support.service import KNOWN, held, hidden
 from support.service_processes import ROLES, Service, serving
 
 #: Generations of a job that does not end by itself.
@@ -31,6 +33,9 @@ ENDLESS = 100_000
 
 #: Generations of a job of a few seconds.
 LONG = 1500
+
+#: Seconds of a record whose diagnosis takes a quarter of a minute on two cores.
+DIAGNOSED = 600.0
 
 #: Number of running jobs that are cancelled.
 CANCELS = 30
@@ -148,6 +153,39 @@ def _reclaimed(
         running.ask("POST", f"/v1/jobs/{job}/cancel")
     yield Figure(name, "s", goal, tuple(reclaimed))
     yield Figure(f"{name.partition(',')[0]}: until it has come on", "s", None, tuple(going))
+
+
+def diagnosis(repeat: int) -> Iterator[Figure]:
+    """Measure the delay of a diagnosis whose coordinator is killed, with and without checkpoints."""
+    for name, every in (("checkpoints every 5 s", "5"), ("no checkpoints", "1e6")):
+        alone, costs = [], []
+        with service(ISLANDS_CHECKPOINT_EVERY=every) as running:
+            _diagnose(running)  # the first run reads all files from the disk
+            for _ in range(repeat):
+                seconds, undisturbed = _diagnose(running)
+                killed, found = _diagnose(running, seconds / 2)
+                assert found == undisturbed
+                alone.append(seconds)
+                costs.append(killed - seconds)
+        yield Figure(f"diagnosis, undisturbed, {name}", "s", None, tuple(alone))
+        yield Figure(f"coordinator of a diagnosis killed at half time, {name}, cost", "s", None, tuple(costs))
+
+
+def _diagnose(running: Service, kill_after: float = 0.0) -> tuple[float, object]:
+    """Return the seconds and the result of a diagnosis whose coordinator may be killed."""
+    files = {"file": ("hidden.csv", hidden(running.folder.parent, DIAGNOSED))}
+    dataset = running.ask("POST", "/v1/datasets", files=files).json()["id"]
+    request = held(dataset, channels=["T_K"], tolerance=KNOWN)
+    began = time.monotonic()
+    job = running.ask("POST", "/v1/discrepancies", json=request).json()["id"]
+    if kill_after:
+        time.sleep(kill_after)
+        kill(running.one("coordinator"))
+    running.ended(job)
+    seconds = time.monotonic() - began
+    found = running.ask("GET", f"/v1/jobs/{job}/result").json()
+    del found["wall_s"]
+    return seconds, found
 
 
 def island(repeat: int) -> Iterator[Figure]:
@@ -305,6 +343,7 @@ MEASURES = {
     "api": api,
     "coordinator": coordinator,
     "hung": hung,
+    "diagnosis": diagnosis,
     "island": island,
     "frozen": frozen,
     "ray": ray,
