@@ -1,9 +1,10 @@
 """Uploads in progress: number, quota, time and files are bounded before and while the body arrives."""
 
 import json
+import resource
 import socket
 import time
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -72,6 +73,19 @@ def spooled():
         if target.endswith("(deleted)") and "memfd" not in target:
             found.append(Path(target))
     return found
+
+
+def resident_bytes():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+
+
+def size(spooled_file):
+    """Return the bytes of a nameless file of this process."""
+    for link in Path("/proc/self/fd").iterdir():
+        with suppress(OSError):
+            if link.readlink() == spooled_file:
+                return link.stat().st_size
+    return 0
 
 
 def receiving(service):
@@ -159,6 +173,20 @@ def test_a_body_of_undeclared_length_ends_at_the_quota(service):
             sent += len(chunk)
         assert answer(connection)[:2] == (429, "quota-exceeded")
     assert not receiving(service)
+
+
+def test_bodies_in_progress_are_on_the_disk_and_not_in_memory(service):
+    eventually(lambda: not receiving(service))
+    block = b"0,1,2,3,\n0" * 10_000
+    with ExitStack() as stack:
+        before = resident_bytes()
+        for _ in range(3):
+            connection = stack.enter_context(started(service, service.key(), 5_000_000))
+            for _ in range(48):
+                connection.sendall(block)
+        eventually(lambda: sum(map(size, receiving(service))) > 3 * 4_500_000)
+        assert resident_bytes() - before < 6_000_000
+    eventually(lambda: not receiving(service))
 
 
 def test_a_key_without_the_scope_is_refused_before_the_body(service):
