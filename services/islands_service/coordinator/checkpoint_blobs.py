@@ -3,7 +3,7 @@
 import gzip
 import zlib
 from collections.abc import Callable, Iterable
-from typing import TypeVar
+from typing import TextIO, TypeVar
 
 import structlog
 
@@ -42,7 +42,7 @@ class CheckpointBlobs:
         # Blobs that the job named, or may have named, before its current checkpoint.
         self._earlier = set() if job.checkpoint is None else {job.checkpoint}
 
-    def load(self, parse: Callable[[str], T]) -> T | None:
+    def load(self, parse: Callable[[TextIO], T]) -> T | None:
         """Return the parsed text of the last checkpoint of the job; None if it is lost or damaged.
 
         Parameters
@@ -63,8 +63,11 @@ class CheckpointBlobs:
             return None
         try:
             # Unlike `gzip.decompress`, the time of this is linear in the number of members.
-            with self._blobs.open(job.checkpoint) as stream, gzip.open(stream) as text:
-                return parse(text.read().decode())
+            with (
+                self._blobs.open(job.checkpoint) as stream,
+                gzip.open(stream, "rt", encoding="utf-8") as text,
+            ):
+                return parse(text)
         except StoreError:
             raise
         except _LOSS_ERRORS as error:

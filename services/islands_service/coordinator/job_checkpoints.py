@@ -1,17 +1,18 @@
 """Checkpoints of an identification job."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TextIO
 
 from islands.evolution.search_state import SearchState
 from islands.facade.automatic.kind_choice import Choice, choice_from_document
 from islands.io.checkpoints import (
-    archipelago_from_document,
     compressed_checkpoint,
+    read_archipelago,
     state_document,
     state_from_document,
 )
 from islands_service.coordinator.checkpoint_blobs import CheckpointBlobs
+from islands_service.runtime.packed_epoch import pack_islands
 
 #: Note in the progress and the summary of a job whose checkpoint was lost.
 RESTARTED = "the last checkpoint was lost or damaged: the search started again, which gives the same result"
@@ -55,8 +56,10 @@ class JobCheckpoints(CheckpointBlobs):
         """
         return self.load(self._parse) or JobStart(note=RESTARTED if self._job.checkpoint else "")
 
-    def _parse(self, text: str) -> JobStart:
-        archipelago, about = archipelago_from_document(text, f"the checkpoint of job {self._job.id}")
+    def _parse(self, text: TextIO) -> JobStart:
+        # Packed islands take a tenth of the memory.
+        name = f"the checkpoint of job {self._job.id}"
+        archipelago, about = read_archipelago(text, name, keep=pack_islands)
         choice = choice_from_document(about["choice"]) if about.get("choice") else None
         return JobStart(state_from_document(archipelago, about), float(about["wall_s"]), choice)
 

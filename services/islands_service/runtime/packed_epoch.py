@@ -19,6 +19,7 @@ from islands.evolution.epoch import IslandEpoch
 from islands.evolution.gp.individual import Population
 from islands.evolution.island import Island, StepInfo
 from islands.model.expression import Primitive
+from islands.model.primitives import PRIMITIVES
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,3 +170,10 @@ class PackedIslands(LazyIslands):
 
     def _read(self, place: int) -> Island:
         return unpack_island(self._reports[place].packed, self._primitives)
+
+
+def pack_islands(
+    islands: Iterable[Island], primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> PackedIslands:
+    """Pack islands one by one."""
+    return PackedIslands([pack_epoch(IslandEpoch(island, (), ())) for island in islands], primitives)

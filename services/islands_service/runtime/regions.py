@@ -6,7 +6,7 @@ borders of regions on, and merges the statistics. The result does not depend on 
 """
 
 from collections.abc import Callable, Generator, Iterator
-from itertools import pairwise
+from itertools import islice, pairwise
 from time import monotonic
 
 import ray
@@ -147,9 +147,9 @@ class _Tree:
             )
             for span in spans
         ]
-        self._regions = []
+        self._regions, islands = [], iter(start.islands)
         for index, span in enumerate(spans):
-            state = tuple(pack_epoch(begin_epoch(problem, start.islands[island])) for island in span)
+            state = tuple(pack_epoch(begin_epoch(problem, island)) for island in islice(islands, len(span)))
             region = _Region(index, span, start.generation, ray.put(state))
             border = {each.index: each.emigrants for each in state if each.index in self._borders[index]}
             region.reports[start.generation] = RegionReport((), border)

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TextIO
 
 import structlog
 
@@ -90,8 +90,8 @@ class DiagnosisCheckpoints(CheckpointBlobs):
         """
         return self.load(self._parse) or DiagnosisState(lost=self._job.checkpoint is not None)
 
-    def _parse(self, text: str) -> DiagnosisState:
-        document, name = json.loads(text), f"the checkpoint of job {self._job.id}"
+    def _parse(self, text: TextIO) -> DiagnosisState:
+        document, name = json.load(text), f"the checkpoint of job {self._job.id}"
         if (document["schema"], document["job"]) != (SCHEMA, self._job.id):
             raise ModelError(f"{name} has another schema or belongs to another job")
         state = DiagnosisState(journal_from_document(document["fits"]), spent=float(document["wall_s"]))

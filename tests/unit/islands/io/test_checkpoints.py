@@ -1,6 +1,7 @@
 """Checkpoints: exact round trips, atomic writes, and errors for damaged files."""
 
 import gzip
+import io
 import json
 import os
 from dataclasses import replace
@@ -17,7 +18,10 @@ from islands.evolution.island import Island
 from islands.io.checkpoints import (
     HALL_SCHEMA,
     SCHEMA,
+    checkpoint_text,
     compressed_checkpoint,
+    json_reader,
+    read_archipelago,
     read_checkpoint,
     write_checkpoint,
     write_hall,
@@ -95,6 +99,29 @@ def test_an_archipelago_is_read_back_exactly(path):
     assert about == ABOUT
     # Float equality ignores the sign of zero, and regressor equality compares texts only.
     assert repr(read) == repr(archipelago())
+
+
+@pytest.mark.parametrize("size", [1, 7, 1 << 20])
+@pytest.mark.parametrize("indent", [None, 1])
+def test_a_checkpoint_is_read_in_pieces_of_any_size(document, path, monkeypatch, size, indent):
+    monkeypatch.setattr(json_reader, "_PIECE", size)
+    path.write_text(json.dumps({"number": 10**30, **document}, indent=indent))
+    assert read_checkpoint(path) == (archipelago(), ABOUT)
+    for damage in ("]", ",", "{}", '"'):
+        path.write_text(json.dumps(document) + damage)
+        with pytest.raises(ModelError, match="cannot read the checkpoint"):
+            read_checkpoint(path)
+
+
+def test_islands_are_read_one_by_one(monkeypatch):
+    monkeypatch.setattr(json_reader, "_PIECE", 1)
+    stream, places = io.StringIO(checkpoint_text(empty_archipelago(20, 5), {})), []
+
+    def keep(islands):
+        return tuple((island, places.append(stream.tell()))[0] for island in islands)
+
+    assert read_archipelago(stream, "it", keep=keep)[0] == empty_archipelago(20, 5)
+    assert places[0] < places[10] < places[-1]
 
 
 def test_rewriting_a_checkpoint_gives_the_same_bytes(path, tmp_path):
@@ -275,7 +302,9 @@ def test_a_file_truncated_at_any_position_is_refused(document, path):
             read_checkpoint(path)
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"y = a*b", b"[" * 100_000])
+@pytest.mark.parametrize(
+    "content", [b"\xff\xfe\x00", b"y = a*b", b"[" * 100_000, b'{"about": ' + b"[" * 100_000, b"[]", b"3"]
+)
 def test_a_foreign_file_is_refused(path, content):
     path.write_bytes(content)
     with pytest.raises(ModelError, match="cannot read the checkpoint"):
@@ -285,10 +314,9 @@ def test_a_foreign_file_is_refused(path, content):
 @pytest.mark.parametrize(
     "foreign",
     [
-        [],
-        3,
         {},
         {"schema": "islands.model/1"},
+        {"islands": 3},
         {"schema": "islands.hall/1"},
         {"schema": "islands.checkpoint/2"},
     ],
