@@ -152,7 +152,8 @@ class JobView(ResponseModel):
     finished: datetime | None = None
     spec: dict[str, Any]
     progress: dict[str, Any] | None = Field(
-        default=None, description="Phase, and estimated position in the queue."
+        default=None,
+        description="Phase, estimated position in the queue, and the quota that the job waits for.",
     )
     summary: dict[str, Any] | None = Field(default=None, description="Summary of the result.")
     problem: dict[str, Any] | None = Field(default=None, description="Why the job failed.")

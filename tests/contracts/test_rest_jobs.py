@@ -224,7 +224,7 @@ def test_actions_are_allowed_only_in_certain_states(service, action, state):
 
 
 def test_queued_jobs_show_their_position_among_those_of_all_owners(service, order, monkeypatch):
-    monkeypatch.setattr("islands_api.web.responses._POSITION_SECONDS", 0.0)
+    monkeypatch.setattr("islands_api.web.responses._PLACE_SECONDS", 0.0)
     first, second = (service.submit(**order, priority=each).json()["id"] for each in (1, 0))
     urgent = service.submit(service.key(owner="other"), **spec(kept(service.store, "other")), priority=7)
     assert urgent.status_code == 202
@@ -237,7 +237,12 @@ def test_queued_jobs_show_their_position_among_those_of_all_owners(service, orde
     assert claimed(service.store).job.id == first
     assert service.client.get(f"/v1/jobs/{second}").json()["progress"]["position"] == 2
     assert claimed(service.store).job.owner == "other"
-    assert service.client.get(f"/v1/jobs/{second}").json()["progress"]["position"] == 1
+    service.store.owners.change(LOCAL_OWNER, {"max_running": 1})
+    assert service.client.get(f"/v1/jobs/{second}").json()["progress"] == {
+        "phase": "queued",
+        "position": 1,
+        "note": "waits for your quota of running jobs: 1 of 1 are running",
+    }
 
 
 def test_cancelling_a_job_twice_is_allowed(service):

@@ -175,3 +175,23 @@ def test_concurrent_claims_do_not_exceed_the_quota(database):
             ]
         )
         assert [size(lease) for lease in answers if lease is not None] == [3, 3, 3]
+
+
+def test_place_of_a_queued_job_names_the_quota_that_it_waits_for(store, claim):
+    queue(store, ALICE, 3, 2)
+
+    def notes(**quotas):
+        return [
+            place.note for place in store.leases.queue_places(store.jobs.page(ALICE).jobs, **quotas).values()
+        ]
+
+    assert notes(most_running=1, most_islands=4) == ["", ""]
+    lease = claim()
+    assert notes() == notes(most_running=2, most_islands=5) == [""]
+    assert notes(most_islands=4) == [
+        "waits for your quota of running islands: 3 of 4 are running, and this job has 2"
+    ]
+    store.owners.change(ALICE, {"max_running": 1})
+    assert notes(most_islands=4) == ["waits for your quota of running jobs: 1 of 1 are running"]
+    store.leases.finish(lease, CANCELLED)
+    assert notes(most_islands=4) == [""]

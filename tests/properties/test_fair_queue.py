@@ -145,7 +145,7 @@ def test_positions_are_the_order_of_the_claims(fair, weighted, queued, before):
     before = min(before, len(queued) - 1)
     claims(fair, before)
     waiting = [job for owner in OWNERS for job in fair.jobs.page(owner, "queued").jobs]
-    positions = fair.leases.queue_positions(waiting)
+    positions = {job: place.position for job, place in fair.leases.queue_places(waiting).items()}
     order = [claimed(fair).job.id for _ in waiting]
     assert sorted(positions, key=positions.__getitem__) == order
     assert sorted(positions.values()) == list(range(1, len(waiting) + 1))

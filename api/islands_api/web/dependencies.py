@@ -12,7 +12,7 @@ from islands_api.web.limits.owner_counts import OwnerCounts
 from islands_api.web.limits.owner_slots import OwnerSlots
 from islands_api.web.limits.rate_limit import RateLimiter
 from islands_api.web.prometheus import ServiceMetrics
-from islands_api.web.responses import QueuePositions
+from islands_api.web.responses import QueuePlaces
 from islands_api.web.uploads.upload_admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
 from islands_service.outbound.checked_client import CheckedClient
@@ -54,7 +54,7 @@ class AppState:
     executor: BlockingExecutor
     outbound: CheckedClient
     tokens: "TokenVerifier | None"
-    positions: QueuePositions = field(default_factory=QueuePositions)
+    places: QueuePlaces = field(default_factory=QueuePlaces)
 
     async def quotas(self, owner: str) -> Quotas:
         """Return the quotas of an owner."""

@@ -74,19 +74,20 @@ async def submit_job(
 
 
 async def describe_job(state: AppState, job: Job) -> dict[str, Any]:
-    """Return the document of a job, with its position if it is queued."""
+    """Return the document of a job, with its place if it is queued."""
     (document,) = await describe_jobs(state, (job,))
     return document
 
 
 async def describe_jobs(state: AppState, jobs: Sequence[Job]) -> list[dict[str, Any]]:
-    """Return the documents of jobs, with the positions of those that are queued."""
-    positions, unknown = state.positions.find(jobs)
+    """Return the documents of jobs, with the places of those that are queued."""
+    places, unknown = state.places.find(jobs)
     if unknown:
-        found = await state.run_blocking(state.store.leases.queue_positions, unknown)
-        state.positions.store(unknown, found)
-        positions |= found
-    return [job_document(job, positions.get(job.id)) for job in jobs]
+        quotas = state.settings.max_running, state.settings.max_running_islands
+        found = await state.run_blocking(state.store.leases.queue_places, unknown, *quotas)
+        state.places.store(unknown, found)
+        places |= found
+    return [job_document(job, places.get(job.id)) for job in jobs]
 
 
 def etag(job: Job) -> str:

@@ -13,27 +13,29 @@ from islands_service.domain.job import Job, JobState
 from islands_service.domain.owner import Owner
 from islands_service.domain.webhook import Delivery, Webhook
 from islands_service.store.datasets import StoredDataset
+from islands_service.store.job_rows.queue_places import QueuePlace
 from islands_service.store.tenants.keys import Key
 
-#: Seconds for which the position of a queued job is kept.
-_POSITION_SECONDS = 1.0
+#: Seconds for which the place of a queued job is kept.
+_PLACE_SECONDS = 1.0
 
-#: Largest number of jobs whose position is kept.
-_MAX_POSITIONS = 10_000
+#: Largest number of jobs whose place is kept.
+_MAX_PLACES = 10_000
 
 
-def job_document(job: Job, position: int | None = None) -> dict[str, Any]:
+def job_document(job: Job, place: QueuePlace | None = None) -> dict[str, Any]:
     """Convert a job to a document with the fields of `islands_api.schemas.JobView`.
 
     Parameters
     ----------
-    position : int, optional
-        Position of a queued job in the queue, if it is known.
+    place : QueuePlace, optional
+        Place of a queued job, if it is known.
     """
     progress = job.progress
     if job.state == JobState.QUEUED:
-        place = {} if position is None else {"position": position}
-        progress = {**(progress or {}), "phase": "queued", **place}
+        progress = {**(progress or {}), "phase": "queued"}
+        if place is not None:
+            progress |= {"position": place.position, **({"note": place.note} if place.note else {})}
     return {
         "id": job.id,
         "kind": job.kind,
@@ -55,28 +57,28 @@ def job_document(job: Job, position: int | None = None) -> dict[str, Any]:
     }
 
 
-class QueuePositions:
-    """Cache of the positions of queued jobs, for a second: clients poll more often than jobs move."""
+class QueuePlaces:
+    """Cache of the places of queued jobs, for a second: clients poll more often than jobs move."""
 
     def __init__(self) -> None:
-        self._known: dict[str, tuple[float, int | None]] = {}
+        self._known: dict[str, tuple[float, QueuePlace | None]] = {}
 
-    def find(self, jobs: Sequence[Job]) -> tuple[dict[str, int], list[Job]]:
-        """Return the known positions of jobs, and the queued ones whose position has to be read."""
+    def find(self, jobs: Sequence[Job]) -> tuple[dict[str, QueuePlace], list[Job]]:
+        """Return the known places of jobs, and the queued ones whose place has to be read."""
         now = monotonic()
         queued = [job for job in jobs if job.state == JobState.QUEUED]
         known = {job.id: self._known.get(job.id, (-inf, None)) for job in queued}
-        fresh = {job: position for job, (at, position) in known.items() if now - at < _POSITION_SECONDS}
-        positions = {job: position for job, position in fresh.items() if position is not None}
-        return positions, [job for job in queued if job.id not in fresh]
+        fresh = {job: place for job, (at, place) in known.items() if now - at < _PLACE_SECONDS}
+        places = {job: place for job, place in fresh.items() if place is not None}
+        return places, [job for job in queued if job.id not in fresh]
 
-    def store(self, jobs: Sequence[Job], positions: Mapping[str, int]) -> None:
-        """Store the positions of jobs that were read now."""
+    def store(self, jobs: Sequence[Job], places: Mapping[str, QueuePlace]) -> None:
+        """Store the places of jobs that were read now."""
         now = monotonic()
-        if len(self._known) > _MAX_POSITIONS:
+        if len(self._known) > _MAX_PLACES:
             self._known.clear()
         for job in jobs:
-            self._known[job.id] = now, positions.get(job.id)
+            self._known[job.id] = now, places.get(job.id)
 
 
 def dataset_document(dataset: StoredDataset, retention: int = 0) -> dict[str, Any]:

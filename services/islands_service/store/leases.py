@@ -22,9 +22,9 @@ from islands_service.domain.job import (
 )
 from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.job_rows.fair_queue import estimate_positions
 from islands_service.store.job_rows.job_claims import claim_job
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document
+from islands_service.store.job_rows.queue_places import QueuePlace, find_places
 from islands_service.store.tables import artefacts, events, jobs, models, points, results
 
 #: Progress events that are kept per job. A client that was away longer reads the job itself.
@@ -91,10 +91,12 @@ class Leases:
 
         return self._database.write(operation)
 
-    def queue_positions(self, found: Iterable[Job]) -> dict[str, int]:
-        """Return the positions of the queued ones of some jobs; see `estimate_positions`."""
+    def queue_places(
+        self, found: Iterable[Job], most_running: int | None = None, most_islands: int | None = None
+    ) -> dict[str, QueuePlace]:
+        """Return the places of the queued ones of some jobs; see `find_places`."""
         with self._database.read() as connection:
-            return estimate_positions(connection, found)
+            return find_places(connection, found, most_running, most_islands)
 
     def is_cancel_requested(self, lease: Lease) -> bool:
         """Return whether cancellation of a job is requested; the lease is neither checked nor extended."""

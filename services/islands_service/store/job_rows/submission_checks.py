@@ -36,7 +36,8 @@ _RETIRED = select(retired_keys).where(
 )
 
 
-def _select_own(quota: Column[Any], default: str) -> ColumnElement[Any]:
+def select_quota(quota: Column[Any], default: str) -> ColumnElement[Any]:
+    """Return the quota of the owner ``:owner``: its own one, or the parameter named ``default``."""
     own = select(quota).where(owners.c.name == _OF_OWNER).scalar_subquery()
     return func.coalesce(own, bindparam(default, type_=BigInteger))
 
@@ -44,8 +45,8 @@ def _select_own(quota: Column[Any], default: str) -> ColumnElement[Any]:
 _QUOTAS = (
     select(
         func.count(),
-        _select_own(owners.c.max_active, "most_active"),
-        _select_own(owners.c.max_islands, "most_islands"),
+        select_quota(owners.c.max_active, "most_active"),
+        select_quota(owners.c.max_islands, "most_islands"),
     )
     .select_from(jobs)
     .where(jobs.c.owner == _OF_OWNER, jobs.c.state.in_(ACTIVE))
