@@ -233,7 +233,7 @@ def test_epochs_report_use_and_limits_of_the_caches(history):
 def test_hall_of_fame_of_an_archipelago_merges_those_of_the_islands(history):
     last = history[-1].archipelago
     assert exactly(last.hall_of_fame) == exactly(
-        merge(*(island.hall_of_fame for island in reversed(last.islands)))
+        merge(island.hall_of_fame for island in reversed(last.islands))
     )
     for size, entry in last.hall_of_fame.best().items():
         assert entry.fitness == min(

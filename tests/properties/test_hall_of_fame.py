@@ -54,22 +54,22 @@ def exactly(hall):
 
 @given(halls, halls)
 def test_merging_is_commutative(one, other):
-    assert exactly(merge(one, other)) == exactly(merge(other, one))
+    assert exactly(merge([one, other])) == exactly(merge([other, one]))
 
 
 @given(halls, halls, halls)
 def test_merging_is_associative(one, other, third):
-    together = exactly(merge(one, other, third))
-    assert exactly(merge(merge(one, other), third)) == together
-    assert exactly(merge(one, merge(other, third))) == together
+    together = exactly(merge([one, other, third]))
+    assert exactly(merge([merge([one, other]), third])) == together
+    assert exactly(merge([one, merge([other, third])])) == together
 
 
 @given(halls, halls)
 def test_merging_is_idempotent(one, other):
-    assert exactly(merge(one, one)) == exactly(one)
-    both = merge(one, other)
-    assert exactly(merge(both, one, other, both)) == exactly(both)
-    assert exactly(merge(one, HallOfFame())) == exactly(one)
+    assert exactly(merge([one, one])) == exactly(one)
+    both = merge([one, other])
+    assert exactly(merge([both, one, other, both])) == exactly(both)
+    assert exactly(merge([one, HallOfFame()])) == exactly(one)
 
 
 @given(st.lists(individuals(), max_size=30), st.randoms(use_true_random=False))

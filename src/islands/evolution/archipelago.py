@@ -37,7 +37,7 @@ class Archipelago:
     @property
     def hall_of_fame(self) -> HallOfFame:
         """Merged halls of fame of all islands."""
-        return merge(*(island.hall_of_fame for island in self.islands))
+        return merge(island.hall_of_fame for island in self.islands)
 
     def render(self, function: Callable[[Island], bytes]) -> Iterator[bytes]:
         """Yield the bytes that a function returns for each island, in order.

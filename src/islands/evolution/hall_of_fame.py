@@ -6,6 +6,7 @@ Merging is associative, commutative and idempotent, so halls of islands can be m
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from math import inf, isfinite
 
 from islands.evolution.gp.individual import Individual
@@ -46,7 +47,7 @@ def with_entries(hall: HallOfFame, individuals: Iterable[Individual]) -> HallOfF
     """Return the hall with individuals added; individuals without a finite fitness are ignored."""
     thresholds = hall.entry_thresholds()
     found: dict[tuple[str, ...], Individual] = {}
-    for entry in (*hall.entries, *individuals):
+    for entry in chain(hall.entries, individuals):
         if not isfinite(entry.fitness) or entry.fitness > thresholds.get(entry.size, inf):
             continue
         known = found.get(entry.key)
@@ -72,8 +73,8 @@ def pareto_front(individuals: Iterable[Individual]) -> tuple[Individual, ...]:
     return tuple(found)
 
 
-def merge(*halls: HallOfFame) -> HallOfFame:
-    """Merge halls of fame."""
+def merge(halls: Iterable[HallOfFame]) -> HallOfFame:
+    """Merge halls of fame. Thousands of them do not have to be in memory at the same time."""
     return with_entries(HallOfFame(), (entry for hall in halls for entry in hall.entries))
 
 

@@ -170,7 +170,8 @@ def identify(
                 progress(state, settings)
     if state.archipelago.generation < 0:
         raise SettingsError("stopped before the first populations were evaluated: there is no model to keep")
-    candidates = estimate_candidates(state.archipelago.hall_of_fame, search_problem, split, offsets, stage)
+    hall_of_fame = state.archipelago.hall_of_fame
+    candidates = estimate_candidates(hall_of_fame, search_problem, split, offsets, stage)
     stage("assessment of the final models", 1.0)
     models = select_final_models(candidates, search_problem, split)
     if not models:
@@ -182,7 +183,7 @@ def identify(
     if isinstance(preset, Choice):
         described.update(preset=AUTO, choice=preset.to_document())
     described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
-    statistics = _make_statistics(state, search_problem)
+    statistics = _make_statistics(state, hall_of_fame, search_problem)
     found = SearchResult(record, split, seed, described, statistics, models)
     banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag)
     return Result(with_average(banded, count))
@@ -219,8 +220,8 @@ def _find_search_offsets(record: Dataset, settings: Settings) -> Offsets:
     return find_offsets(record, LARGE_OFFSET) if shiftable else no_offsets(record)
 
 
-def _make_statistics(state: SearchState, problem: Problem) -> SearchStatistics:
-    maximum_lag, degree = _maximum_lag_and_degree(state.archipelago.hall_of_fame)
+def _make_statistics(state: SearchState, hall_of_fame: HallOfFame, problem: Problem) -> SearchStatistics:
+    maximum_lag, degree = _maximum_lag_and_degree(hall_of_fame)
     inputs = problem.record.inputs
     count = full_set(degree, maximum_lag, maximum_lag, inputs)
     rows = sum(max(0, length - problem.settings.maximum_lag) for length in problem.record.segments)

@@ -230,7 +230,7 @@ def halls():
     otherwise = individual("mul(y(k-1), u1(k-1))", "q1(y(k-1))", fitness=0.25)
     one = with_entries(HallOfFame(), found)
     parts = [with_entries(HallOfFame(), each) for each in ([found[2], otherwise], [found[0], *found[2:]])]
-    return one, merge(*parts)
+    return one, merge(parts)
 
 
 def test_equal_halls_are_the_same_bytes_from_any_search(tmp_path):
