@@ -9,6 +9,8 @@ from time import time
 import pytest
 from sqlalchemy import update
 
+from islands_api.client import Client
+from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import JobState
 from islands_service.outbound import delivery_sender
 from islands_service.store.tables import deliveries as deliveries_table
@@ -55,6 +57,19 @@ def delivered(service, webhook, state="delivered"):
     """Wait for the state of the newest delivery; return the delivery."""
     eventually(lambda: (last_delivery(service, webhook) or {}).get("state") == state)
     return last_delivery(service, webhook)
+
+
+def test_the_client_creates_lists_and_deletes_webhooks(service, receiver):
+    with Client(service.url) as client:
+        other, made = client.create_webhook(receiver.url), client.create_webhook(receiver.url, ["job.failed"])
+        assert other.events == tuple(sorted(EVENTS))
+        assert [each.id for each in client.webhooks()] == [other.id, made.id]
+        for state in (JobState.SUCCEEDED, JobState.FAILED):
+            job = job_in(service.store, state, LOCAL_OWNER)
+        (delivery,) = eventually(lambda: client.deliveries(made.id))
+        assert (delivery.event, delivery.job) == ("job.failed", job.id)
+        client.delete_webhook(other)
+        assert [each.id for each in client.webhooks()] == [made.id]
 
 
 def test_the_secret_of_a_webhook_is_shown_once(service, receiver):

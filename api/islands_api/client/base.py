@@ -8,7 +8,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, get_args, over
 
 import httpx
 
-from islands_api.client import calls, dataset_calls, diagnosis_calls
+from islands_api.client import calls, dataset_calls, diagnosis_calls, webhook_calls
 from islands_api.client.calls import RequestSpec, T
 from islands_api.client.errors import JobFailedError
 from islands_api.client.transport import (
@@ -68,7 +68,7 @@ class Endpoint(Generic[P, T]):
 class BaseClient(Generic[H]):
     """Constructor and calls of both clients.
 
-    To add a call, add a function to `islands_api.client.calls` and one line here.
+    To add a call, add a function to one of the modules of calls and one line here.
     The parameters are described in `islands_api.client.synchronous.Client`.
     """
 
@@ -89,6 +89,10 @@ class BaseClient(Generic[H]):
     history = Endpoint(calls.history)
     export = Endpoint(calls.export)
     figure = Endpoint(calls.figure)
+    create_webhook = Endpoint(webhook_calls.create_webhook)
+    webhooks = Endpoint(webhook_calls.webhooks)
+    delete_webhook = Endpoint(webhook_calls.delete_webhook)
+    deliveries = Endpoint(webhook_calls.deliveries)
 
     _http_class: type[H]
 
