@@ -2,14 +2,17 @@
 
 import json
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
+import httpx
 import pytest
 
 from islands.evolution.engine import SerialEngine
 from islands.facade.identify import identify
 from islands.io.records import read_record
 from islands.io.result_folder import result_document
+from support.control_groups import memory_limit
 from support.processes import alive, descendants, eventually, kill
 from support.service_processes import ROLES, SPEC, Service, serving
 
@@ -67,6 +70,27 @@ def test_service_finds_the_models_of_one_process(service: Service, undisturbed: 
     alone = identify(record, preset="hysteresis", seed=SPEC["seed"], engine=SerialEngine(), **settings)
     expected = result_document(alone.search_result)["models"]
     assert json.loads(undisturbed[1])["items"] == json.loads(json.dumps(expected))
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("role", ["api", "coordinator", "island"])
+def test_process_that_reaches_its_memory_limit_loses_no_job(
+    service: Service, undisturbed: tuple[bytes, bytes], role: str
+) -> None:
+    """The kernel kills it in the middle of an allocation."""
+    job = service.submit(LONG, key=f"memory {role}")
+    service.under_way(job)
+    victim = service.one(role)
+
+    def ended() -> bool:
+        with suppress(httpx.TransportError):  # an upload, so that the API allocates
+            service.client.post("/v1/datasets", files={"file": ("noise.csv", bytes(10_000_000))})
+        return not alive([victim])
+
+    with memory_limit(victim, 100_000):
+        eventually(ended)
+    assert service.found(job) == undisturbed[0]
+    assert service.job(job)["attempt"] in ATTEMPTS[role]
 
 
 @pytest.mark.parametrize(
