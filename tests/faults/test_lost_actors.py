@@ -122,7 +122,7 @@ def test_loss_of_all_actors_does_not_change_the_result(posed, undisturbed, engin
             for pid in actors():
                 kill(pid)
     assert found == undisturbed
-    assert len(messages) == min(3, len(os.sched_getaffinity(0)))
+    assert sum("was lost" in message for message in messages) == min(3, len(os.sched_getaffinity(0)))
 
 
 @pytest.mark.nightly
@@ -136,7 +136,7 @@ def test_standby_actor_replaces_a_lost_one_until_its_restart(posed, engine, mess
         eventually(lambda: found.maintain(at_once=True) and len(found.slots) == full_size)
         regular = [found.actor_for(island) for island in range(3)]
         kill(min(eventually(actors)))
-        eventually(lambda: found.maintain(at_once=True) and messages)
+        eventually(lambda: found.maintain(at_once=True) and any("was lost" in each for each in messages))
         assert found.slots[0] == actor_pool.STANDBY
         assert len(found.slots) == full_size - 1
         replaced = [
