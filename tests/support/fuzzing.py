@@ -6,6 +6,7 @@ a crash, a case that takes seconds.
 
 import io
 import json
+import os
 import random
 import re
 import resource
@@ -219,6 +220,9 @@ def main() -> None:
     from islands.io.records import preview
 
     asked = json.load(sys.stdin)
+    # Libraries print messages.
+    answer = os.fdopen(os.dup(sys.stdout.fileno()), "w")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     corpus(asked["suffix"])
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -227,7 +231,8 @@ def main() -> None:
         for case, defect in zip(
             cases, run_cases(preview, asked["suffix"], asked["seed"], cases, Path(folder)), strict=True
         ):
-            print(json.dumps({"case": case, "reason": None if defect is None else defect.reason}), flush=True)
+            reason = None if defect is None else defect.reason
+            print(json.dumps({"case": case, "reason": reason}), file=answer, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
 """Processes that read an untrusted file with limited resources: how they are started, and how they answer."""
 
 import json
+import os
 import resource
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import IO, Any, NoReturn
 
 from islands.errors import IslandsError, RecordError
 from islands_service.intake.confinement import confine
@@ -13,7 +14,7 @@ from islands_service.intake.confinement import confine
 #: Environment of a process, without any secret.
 ENVIRONMENT = {"PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 
-#: Exit status if the file is unusable and the reason is on standard output.
+#: Exit status if the file is unusable and the reason is the answer.
 _REFUSED = 3
 
 #: Largest number of open files.
@@ -31,19 +32,28 @@ def make_message(path: Path, memory: int, seconds: float, asked: Mapping[str, An
     return json.dumps(message).encode()
 
 
-def enter(writes: bool = False) -> tuple[str, dict[str, Any]]:
-    """Read the message on standard input, and restrict this process; return the path and what is asked.
+def enter(writes: bool = False) -> tuple[str, dict[str, Any], IO[bytes]]:
+    """Read the message on standard input, and restrict this process.
 
     Parameters
     ----------
     writes : bool
         Whether standard output is a file, which may have as many bytes as the process has memory.
+
+    Returns
+    -------
+    path : str
+    asked : dict
+    answer : binary stream
+        Standard output. What libraries print is on standard error instead.
     """
+    answer = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     message = json.load(sys.stdin)
     memory = message["memory"]
     limit_resources(memory, message["seconds"], memory if writes else 0)
     confine([Path(message["path"]).resolve()])
-    return message["path"], message["asked"]
+    return message["path"], message["asked"], answer
 
 
 def limit_resources(memory: int, seconds: float, output_bytes: int = 0) -> None:
@@ -59,10 +69,16 @@ def limit_resources(memory: int, seconds: float, output_bytes: int = 0) -> None:
         resource.setrlimit(kind, (most, most))
 
 
-def refuse(error: IslandsError) -> NoReturn:
+def refuse(error: IslandsError, answer: IO[bytes]) -> NoReturn:
     """End this process with the reason why the file is unusable."""
-    sys.stdout.write(json.dumps({"error": str(error)}))
+    send_document({"error": str(error)}, answer)
     sys.exit(_REFUSED)
+
+
+def send_document(document: Mapping[str, Any], answer: IO[bytes]) -> None:
+    """Write a document as the answer of this process."""
+    answer.write(json.dumps(document).encode())
+    answer.flush()
 
 
 def check_status(

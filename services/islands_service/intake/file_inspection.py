@@ -5,7 +5,6 @@ A file that exhausts memory, or makes its reader loop, ends only this subprocess
 
 import asyncio
 import json
-import sys
 from asyncio.subprocess import PIPE
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -21,6 +20,7 @@ from islands_service.intake.confined_process import (
     make_command,
     make_message,
     refuse,
+    send_document,
     timeout_error,
 )
 
@@ -120,7 +120,7 @@ async def _read_output(process: asyncio.subprocess.Process, stream: asyncio.Stre
 
 def main() -> None:
     """Inspect the file named on standard input, and write the result to standard output."""
-    path, asked = enter()
+    path, asked, answer = enter()
     # Import after the limits are set, so that the imported code is subject to them.
     from islands.io.records import read_dataset  # noqa: PLC0415
     from islands.io.records.preview import preview_table  # noqa: PLC0415
@@ -142,12 +142,12 @@ def main() -> None:
         elif options.gaps is None:
             _check_usable({column.name: column.problem for column in found.columns}, request)
     except (RecordError, SettingsError) as error:
-        refuse(error)
+        refuse(error, answer)
     measured = _measure(found, path, request, options)
     if options.resample is not None:
         found = replace(found, dt=options.resample)
     document = {**asdict(found), "inspection": measured, "reading": options.changes()}
-    json.dump(document, sys.stdout)
+    send_document(document, answer)
 
 
 def _measure(

@@ -8,7 +8,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -126,7 +125,7 @@ def _to_tuple(value: object) -> object:
 
 def main() -> None:
     """Read the file named on standard input, and write the record to standard output."""
-    path, asked = enter(writes=True)
+    path, asked, answer = enter(writes=True)
     # Import after the limits are set, so that the imported code is subject to them.
     from islands.io.records import read_dataset  # noqa: PLC0415
     from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
@@ -137,8 +136,9 @@ def main() -> None:
         options, rows = ReadingOptions(**request.reading), parse_rows(request.rows)  # type: ignore[arg-type]
         record = read_dataset(path, request.inputs, request.output, request.dt, rows, options=options)
     except (RecordError, SettingsError) as error:
-        refuse(error)
-    send_record(record, sys.stdout.buffer)
+        refuse(error, answer)
+    send_record(record, answer)
+    answer.flush()
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,10 +18,15 @@ import pytest
 from islands.errors import RecordError
 from islands_service.intake import file_inspection
 from islands_service.intake.file_inspection import InspectionRequest, inspect_file
+from islands_service.intake.record_reading import RecordRequest, read_confined
+from support.odd_files import write_workbook
 from support.processes import alive, descendants, eventually
 from support.service import csv
 
 MEMORY, SECONDS = 6_000_000_000, 30.0
+
+#: Styles of the cells of a workbook.
+NO_STYLE = re.compile(rb"<cellStyleXfs.*</cellStyleXfs>")
 
 #: Writes files after the limits are set.
 WRITES = """
@@ -70,6 +76,19 @@ def test_a_file_with_too_many_columns_is_refused_before_one_is_read(tmp_path):
             archive.writestr(f"{index}.npy", b"not an array")
     with pytest.raises(RecordError, match="has 1001 columns, and 1000 is the most"):
         inspect(tmp_path / "a.npz")
+
+
+@pytest.mark.ci
+def test_messages_that_a_library_prints_are_no_part_of_the_answer(tmp_path):
+    """The reader of workbooks prints the number of a style that does not exist."""
+    write_workbook(tmp_path / "a.xlsx")
+    with zipfile.ZipFile(tmp_path / "a.xlsx") as whole, zipfile.ZipFile(tmp_path / "b.xlsx", "w") as broken:
+        for name in whole.namelist():
+            broken.writestr(name, NO_STYLE.sub(b"<cellStyleXfs/>", whole.read(name)))
+    with pytest.raises(RecordError, match=r"b\.xlsx is damaged"):
+        inspect(tmp_path / "b.xlsx")
+    with pytest.raises(RecordError, match=r"b\.xlsx is damaged"):
+        read_confined(tmp_path / "b.xlsx", RecordRequest(["u"], "y", None, None, {}), MEMORY, SECONDS)
 
 
 def test_record_is_described(record):

@@ -21,7 +21,8 @@ _MOST_ROWS = 2**20
 
 #: Exceptions of openpyxl and the standard library for damaged workbooks.
 _DAMAGED = (
-    KeyError,
+    LookupError,
+    ArithmeticError,
     ValueError,
     TypeError,
     AttributeError,
