@@ -1,6 +1,5 @@
 """Table of commands, and error handling: one line on standard error and exit code 2."""
 
-import os
 import sys
 from collections.abc import Mapping
 from importlib import import_module
@@ -16,9 +15,7 @@ from typer.core import TyperCommand, TyperGroup
 from islands.errors import IslandsError, SettingsError
 from islands_api.cli.console import errors
 from islands_api.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
-
-#: Environment variables that set the number of threads of linear algebra libraries.
-THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+from islands_service.process.process_settings import limit_threads
 
 #: Commands and their descriptions, in the order of the help. Each is a file with a function or a group of the
 #: command's name. The help shows these descriptions, so that it does not import the commands.
@@ -168,8 +165,5 @@ def _islands(
 
 def main() -> None:
     """Run the command line."""
-    # The matrices are small, and the cores are busy with islands and jobs: more threads would wait for each
-    # other, and the sums would depend on their number. Must be set before NumPy is imported.
-    for name in THREADS:
-        os.environ.setdefault(name, "1")
+    limit_threads()
     app()

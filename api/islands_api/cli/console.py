@@ -48,9 +48,10 @@ def progress(title: str) -> Iterator[Display]:
 
 
 def compile_kernels() -> None:
-    """Compile the kernels if they are not in the cache, and show a progress bar meanwhile."""
+    """Compile the kernels if they are not in the cache, with a progress bar, and prepare for a long run."""
     # Imported here because it loads most of the core: other commands must start fast.
     from islands.facade.warm_up import warm_up  # noqa: PLC0415
+    from islands_service.process.process_settings import freeze_garbage_collector  # noqa: PLC0415
 
     with ExitStack() as stack:
 
@@ -59,3 +60,4 @@ def compile_kernels() -> None:
             stack.enter_context(progress("kernels"))("", 0.0)
 
         warm_up(announce)
+    freeze_garbage_collector()

@@ -1,8 +1,6 @@
-"""Listening socket of the web server, and the limit of open files."""
+"""Listening socket of the web server."""
 
-import resource
 import socket
-from contextlib import suppress
 from errno import EADDRINUSE
 from time import monotonic, sleep
 
@@ -13,9 +11,6 @@ _PORT_RETRY_SECONDS = 2.0
 
 #: Length of the queue of connections that wait to be accepted.
 _BACKLOG = 2048
-
-#: Upper bound on the limit of open files. Each connection takes one.
-_MAX_OPEN_FILES = 65_536
 
 
 def open_listener(host: str, port: int) -> socket.socket:
@@ -57,13 +52,3 @@ def _listen(host: str, port: int) -> socket.socket:
         listener.close()
         raise
     return listener
-
-
-def raise_file_limit() -> None:
-    """Raise the soft limit of open files to the hard limit; the default is about a thousand."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    limit = _MAX_OPEN_FILES if hard == resource.RLIM_INFINITY else min(hard, _MAX_OPEN_FILES)
-    if soft != resource.RLIM_INFINITY and soft < limit:
-        # Some systems enforce a lower limit than the hard limit that they report.
-        with suppress(ValueError, OSError):
-            resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))

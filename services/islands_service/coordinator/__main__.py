@@ -13,15 +13,14 @@ from islands_service.coordinator.coordinator_metrics import CoordinatorMetrics
 from islands_service.coordinator.process_restart import restart_process
 from islands_service.liveness import StopRequest, stop_on_signals, watch_supervisor
 from islands_service.logging_config import configure_logs
-from islands_service.process_metrics import serve_metrics
+from islands_service.process.process_metrics import serve_metrics
+from islands_service.process.process_settings import limit_threads
 from islands_service.settings import service_settings
 
 
 def main() -> int:
     """Run until SIGTERM or SIGINT."""
-    # Floating-point sums depend on the number of BLAS threads, and results must not. NumPy is not imported
-    # yet.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    limit_threads()  # NumPy is not imported yet
     parser = argparse.ArgumentParser(prog="python -m islands_service.coordinator", description=__doc__)
     parser.add_argument(
         "--name", default=f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(3)}", help="unique"

@@ -283,6 +283,7 @@ class Coordinator:
 
     def _connect(self) -> None:
         from islands.facade.warm_up import warm_up  # noqa: PLC0415
+        from islands_service.process.process_settings import freeze_garbage_collector  # noqa: PLC0415
         from islands_service.runtime.cluster import cluster  # noqa: PLC0415
 
         self._ray.enter_context(cluster(self._find_address()))
@@ -290,6 +291,7 @@ class Coordinator:
         self._connected = True
         log.info("connected to Ray", address=self._find_address())
         warm_up(lambda line: log.info("kernels", note=line))
+        freeze_garbage_collector()
 
     def _make_engine(self, lease: Lease, notes: JobNotes) -> "Engine":
         from islands_service.coordinator.job_engine import make_job_engine  # noqa: PLC0415

@@ -14,6 +14,7 @@ from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.facade.warm_up import warm_up
+from islands_service.process.process_settings import freeze_garbage_collector
 from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack_emigrants, unpack_island
 
 
@@ -47,6 +48,7 @@ class IslandActor:
         """
         warm_up(lambda _line: None)
         self._evaluator = Evaluator(self._problem.record, self._problem.settings)
+        freeze_garbage_collector()
         return version("islands")
 
     @ray.method(concurrency_group="watch")

@@ -16,9 +16,9 @@ from islands.evolution.progress import ProgressCallback
 from islands.performance.benchmark.report import BenchmarkReport, check_goals, to_document
 from islands.performance.benchmark.run import measure
 from islands.performance.benchmark.scaling import save_scalings
-from islands_api.cli.app import THREADS
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
+from islands_service.process.process_settings import THREADS
 
 
 def bench(

@@ -152,7 +152,7 @@ def job_progress_bar() -> Iterator[Callable[[JobView], None]]:
 def _describe_phase(job: JobView) -> str:
     """Return the phase of a job, its position in the queue, or its last note."""
     status = job.progress or {}
-    if job.state == JobState.QUEUED and "note" not in status:
+    if job.state == JobState.QUEUED:
         place = status.get("position")
         return "waiting" if place is None else f"number {place} in the queue"
     return str(status.get("note") or status.get("phase", "waiting"))

@@ -1,9 +1,7 @@
-"""Listening socket: no delay of small responses, clear errors, many open files."""
+"""Listening socket: no delay of small responses, clear errors."""
 
 import asyncio
-import resource
 import socket
-from collections.abc import Iterator
 
 import pytest
 
@@ -38,26 +36,3 @@ def test_accepted_connections_send_small_responses_at_once(host: str) -> None:
 def test_an_address_of_another_machine_is_refused() -> None:
     with pytest.raises(SettingsError, match=r"cannot listen at 192\.0\.2\.1, port 1234 .*as --host"):
         listener.open_listener("192.0.2.1", 1234)
-
-
-@pytest.fixture
-def file_limit() -> Iterator[int]:
-    """Lower the soft limit of open files; yield the hard limit."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (256, hard))
-    yield hard
-    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-
-
-def test_the_limit_of_open_files_is_raised_and_never_lowered(
-    file_limit: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(listener, "_MAX_OPEN_FILES", 300)
-    listener.raise_file_limit()
-    assert resource.getrlimit(resource.RLIMIT_NOFILE) == (300, file_limit)
-    monkeypatch.setattr(listener, "_MAX_OPEN_FILES", 200)  # the limit is never lowered
-    listener.raise_file_limit()
-    assert resource.getrlimit(resource.RLIMIT_NOFILE) == (300, file_limit)
-    monkeypatch.setattr(listener, "_MAX_OPEN_FILES", 10**12)
-    listener.raise_file_limit()
-    assert file_limit == resource.RLIM_INFINITY or resource.getrlimit(resource.RLIMIT_NOFILE)[0] == file_limit

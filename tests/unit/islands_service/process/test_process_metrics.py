@@ -8,7 +8,7 @@ import pytest
 
 from islands.errors import SettingsError
 from islands_api.cli.commands.serve import roles
-from islands_service.process_metrics import make_registry, serve_metrics
+from islands_service.process.process_metrics import make_registry, serve_metrics
 from islands_service.settings import ServiceSettings
 from support.service_processes import free_port
 

@@ -1,0 +1,1 @@
+"""A process of the service: its settings and its metrics."""
