@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import h5py
+import nptdms
 import numpy as np
 import pytest
 
@@ -44,6 +45,13 @@ def _directory_of_a_workbook(path: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b"PK\1\2", b"PK\1\3"))
 
 
+def _too_many_values(path: Path) -> None:
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.ChannelObject("g", name, np.arange(61.0)) for name in ("u_V", "y_um")])
+    count, wrong = (number.to_bytes(8, "little") for number in (61, 2**63))
+    path.write_bytes(path.read_bytes().replace(count, wrong))
+
+
 def _name_that_is_not_utf_8(path: Path) -> None:
     with h5py.File(path, "w") as file:
         file[b"\xff\xfe"] = np.arange(60.0)
@@ -55,6 +63,7 @@ def _name_that_is_not_utf_8(path: Path) -> None:
         ("r.npz", _header_without_end),
         ("r.xlsx", _directory_of_a_workbook),
         ("r.h5", _name_that_is_not_utf_8),
+        ("r.tdms", _too_many_values),
     ],
 )
 def test_a_damage_that_libraries_do_not_expect_is_refused(

@@ -20,7 +20,10 @@ from islands.io.records.validation import MIN_SAMPLES
 MOST_CHANNELS = 16
 
 #: Exceptions that readers, NumPy and h5py raise for damaged files.
-DAMAGED = (LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError, struct.error, zlib.error)
+DAMAGED = (
+    *(ArithmeticError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError),
+    *(struct.error, zlib.error),
+)
 
 #: MATLAB commands to save a variable x as numbers, by its class.
 ADVICE = {
