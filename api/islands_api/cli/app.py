@@ -50,7 +50,9 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
 EXTRAS: Mapping[str, str] = MappingProxyType(
     {
         "ray": "ray",
-        **dict.fromkeys(("alembic", "fastapi", "prometheus_client", "pydantic_settings"), "service"),
+        **dict.fromkeys(
+            ("alembic", "fastapi", "httptools", "prometheus_client", "pydantic_settings"), "service"
+        ),
         **dict.fromkeys(("python_multipart", "sqlalchemy", "starlette", "structlog", "uvicorn"), "service"),
     }
 )
