@@ -24,6 +24,7 @@ from islands_api.schemas import (
     ModelView,
     Names,
 )
+from islands_api.webhook_schemas import WebhookView
 
 T = TypeVar("T")
 
@@ -122,7 +123,7 @@ def submit(
 
 def job(which: JobRef) -> RequestSpec[JobView]:
     """Return a job."""
-    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}", read_as(JobView))
+    return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}", read_as(JobView))
 
 
 def await_change(which: JobView, seconds: float) -> RequestSpec[JobView]:
@@ -132,7 +133,7 @@ def await_change(which: JobView, seconds: float) -> RequestSpec[JobView]:
         return which if response.status_code == HTTPStatus.NOT_MODIFIED else read_as(JobView)(response)
 
     headers = {"If-None-Match": f'"{which.version}"'}
-    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}", read, params={"wait": seconds}, headers=headers)
+    return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}", read, params={"wait": seconds}, headers=headers)
 
 
 def jobs(state: str | None = None, cursor: str | None = None, limit: int = 50) -> RequestSpec[JobPage]:
@@ -150,55 +151,55 @@ def datasets(cursor: str | None = None, limit: int = 50) -> RequestSpec[DatasetP
 
 def cancel(which: JobRef) -> RequestSpec[JobView]:
     """Cancel a job."""
-    return RequestSpec("POST", f"/v1/jobs/{_quote_id(which)}/cancel", read_as(JobView))
+    return RequestSpec("POST", f"/v1/jobs/{quote_id(which)}/cancel", read_as(JobView))
 
 
 def resume(which: JobRef) -> RequestSpec[JobView]:
     """Resume a job that has failed or was cancelled."""
-    return RequestSpec("POST", f"/v1/jobs/{_quote_id(which)}/resume", read_as(JobView), repeatable=False)
+    return RequestSpec("POST", f"/v1/jobs/{quote_id(which)}/resume", read_as(JobView), repeatable=False)
 
 
 def delete(which: JobRef) -> RequestSpec[None]:
     """Delete a finished job."""
-    return RequestSpec("DELETE", f"/v1/jobs/{_quote_id(which)}", lambda _: None, repeatable=False)
+    return RequestSpec("DELETE", f"/v1/jobs/{quote_id(which)}", lambda _: None, repeatable=False)
 
 
 def delete_dataset(which: DatasetRef) -> RequestSpec[None]:
     """Delete a data set that no unfinished job needs."""
-    return RequestSpec("DELETE", f"/v1/datasets/{_quote_id(which)}", lambda _: None, repeatable=False)
+    return RequestSpec("DELETE", f"/v1/datasets/{quote_id(which)}", lambda _: None, repeatable=False)
 
 
 def models(which: JobRef) -> RequestSpec[tuple[ModelView, ...]]:
     """Return the models of a job, least validation error first."""
     page = read_as(ModelPage)
-    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}/models", lambda response: page(response).items)
+    return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/models", lambda response: page(response).items)
 
 
 def result(which: JobRef) -> RequestSpec[dict[str, Any]]:
     """Return the whole result: ``result.json``, or ``discrepancy.json`` of a discrepancy job."""
-    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}/result", read_mapping)
+    return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/result", read_mapping)
 
 
 def report(which: JobRef) -> RequestSpec[bytes]:
     """Return the report of a job as one HTML file."""
-    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}/report", lambda response: response.content)
+    return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/report", lambda response: response.content)
 
 
 def extended(which: JobRef) -> RequestSpec[bytes]:
     """Return the extended simulation of a discrepancy job: ``extended.json``."""
-    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}/extended", lambda response: response.content)
+    return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/extended", lambda response: response.content)
 
 
 def history(which: JobRef, after: int = -1) -> RequestSpec[HistoryPage]:
     """Return a page of the search history after a generation. After the last page an empty one follows."""
     return RequestSpec(
-        "GET", f"/v1/jobs/{_quote_id(which)}/history", read_as(HistoryPage), params={"after": after}
+        "GET", f"/v1/jobs/{quote_id(which)}/history", read_as(HistoryPage), params={"after": after}
     )
 
 
 def export(which: JobRef, rank: int = 1, form: str = "python") -> RequestSpec[str]:
     """Return a model as text: python, c, matlab, latex, json and so on."""
-    path = f"/v1/jobs/{_quote_id(which)}/models/{rank}/export"
+    path = f"/v1/jobs/{quote_id(which)}/models/{rank}/export"
     return RequestSpec("GET", path, lambda response: response.text, params={"format": form})
 
 
@@ -207,7 +208,7 @@ def figure(which: JobRef, name: str, rank: int | None = 1) -> RequestSpec[bytes]
     of = "" if rank is None else f"/models/{rank}"
     return RequestSpec(
         "GET",
-        f"/v1/jobs/{_quote_id(which)}{of}/figures/{_quote_id(name)}.svg",
+        f"/v1/jobs/{quote_id(which)}{of}/figures/{quote_id(name)}.svg",
         lambda response: response.content,
     )
 
@@ -217,7 +218,7 @@ def figure_names(which: JobRef, rank: int | None) -> RequestSpec[tuple[str, ...]
     of = "" if rank is None else f"/models/{rank}"
     names = read_as(Names)
     return RequestSpec(
-        "GET", f"/v1/jobs/{_quote_id(which)}{of}/figures", lambda response: names(response).items
+        "GET", f"/v1/jobs/{quote_id(which)}{of}/figures", lambda response: names(response).items
     )
 
 
@@ -228,15 +229,15 @@ def get_recommended_rank(job: JobView) -> int:
 
 def events_path(which: JobRef) -> str:
     """Return the path of the event stream of a job."""
-    return f"/v1/jobs/{_quote_id(which)}/events"
+    return f"/v1/jobs/{quote_id(which)}/events"
 
 
-def get_id(which: JobView | DatasetRef) -> str:
-    """Return the id of a job or data set that is given as a value or as an id."""
+def get_id(which: JobView | DatasetRef | WebhookView) -> str:
+    """Return the id of a resource that is given as a value or as an id."""
     return which if isinstance(which, str) else which.id
 
 
-def _quote_id(which: JobView | DatasetRef) -> str:
+def quote_id(which: JobView | DatasetRef | WebhookView) -> str:
     """Return an id as one percent-encoded path segment."""
     return quote(get_id(which), safe="")
 

@@ -1,9 +1,8 @@
 """Calls of webhooks, which the service calls when jobs end."""
 
 from collections.abc import Sequence
-from urllib.parse import quote
 
-from islands_api.client.calls import RequestSpec
+from islands_api.client.calls import RequestSpec, quote_id
 from islands_api.client.response_parsing import read_as
 from islands_api.webhook_schemas import (
     CreatedWebhook,
@@ -39,14 +38,12 @@ def webhooks() -> RequestSpec[tuple[WebhookView, ...]]:
 
 def delete_webhook(which: WebhookRef) -> RequestSpec[None]:
     """Delete a webhook and its deliveries."""
-    return RequestSpec("DELETE", _path(which), lambda _: None, repeatable=False)
+    return RequestSpec("DELETE", f"/v1/webhooks/{quote_id(which)}", lambda _: None, repeatable=False)
 
 
 def deliveries(which: WebhookRef) -> RequestSpec[tuple[DeliveryView, ...]]:
     """Return the last hundred deliveries of a webhook, newest first."""
     page = read_as(DeliveryPage)
-    return RequestSpec("GET", f"{_path(which)}/deliveries", lambda response: page(response).items)
-
-
-def _path(which: WebhookRef) -> str:
-    return f"/v1/webhooks/{quote(which if isinstance(which, str) else which.id, safe='')}"
+    return RequestSpec(
+        "GET", f"/v1/webhooks/{quote_id(which)}/deliveries", lambda response: page(response).items
+    )

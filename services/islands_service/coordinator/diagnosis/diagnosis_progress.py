@@ -63,7 +63,7 @@ class DiagnosisProgress:
         self._reported_at = self._checkpoint_at = monotonic()
         self._started_at = self._reported_at - state.spent
         self._stored = state.reached
-        self._phase, self._begin, self._searched_from = "", 0.0, (0.0, 0)
+        self._phase, self._begin = "", 0.0
 
     @property
     def spent(self) -> float:

@@ -136,7 +136,7 @@ def rank_owners(
 
 
 def has_room(turn: Row[Any], islands: int) -> bool:
-    """Return whether an owner may run a job with these islands, given its row of `rank_owners`.
+    """Return whether an owner may run a job with these islands, given a row with its quota.
 
     A job with more islands than the quota, which was lowered after the submission, runs alone.
     """

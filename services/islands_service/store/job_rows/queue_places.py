@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import Connection, Row, bindparam, func, select
 
 from islands_service.domain.job import Job, JobState
-from islands_service.store.job_rows.fair_queue import estimate_positions
+from islands_service.store.job_rows.fair_queue import estimate_positions, has_room
 from islands_service.store.job_rows.submission_checks import select_quota
 from islands_service.store.tables import jobs, owners
 
@@ -69,10 +69,10 @@ def find_places(
 def _explain_wait(connection: Connection, job: Job, usage: Row[Any]) -> str:
     if usage.most_running is not None and usage.running >= usage.most_running:
         return f"waits for your quota of running jobs: {usage.running} of {usage.most_running} are running"
-    if usage.most_islands is None or usage.islands == 0:
+    if usage.most_islands is None:
         return ""
     own = connection.execute(_ISLANDS, {"id": job.id}).scalar_one()
-    if usage.islands + own <= usage.most_islands:
+    if has_room(usage, own):
         return ""
     return (
         f"waits for your quota of running islands: {usage.islands} of {usage.most_islands} are running, and "
