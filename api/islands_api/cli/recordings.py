@@ -33,6 +33,8 @@ class Recordings:
     reading : ReadingOptions
     steps : PreprocessingSteps
         Steps of all recordings. The offsets are those of the estimation data.
+    resting_inputs : bool
+        Accept constant inputs.
     """
 
     paths: Sequence[Path]
@@ -41,6 +43,7 @@ class Recordings:
     dt: float | None = None
     reading: ReadingOptions = DEFAULT_READING
     steps: PreprocessingSteps = NO_STEPS
+    resting_inputs: bool = False
 
     def read(self, rows: str | None = None) -> Dataset:
         """Read ``START:STOP`` of every recording, or all of it, join the recordings and preprocess them."""
@@ -88,4 +91,12 @@ class Recordings:
         return record if self.steps.is_none else preprocess(record, like=self.read(used))
 
     def _read_file(self, path: Path, rows: str | None = None) -> Dataset:
-        return read_dataset(path, self.inputs, self.output, self.dt, parse_rows(rows), options=self.reading)
+        return read_dataset(
+            path,
+            self.inputs,
+            self.output,
+            self.dt,
+            parse_rows(rows),
+            options=self.reading,
+            resting_inputs=self.resting_inputs,
+        )

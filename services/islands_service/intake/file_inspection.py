@@ -53,6 +53,8 @@ class InspectionRequest:
         As in a job of `islands_service.domain.job_spec`.
     reading : mapping
         Options of `islands.io.records.reading_options.ReadingOptions` that differ from the default.
+    resting_inputs : bool
+        Accept constant inputs.
     """
 
     inputs: tuple[str, ...] = ()
@@ -60,6 +62,7 @@ class InspectionRequest:
     dt: float | None = None
     rows: str | None = None
     reading: Mapping[str, Any] = field(default_factory=dict)
+    resting_inputs: bool = False
 
 
 async def inspect_file(
@@ -138,7 +141,15 @@ def main() -> None:
         _check_readable(found, name)
         if request.inputs and request.output is not None:
             rows = parse_rows(request.rows)
-            read_dataset(path, request.inputs, request.output, request.dt, rows, options=options)
+            read_dataset(
+                path,
+                request.inputs,
+                request.output,
+                request.dt,
+                rows,
+                options=options,
+                resting_inputs=request.resting_inputs,
+            )
         elif options.gaps is None:
             _check_usable({column.name: column.problem for column in found.columns}, request)
     except (RecordError, SettingsError) as error:

@@ -79,7 +79,8 @@ def validate_job(
     for part, dataset in zip(parts, datasets, strict=True):
         if not _is_readable(spec, part, dataset.preview, dataset.name):
             reading = dataset.preview.get("reading", {})
-            request = InspectionRequest(spec.inputs, spec.output, spec.dt, part.rows, reading)
+            is_diagnosis = isinstance(spec, Discrepancy)
+            request = InspectionRequest(spec.inputs, spec.output, spec.dt, part.rows, reading, is_diagnosis)
             pending.append(PendingInspection(dataset, request))
     return ValidJob(islands, tuple(pending))
 

@@ -49,6 +49,7 @@ class RecordRequest:
     dt: float | None
     rows: str | None
     reading: dict[str, object]
+    resting_inputs: bool = False
 
 
 def read_confined(path: Path, request: RecordRequest, memory: int, seconds: float) -> Dataset:
@@ -134,7 +135,15 @@ def main() -> None:
     request = RecordRequest(**asked)
     try:
         options, rows = ReadingOptions(**request.reading), parse_rows(request.rows)  # type: ignore[arg-type]
-        record = read_dataset(path, request.inputs, request.output, request.dt, rows, options=options)
+        record = read_dataset(
+            path,
+            request.inputs,
+            request.output,
+            request.dt,
+            rows,
+            options=options,
+            resting_inputs=request.resting_inputs,
+        )
     except (RecordError, SettingsError) as error:
         refuse(error, answer)
     send_record(record, answer)

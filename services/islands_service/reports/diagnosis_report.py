@@ -37,6 +37,7 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     """Summarise a diagnosis as plain text."""
     lines = [_verdict(found)]
     lines += [f"  {_finding(finding)}" for finding in found.effects]
+    lines += [f"Record: {each.text}" for each in found.record_findings]
     if found.verdict == Verdict.UNKNOWN:
         nearest = ", ".join(candidate.name for candidate in found.candidates[:3])
         dependence = ", ".join(found.residual_structure) or "its own past"

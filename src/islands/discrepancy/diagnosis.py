@@ -21,6 +21,8 @@ from islands.discrepancy.calibration.preparation import (
     validate_prior,
 )
 from islands.discrepancy.effects import EFFECTS
+from islands.discrepancy.gross_errors.channel_admission import admit_channels
+from islands.discrepancy.gross_errors.record_finding import RecordFinding
 from islands.discrepancy.inference.experiment_design import suggest_experiment
 from islands.discrepancy.inference.holdout import HoldoutGain, measure_gain
 from islands.discrepancy.inference.noise_detectors import DETECTORS
@@ -93,6 +95,7 @@ class Diagnosis:
     suggested_experiment : str
         Experiment that discriminates between the named causes and their equivalents; empty if there is none.
     record : Dataset
+        The record without the channels that were left out.
     estimation_samples : int
         Number of samples, from the first on, that are used for estimation; the rest is the hold-out part.
     base, best : CalibrationResult
@@ -104,6 +107,8 @@ class Diagnosis:
         flexible reference model.
     nominal_rmse : float
         RMSE of the simulation at its nominal values over the hold-out part.
+    record_findings : tuple of RecordFinding
+        Channels that were left out, and other findings about the record.
     """
 
     verdict: Verdict
@@ -119,6 +124,7 @@ class Diagnosis:
     noise_floor: float
     is_noise_floor_measured: bool
     nominal_rmse: float
+    record_findings: tuple[RecordFinding, ...] = ()
 
 
 def diagnose(
@@ -154,14 +160,15 @@ def diagnose(
     Raises
     ------
     RecordError
-        The record or one of its recordings is too short, or has gaps, a constant signal or a channel equal to
-        the input, or the simulation diverges on it.
+        The record or one of its recordings is too short, or has gaps or a constant output, or the simulation
+        diverges on it.
     SettingsError
         A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, two effects have the
         same name, or an effect is invalid.
     """
     prior_std = validate_prior(tolerance or {}, simulator)
     fitted = count_fitted_samples(record)
+    record, record_findings = admit_channels(record, fitted)
     context = make_context(record, simulator, fitted)
     rng = np.random.default_rng(seed)
     simulation = ExtendedSimulator(simulator, (), context)
@@ -194,7 +201,8 @@ def diagnose(
         model_error = search_with_model_error(base, target, effects, progress, parallel_map)
         second = assess_evidence(model_error, fitted, rng)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome
-    return _make_diagnosis(record, outcome, base, effects, fitted, rng, progress, parallel_map)
+    found = _make_diagnosis(record, outcome, base, effects, fitted, rng, progress, parallel_map)
+    return replace(found, record_findings=record_findings)
 
 
 def _make_diagnosis(

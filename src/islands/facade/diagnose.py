@@ -72,7 +72,7 @@ def diagnose(
         There is no such simulation, a tolerance belongs to no parameter, two effects have the same name, or
         an effect is invalid.
     """
-    record = as_record(record, dt=dt, inputs=inputs, output=output)
+    record = as_record(record, dt=dt, inputs=inputs, output=output, resting_inputs=True)
     simulator: Any = simulation
     if isinstance(simulation, Model):
         simulator = make_model_simulator(simulation, "the model", record)

@@ -42,6 +42,7 @@ def as_record(
     inputs: str | Sequence[str] = (),
     output: str | None = None,
     missing_output: bool = False,
+    resting_inputs: bool = False,
 ) -> Dataset:
     """Make a record of a data frame or of arrays, and check it as `read_record` checks a file.
 
@@ -64,6 +65,8 @@ def as_record(
         Name of the output column.
     missing_output : bool
         Accept missing values of the output and constant columns, for a simulation.
+    resting_inputs : bool
+        Accept constant inputs, for a diagnosis.
 
     Returns
     -------
@@ -90,7 +93,8 @@ def as_record(
             )
         return data
     if y is None and isinstance(data, list | tuple) and data and _is_recording(data[0]):
-        made = (_read_one(each, dt, inputs, output, missing_output) for each in data)
+        accepted = {"missing_output": missing_output, "resting_inputs": resting_inputs}
+        made = (_read_one(each, dt, inputs, output, accepted) for each in data)
         return join(tuple(made))
     columns = read_columns_in_memory(data)
     if y is not None:
@@ -108,7 +112,9 @@ def as_record(
         raise SettingsError(
             f"no output is given: take one of the columns {', '.join(table.names)} as output=..."
         )
-    record = read_table(table, _TITLE, inputs, output, dt, missing_output=missing_output)
+    record = read_table(
+        table, _TITLE, inputs, output, dt, missing_output=missing_output, resting_inputs=resting_inputs
+    )
     names = [*record.input_names, output]
     units = [
         columns.units.get(find_column(name, table.names)) or unit
@@ -122,11 +128,15 @@ def _is_recording(data: Any) -> bool:
 
 
 def _read_one(
-    data: Any, dt: float | None, inputs: str | Sequence[str], output: str | None, missing_output: bool
+    data: Any,
+    dt: float | None,
+    inputs: str | Sequence[str],
+    output: str | None,
+    accepted: Mapping[str, bool],
 ) -> Dataset:
     if isinstance(data, Dataset):
         return data
-    return as_record(data, dt=dt, inputs=inputs, output=output, missing_output=missing_output)
+    return as_record(data, dt=dt, inputs=inputs, output=output, **accepted)
 
 
 def column_names(data: "RecordLike") -> tuple[str, ...]:

@@ -48,6 +48,7 @@ def diagnosis_document(
         "calibrated": _get_calibrated_values(diagnosis),
         **_describe_self_test(tested),
         "extended_model": None if diagnosis.gain is None else "extended.json",
+        "record_findings": [each.as_document() for each in diagnosis.record_findings],
         "wall_s": wall_s,
     }
 

@@ -154,6 +154,7 @@ def _read_record(
     """Read the recordings, and separately the column of a simulation that was recorded in them."""
     extra = [] if column is None else [column]
     names = [options.single_input(inputs), *channels, *extra]
-    whole = Recordings(records, names, output_column, dt, reading).read(rows)
+    recordings = Recordings(records, names, output_column, dt, reading, resting_inputs=True)
+    whole = recordings.read(rows)
     kept = 1 + len(channels)
     return whole.first_inputs(kept), {} if column is None else {column: whole.u[:, kept]}

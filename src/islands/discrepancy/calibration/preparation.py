@@ -1,6 +1,6 @@
 """Preparation of a diagnosis: checks of the record, estimation part, context and applicable effects."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +9,7 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.effects.scale import wrong_parameter
 from islands.discrepancy.interfaces.effect import Effect, SimulationContext, Site
+from islands.discrepancy.interfaces.segments import is_resting
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -19,6 +20,9 @@ HOLDOUT_FRACTION = 0.25
 
 #: Minimum number of samples of a record, in all recordings together.
 MIN_SAMPLES = 200
+
+#: Families of effects on the output that are visible while the simulated output rests.
+_FAMILIES_AT_REST = ("baseline", "memory", "disturbance")
 
 #: Minimum number of samples of each of several recordings, and of each part of one that the hold-out part
 #: divides: its initial state is estimated from them.
@@ -49,6 +53,7 @@ def select_effects(
             f"effects need different names, and {', '.join(duplicates)} is given twice: rename one"
         )
     has_full_prior = {each.name for each in simulator.parameters if not each.initial} <= tolerance.keys()
+    is_visible = _make_visibility_test(simulator, context)
     effects = [
         effect
         for effect in catalogue
@@ -57,9 +62,26 @@ def select_effects(
         and effect.name not in simulator.built_in_effects
         and (has_full_prior or not effect.is_gain)
         and effect.is_applicable(context)
+        and is_visible(effect)
     ]
-    effects += simulator.state_effects
+    effects += [effect for effect in simulator.state_effects if effect.is_applicable(context)]
     return effects + [wrong_parameter(each) for each in simulator.parameters if each.name in tolerance]
+
+
+def _make_visibility_test(simulator: Simulator, context: SimulationContext) -> Callable[[Effect], bool]:
+    """Return the test whether an input that rests over the estimation part can show an effect.
+
+    Effects at a constant input are constants, as an offset is. If the simulated output rests as well, only
+    effects on the baseline, memories and disturbances of the output are visible.
+    """
+    if not context.has_resting_input:
+        return lambda _: True
+    fitted = round(context.fit_end_time / context.dt)
+    simulation = ExtendedSimulator(simulator, (), context)
+    if is_resting(simulation.simulate(simulation.nominal)[:fitted]):
+        return lambda effect: effect.site == Site.OUTPUT and effect.family in _FAMILIES_AT_REST
+    has_output_coordinate = context.force_coordinate.is_dissipative
+    return lambda effect: effect.site != Site.INPUT and (effect.site != Site.FORCE or has_output_coordinate)
 
 
 def validate_prior(tolerance: Mapping[str, float], simulator: Simulator) -> Mapping[str, float]:
@@ -107,8 +129,7 @@ def count_fitted_samples(record: Dataset) -> int:
     Raises
     ------
     RecordError
-        The record or one of its recordings is too short, or has gaps, a constant signal or a channel equal to
-        the input.
+        The record or one of its recordings is too short, or has gaps or a constant output.
     """
     if record.samples < MIN_SAMPLES:
         raise RecordError(
@@ -123,12 +144,8 @@ def count_fitted_samples(record: Dataset) -> int:
     if np.isnan(record.y).any():
         raise RecordError("the measured output has gaps: repair them, or select rows without any")
     fitted = estimation_part(record).samples
-    for name, signal in zip((*record.input_names, record.output_name), (*record.u.T, record.y), strict=True):
-        if np.ptp(signal[:fitted]) == 0.0:
-            raise RecordError(f"column {name} is constant: a diagnosis needs signals that vary")
-    for name, signal in zip(record.input_names[1:], record.u.T[1:], strict=True):
-        if np.array_equal(signal, record.u[:, 0]):
-            raise RecordError(f"channel {name} is the input itself: leave it out")
+    if np.ptp(record.y[:fitted]) == 0.0:
+        raise RecordError(f"column {record.output_name} is constant: a diagnosis needs an output that varies")
     return fitted
 
 
@@ -153,7 +170,7 @@ def make_context(record: Dataset, simulator: Simulator, fitted: int) -> Simulati
             name: np.ascontiguousarray(record.u[:, index]) for index, name in enumerate(names) if index
         },
         units=dict(zip(names[1:], units[1:], strict=True)),
-        input_peak=float(np.max(np.abs(record.u[:, 0]))),
+        input_peak=peak_amplitude(record.u[:, 0]),
         output_peak=1.0,
         input_unit=units[0] or "1",
         output_unit=record.output_unit or "1",
@@ -167,5 +184,8 @@ def make_context(record: Dataset, simulator: Simulator, fitted: int) -> Simulati
             f"the simulation {simulator.name} diverges on this input: check its parameters, its units and "
             "the sampling time"
         )
-    scaled = replace(context, output_peak=peak_amplitude(nominal))
+    peak = peak_amplitude(nominal)
+    if is_resting(nominal[:fitted]):  # it may rest at zero, while the measured output creeps
+        peak = max(float(np.max(np.abs(nominal))), peak_amplitude(record.y))
+    scaled = replace(context, output_peak=peak)
     return replace(scaled, force_coordinate=simulator.make_force_coordinate(scaled, nominal))

@@ -5,15 +5,36 @@ import numpy as np
 from islands.discrepancy.effects.filters import low_pass
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.segments import is_resting
+
+#: Largest step before the first sample, times the fraction that creeps, relative to the largest output.
+_MAX_EARLIER_STEP = 10.0
+
+
+def _earlier_step(y: Signal, tau: float, context: SimulationContext) -> Signal | float:
+    """Return the creep after a step before the first sample, as large as the largest output.
+
+    Without a step within the estimation part, creep comes from an earlier one, whose size is unknown.
+    """
+    fitted = round((context.fit_end_time - context.start_time) / context.dt)
+    if fitted <= 0 or not is_resting(y[:fitted]):
+        return 0.0
+    return context.output_peak * -np.expm1(-context.dt * np.arange(y.size) / tau)
+
+
+def _limit_kappa(context: SimulationContext, lower: float, upper: float) -> tuple[float, float]:
+    """Return the bounds of kappa: the given ones, or wider ones for an earlier step of unknown size."""
+    return (-_MAX_EARLIER_STEP, _MAX_EARLIER_STEP) if context.has_resting_input else (lower, upper)
 
 
 def _exponential_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return y + values[0] * (low_pass(y, float(np.exp(values[1])), context.dt) - y[0])
+    tau = float(np.exp(values[1]))
+    return y + values[0] * (low_pass(y, tau, context.dt) - y[0] + _earlier_step(y, tau, context))
 
 
 def _exponential_creep_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
-        Parameter("kappa", "", 0.0, 0.02, -0.5, 1.0),
+        Parameter("kappa", "", 0.0, 0.02, *_limit_kappa(context, -0.5, 1.0)),
         Parameter("log_tau", "ln s", 0.0, 0.3, np.log(5 * context.dt), np.log(1.5 * context.fit_end_time)),
     )
 
@@ -43,11 +64,13 @@ TAUS = (0.3, 1.0, 3.0, 10.0, 30.0)
 
 
 def _logarithmic_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return y + values[0] * sum(low_pass(y, tau, context.dt) - y[0] for tau in TAUS)
+    return y + values[0] * sum(
+        low_pass(y, tau, context.dt) - y[0] + _earlier_step(y, tau, context) for tau in TAUS
+    )
 
 
-def _logarithmic_creep_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("kappa", "", 0.0, 0.005, -0.3, 0.3),)
+def _logarithmic_creep_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("kappa", "", 0.0, 0.005, *_limit_kappa(context, -0.3, 0.3)),)
 
 
 def _logarithmic_creep_starting_points(

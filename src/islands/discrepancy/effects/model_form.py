@@ -203,6 +203,7 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
         "Identification, section 2",
         linear_parameters=len(terms),
         extra_degrees_of_freedom=_DEGREES_OF_FREEDOM - len(terms) - 1,
+        is_applicable=lambda context: not context.has_resting_input,
     )
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from islands.data.channel_names import simplify_unit
 from islands.discrepancy.calibration.noise_model import fit_ar_noise
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
-from islands.discrepancy.interfaces.segments import find_bounds
+from islands.discrepancy.interfaces.segments import find_bounds, is_resting
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +95,9 @@ QUANTISATION = NoiseDetector(
 #: Minimum number of equal successive samples in a burst.
 _MIN_BURST_LENGTH = 3
 
+#: Fraction of equal neighbours at a constant input above which a system without noise rests.
+_MIN_SHARE_AT_REST = 0.5
+
 #: Minimum number of bursts.
 _MIN_BURSTS = 2
 
@@ -104,6 +107,9 @@ def _detect_held_samples(y: Signal, _residual: Signal, context: SimulationContex
         return None
     is_equal = np.diff(y) == 0.0
     is_equal[[first - 1 for first, _ in find_bounds(context.segments, y.size)[1:]]] = False
+    is_resting_input = np.diff(context.u[: y.size]) == 0.0
+    if is_resting_input.any() and np.mean(is_equal[is_resting_input]) > _MIN_SHARE_AT_REST:
+        is_equal &= ~is_resting_input  # the system rests, and no sample is lost
     is_repeated = np.concatenate([[False], is_equal, [False]])
     edges = np.flatnonzero(np.diff(is_repeated.astype(np.int8)))
     lengths = edges[1::2] - edges[::2] + 1
@@ -186,6 +192,8 @@ def _detect_heteroscedastic_noise(
     y: Signal, residual: Signal, context: SimulationContext
 ) -> NoiseFinding | None:
     whitened, is_innovation = _whiten(residual, context)
+    if is_resting(y - residual):  # the noise cannot grow with an output that rests
+        return None
     whitened, size = whitened[is_innovation], np.abs(y[is_innovation]) / np.max(np.abs(y))
     n = whitened.size
     # A few outliers at large outputs have the same effect, so that squares are clipped at four deviations.

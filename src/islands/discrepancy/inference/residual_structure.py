@@ -40,6 +40,8 @@ def find_residual_structure(
     shifts = rng.integers(n // 20, n - n // 20, SHIFTS)
     distances = {}
     for name, cells in _make_maps(context.u[:n], simulated, context.dt, segments).items():
+        if cells.min() == cells.max():  # a signal at rest
+            continue
         null = np.log([_explained_squares(np.roll(whitened, shift), cells) for shift in shifts])
         distance = (float(np.log(_explained_squares(whitened, cells))) - float(null.mean())) / float(
             null.std()

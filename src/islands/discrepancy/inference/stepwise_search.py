@@ -165,7 +165,11 @@ def _get_min_further_gain(target: Target, effects: Sequence[Effect]) -> float:
     It includes a correction for multiple comparisons, since any of the effects could gain by chance. Under
     model error there is no correction: gains are not due to chance, and pairs need a lower threshold.
     """
-    return MIN_GAIN if target.effective_samples is not None else MIN_GAIN + 2.0 * float(np.log(len(effects)))
+    return (
+        MIN_GAIN
+        if target.effective_samples is not None
+        else MIN_GAIN + 2.0 * float(np.log(max(len(effects), 1)))
+    )
 
 
 def _eliminate_backward(hypothesis: Hypothesis, target: Target, min_gain: float) -> Hypothesis:

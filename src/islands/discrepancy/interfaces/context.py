@@ -123,6 +123,12 @@ class SimulationContext:
         """First sample of every recording and the sample after its last."""
         return find_bounds(self.segments, self.u.size)
 
+    @property
+    def has_resting_input(self) -> bool:
+        """Whether the input is constant over the estimation part."""
+        whole = self.whole or self
+        return bool(np.ptp(whole.u[: round(self.fit_end_time / self.dt)]) == 0.0)
+
     def split(self) -> "tuple[SimulationContext, ...]":
         """Return the context of each recording; scales, units and durations are those of the whole record."""
         if len(self.bounds) <= 1:

@@ -59,6 +59,7 @@ def read_record(
     timezone: str | None = None,
     resample: float | None = None,
     gaps: str | None = None,
+    resting_inputs: bool = False,
 ) -> Dataset:
     """Read inputs and an output from a file and check them.
 
@@ -113,6 +114,9 @@ def read_record(
     gaps : str, optional
         For gaps in the time and missing values: ``split`` makes each part a segment, ``interpolate`` fills
         them linearly.
+    resting_inputs : bool
+        Accept constant inputs, as of a creep test. A diagnosis can use such a record, an identification
+        cannot.
 
     Returns
     -------
@@ -128,7 +132,7 @@ def read_record(
         An option is invalid.
     """
     options = ReadingOptions(tuple(names), header, time, sheet, decimal, dates, timezone, resample, gaps)
-    return read_dataset(path, inputs, output, dt, rows, missing_output, options)
+    return read_dataset(path, inputs, output, dt, rows, missing_output, options, resting_inputs)
 
 
 def read_dataset(
@@ -139,10 +143,11 @@ def read_dataset(
     rows: slice | None = None,
     missing_output: bool = False,
     options: ReadingOptions = DEFAULT_READING,
+    resting_inputs: bool = False,
 ) -> Dataset:
     """Read a record like `read_record`, with the options as one value."""
     table, file = open_record(path, options), Path(path).name
-    record = read_table(table, file, inputs, output, dt, rows, missing_output, options)
+    record = read_table(table, file, inputs, output, dt, rows, missing_output, options, resting_inputs)
     return replace(record, sha256=fingerprint(path))
 
 

@@ -31,6 +31,7 @@ def read_table(
     rows: slice | None = None,
     missing_output: bool = False,
     options: ReadingOptions = DEFAULT_READING,
+    resting_inputs: bool = False,
 ) -> Dataset:
     """Read inputs and an output from an open table and check them.
 
@@ -43,6 +44,8 @@ def read_table(
         As in `islands.io.records.reader.read_record`.
     options : ReadingOptions
         The time column, and the repair of irregular sampling.
+    resting_inputs : bool
+        Accept constant inputs.
 
     Raises
     ------
@@ -73,7 +76,7 @@ def read_table(
         found = make_uniform(recording, places, options.gaps, options.resample)
         for name, column in zip((*sources, output), found.values.T, strict=True):
             check_repaired(column, name, file, missing=name not in required)
-    for name in () if missing_output else (*sources, output):
+    for name in () if missing_output else (*(() if resting_inputs else sources), output):
         check_varies(columns, name)
     record = Dataset(
         u=found.values[:, :-1],

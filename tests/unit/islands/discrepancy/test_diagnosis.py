@@ -117,12 +117,7 @@ def _nominal(record: Dataset) -> tuple:
 
 UNUSABLE = {
     "too short": (lambda record: record[: MIN_SAMPLES - 1], f"a diagnosis needs at least {MIN_SAMPLES}"),
-    "constant input": (lambda record: with_input(record, 0, 1.0), "column u_V is constant"),
-    "constant channel": (lambda record: with_input(record, 2, 1.0), "column w_V is constant"),
-    "channel equal to the input": (
-        lambda record: with_input(record, 1, record.u[:, 0]),
-        "channel T_K is the input itself: leave it out",
-    ),
+    "constant output": (lambda record: replace(record, y=0.0 * record.y), "column y_um is constant"),
     "gaps": (lambda record: replace(record, y=np.where(record.time > 3, record.y, np.nan)), "has gaps"),
 }
 

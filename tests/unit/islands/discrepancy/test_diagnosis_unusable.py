@@ -36,25 +36,16 @@ def with_y(record: Dataset, change: Callable[[np.ndarray], object]) -> Dataset:
     return replace(record, y=y)
 
 
-def with_constant_input(record: Dataset, level: float) -> Dataset:
-    return replace(record, u=np.full_like(record.u, level))
-
-
 SPOILT: dict[str, Callable[[Dataset], Dataset]] = {
     "one sample": lambda record: record[:1],
     "two samples": lambda record: record[:2],
     "five samples": lambda record: record[:5],
     "fifty samples": lambda record: record[:50],
     "one sample too few": lambda record: record[:199],
-    "a constant input": lambda record: with_constant_input(record, 2.0),
-    "a zero input": lambda record: with_constant_input(record, 0.0),
     "a constant output": lambda record: with_y(record, lambda y: y.fill(2.0)),
     "a zero output": lambda record: with_y(record, lambda y: y.fill(0.0)),
     "a gap": lambda record: with_y(record, lambda y: y.__setitem__(slice(100, 110), np.nan)),
     "a gap at its beginning": lambda record: with_y(record, lambda y: y.__setitem__(0, np.nan)),
-    "the input as a channel": lambda record: replace(
-        record, u=np.repeat(record.u, 2, axis=1), input_names=("u_V", "w_V"), input_units=("V", "V")
-    ),
 }
 
 

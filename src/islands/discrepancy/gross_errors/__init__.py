@@ -1,0 +1,1 @@
+"""Gross errors of a record, which are looked for before effects are."""

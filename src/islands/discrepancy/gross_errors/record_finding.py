@@ -1,0 +1,49 @@
+"""Finding about a record: a gross error, or a property that the reader of a diagnosis has to know."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+#: Family of gross errors in the list of causes.
+FAMILY = "gross"
+
+
+@dataclass(frozen=True, slots=True)
+class RecordFinding:
+    """A finding about a record.
+
+    Findings are made before the search for effects. They concern the record and the way in which it was read,
+    not the physics of the simulation.
+
+    Attributes
+    ----------
+    name : str
+        Name such as ``output-unit`` or ``duplicated-channel``.
+    description : str
+        What is wrong, as one or more sentences.
+    advice : str
+        What to do, as a sentence.
+    parameters : mapping
+        Values by name, each with its unit; the unit of a fraction or a factor is empty.
+    """
+
+    name: str
+    description: str
+    advice: str
+    parameters: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+
+    @property
+    def text(self) -> str:
+        """Description and advice, for reports."""
+        return f"{self.description} {self.advice}"
+
+    def as_document(self) -> dict[str, Any]:
+        """Return the finding as JSON values."""
+        return {
+            "name": self.name,
+            "description": self.description,
+            "advice": self.advice,
+            "parameters": {
+                name: {"value": value, "unit": unit} for name, (value, unit) in self.parameters.items()
+            },
+        }
