@@ -13,6 +13,7 @@ from islands.discrepancy.simulators import (
     intersample,
     linear,
     narx,
+    ode,
     python_function,
     recorded_output,
     saved_extension,
@@ -23,6 +24,7 @@ from support.simulated_records import made
 
 #: Classes of the simulators that are not physical systems; "held" is inside an extension.
 CLASSES = {
+    "ode": ode.OdeSimulator,
     "linear": linear.LinearSimulator,
     "model": narx.NarxSimulator,
     "column": recorded_output.RecordedOutput,

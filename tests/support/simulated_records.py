@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.io.simulator_spec.factory import make_simulator
+from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import (
     ColumnSpec,
     LinearSpec,
@@ -21,9 +22,13 @@ from islands.io.simulator_spec.specification import (
     PhysicalSpec,
     ProgramSpec,
 )
+from support.repository import ROOT
 
 #: File with a simulator that is a Python function.
 PROGRAM = Path(__file__).with_name("naive_damper.py")
+
+#: Folder with simulators that are equations.
+EQUATIONS = ROOT / "examples" / "simulations"
 
 #: Samples of a record.
 SAMPLES = 600
@@ -107,6 +112,7 @@ def made() -> Mapping[str, SpecAndRecord]:
             PhysicalSpec(kind="cascaded-tanks", parameters={"k1": 2.0, "k2": 2.0, "k3": 1.0}),
             recorded(np.abs(u) / 10, level),
         ),
+        "ode": SpecAndRecord(OdeSpec.from_text("ode", str(EQUATIONS / "second-order.toml")), oscillator),
         "linear": SpecAndRecord(
             LinearSpec(
                 kind="linear", order=1, delay=2, numerator=(0.1, 0.05), denominator=(0.85,), level=0.3

@@ -45,7 +45,7 @@ from islands.discrepancy.inference.verdict import (
 )
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext
 from islands.discrepancy.interfaces.parallel import ParallelMap
-from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.evolution.progress import ProgressCallback, ignore_progress
 
@@ -145,8 +145,9 @@ def diagnose(
         in. Each of several recordings has its own initial states; all other parameters are common to them.
     simulator : Simulator
     tolerance : mapping, optional
-        Relative standard deviations of the simulator's parameters about their nominal values. Parameters that
-        are not in it are free: a misfit that calibrating them removes is no discrepancy.
+        Relative standard deviations of the simulator's parameters about their nominal values, in addition to
+        those that the simulator states. Other parameters are free: a misfit that calibrating them removes is
+        no discrepancy.
     seed : int
         Seed of the random generator.
     progress : ProgressCallback
@@ -166,7 +167,7 @@ def diagnose(
         A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, two effects have the
         same name, or an effect is invalid.
     """
-    prior_std = validate_prior(tolerance or {}, simulator)
+    prior_std = validate_prior({**get_tolerances(simulator), **(tolerance or {})}, simulator)
     fitted = count_fitted_samples(record)
     record, record_findings = admit_channels(record, fitted)
     context = make_context(record, simulator, fitted)

@@ -102,19 +102,19 @@ def broadcast(_typingctx, number, count):
 @intrinsic
 def add(_typingctx, a, b):
     """Return ``a + b``."""
-    return a(a, b), _elementwise(lambda builder, x, y: builder.fadd(x, y))
+    return a(a, b), elementwise(lambda builder, x, y: builder.fadd(x, y))
 
 
 @intrinsic
 def subtract(_typingctx, a, b):
     """Return ``a - b``."""
-    return a(a, b), _elementwise(lambda builder, x, y: builder.fsub(x, y))
+    return a(a, b), elementwise(lambda builder, x, y: builder.fsub(x, y))
 
 
 @intrinsic
 def multiply(_typingctx, a, b):
     """Return ``a * b``."""
-    return a(a, b), _elementwise(lambda builder, x, y: builder.fmul(x, y))
+    return a(a, b), elementwise(lambda builder, x, y: builder.fmul(x, y))
 
 
 @intrinsic
@@ -126,7 +126,7 @@ def sign(_typingctx, a):
         negative = builder.select(builder.fcmp_ordered("<", x, zero), minus, zero)
         return builder.select(builder.fcmp_ordered(">", x, zero), plus, negative)
 
-    return a(a), _elementwise(one)
+    return a(a), elementwise(one)
 
 
 @intrinsic
@@ -210,7 +210,7 @@ def fold(_typingctx, a):
     return types.float64(a), generate
 
 
-def _elementwise(operation):
+def elementwise(operation):
     """Return the code generator of an operation that is applied to every vector."""
 
     def generate(_context, builder, signature, arguments):

@@ -49,7 +49,7 @@ def compile_law(function):
 
 
 @intrinsic
-def _call(_typingctx, address, x, rate, z, numbers):
+def call_law(_typingctx, address, x, rate, z, numbers):
     """Call ``double (double, double, double, double *)`` at a machine address."""
 
     def generate(_context, builder, _signature, arguments):
@@ -74,13 +74,13 @@ def integrate_along(x, rate, dt, elements, total):
         force, derivative, sign = elements.forces[e], elements.state_derivatives[e], elements.signs[e]
         z = elements.initial_states[e]
         for k in range(x.size):
-            total[k] += sign * _call(force, x[k], rate[k], z, numbers)
+            total[k] += sign * call_law(force, x[k], rate[k], z, numbers)
             if derivative != 0 and k + 1 < x.size:
                 half, v = 0.5 * (x[k] + x[k + 1]), (x[k + 1] - x[k]) / dt
-                first = _call(derivative, x[k], v, z, numbers)
-                second = _call(derivative, half, v, z + 0.5 * dt * first, numbers)
-                third = _call(derivative, half, v, z + 0.5 * dt * second, numbers)
-                fourth = _call(derivative, x[k + 1], v, z + dt * third, numbers)
+                first = call_law(derivative, x[k], v, z, numbers)
+                second = call_law(derivative, half, v, z + 0.5 * dt * first, numbers)
+                third = call_law(derivative, half, v, z + 0.5 * dt * second, numbers)
+                fourth = call_law(derivative, x[k + 1], v, z + dt * third, numbers)
                 z += dt / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
 
 
@@ -90,9 +90,9 @@ def _state_derivative(state, drive, mass, damping, stiffness, elements, slope):
     force = drive - damping * state[1] - stiffness * state[0]
     for e in range(elements.forces.size):
         numbers = elements.numbers.ctypes.data + 8 * WIDTH * e
-        force += elements.signs[e] * _call(elements.forces[e], state[0], state[1], state[2 + e], numbers)
+        force += elements.signs[e] * call_law(elements.forces[e], state[0], state[1], state[2 + e], numbers)
         if elements.state_derivatives[e] != 0:
-            slope[2 + e] = _call(elements.state_derivatives[e], state[0], state[1], state[2 + e], numbers)
+            slope[2 + e] = call_law(elements.state_derivatives[e], state[0], state[1], state[2 + e], numbers)
         else:
             slope[2 + e] = 0.0
     slope[0] = state[1]

@@ -32,15 +32,18 @@ OFFSET = Effect(
 )
 
 
-def input_offset(state: str) -> Effect:
-    """Return the offset in the balance of one state as an effect; its value has the unit of the input."""
+def input_offset(state: str, unit: str = "", size: float = 0.0) -> Effect:
+    """Return the offset in the balance of one state as an effect.
+
+    Its value has a unit and a typical size, by default those of the input.
+    """
     label = f"{INPUT_OFFSET.name}:{state}"
 
     def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-        return (Parameter(label, context.input_unit, 0.0, 0.01 * context.input_peak),)
+        return (Parameter(label, unit or context.input_unit, 0.0, 0.01 * (size or context.input_peak)),)
 
     def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        return ((0.02 * context.input_peak,),)
+        return ((0.02 * (size or context.input_peak),),)
 
     return Effect(
         name=label,

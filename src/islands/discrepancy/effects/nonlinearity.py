@@ -257,19 +257,23 @@ _CAUGHT = (0.0, 0.5)
 _MAX_LEVEL = 4.0
 
 
-def state_clip(state: str) -> Effect:
-    """Return the limit on one state as an effect; the overflow of the last state of a chain is lost."""
+def state_clip(state: str, unit: str = "", size: float = 0.0, spills: bool = True) -> Effect:
+    """Return the limit on one state as an effect, with its unit and peak if they are not those of the output.
+
+    The overflow of the last state of a chain is lost. A state that does not spill is limited to +-level.
+    """
     label = f"{STATE_CLIP.name}:{state}"
 
     def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-        peak = context.output_peak
-        level = Parameter(
-            label, context.output_unit, _MAX_LEVEL * peak, 0.01 * peak, 0.1 * peak, _MAX_LEVEL * peak
-        )
-        return (level, Parameter(f"{label} caught", "", 0.0, 0.05, 0.0, 1.0))
+        peak, own = size or context.output_peak, unit or context.output_unit
+        level = Parameter(label, own, _MAX_LEVEL * peak, 0.01 * peak, 0.1 * peak, _MAX_LEVEL * peak)
+        return (level, Parameter(f"{label} caught", "", 0.0, 0.05, 0.0, 1.0)) if spills else (level,)
 
     def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        return tuple((level * context.output_peak, caught) for level in _LEVELS for caught in _CAUGHT)
+        levels = [level * (size or context.output_peak) for level in _LEVELS]
+        return (
+            tuple((level, caught) for level in levels for caught in _CAUGHT) if spills else tuple(zip(levels))
+        )
 
     return Effect(
         name=label,

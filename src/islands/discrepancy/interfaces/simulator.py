@@ -1,6 +1,7 @@
 """Interface of the simulators that are compared with a record."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
@@ -78,6 +79,46 @@ class RecordBoundSimulator(Protocol):
 
     def for_samples(self, first: int, last: int) -> Simulator:
         """Return the simulator of a recording that begins at sample ``first`` and ends before ``last``."""
+
+
+@runtime_checkable
+class TolerancedSimulator(Protocol):
+    """Simulator that states how well its parameters are known."""
+
+    @property
+    def tolerances(self) -> Mapping[str, float]:
+        """Relative standard deviations of parameters about their nominal values, by name."""
+
+
+def get_tolerances(simulator: Simulator) -> Mapping[str, float]:
+    """Return the tolerances that a simulator states; most simulators state none."""
+    return simulator.tolerances if isinstance(simulator, TolerancedSimulator) else {}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulationRun:
+    """Arguments of one simulation, as of `Simulator.simulate`, without the context.
+
+    Attributes
+    ----------
+    values : ndarray, shape (parameters,)
+    x : ndarray, shape (samples,)
+    effect_parameters : mapping
+    forces : sequence
+    """
+
+    values: Signal
+    x: Signal
+    effect_parameters: Mapping[str, float]
+    forces: Forces
+
+
+@runtime_checkable
+class BatchSimulator(Protocol):
+    """Simulator that computes several runs at once, faster than one by one and with the same bits."""
+
+    def simulate_batch(self, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
+        """Simulate the outputs of runs with the same effects and force laws, shape (runs, samples)."""
 
 
 def take_recording(simulator: Simulator, first: int, last: int) -> Simulator:

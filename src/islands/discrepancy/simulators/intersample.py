@@ -9,7 +9,7 @@ import scipy
 
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.simulator import Forces, Simulator, take_recording
+from islands.discrepancy.interfaces.simulator import Forces, Simulator, get_tolerances, take_recording
 
 
 class SimulatorWrapper:
@@ -53,6 +53,11 @@ class SimulatorWrapper:
     def is_continuous_time(self) -> bool:
         """Whether the wrapped simulator integrates a differential equation."""
         return self.simulator.is_continuous_time
+
+    @property
+    def tolerances(self) -> Mapping[str, float]:
+        """Tolerances that the wrapped simulator states."""
+        return get_tolerances(self.simulator)
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """Return the force coordinate of the wrapped simulator."""

@@ -16,10 +16,12 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator
 from islands.discrepancy.simulators.narx import NarxSimulator
+from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.io.models import model_json
+from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.spec_base import EffectSpec, FrameSpec, ScalesSpec, ValueSpec
 from islands.io.simulator_spec.specification import (
     ColumnSpec,
@@ -112,6 +114,8 @@ def describe_extension(
         case NarxSimulator():
             model = simulator.with_shape(values, shape) if shape else simulator.with_values(values)
             return ModelSpec(kind="model", model=json.loads(model_json(model)), name=simulator.name)
+        case OdeSimulator():
+            return OdeSpec.from_system(simulator.system.with_values(named))
         case RecordedOutput():
             return ColumnSpec(kind="column", column=simulator.column)
         case LinearSimulator():

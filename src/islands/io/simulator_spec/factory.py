@@ -21,11 +21,13 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator, estimate_linear
 from islands.discrepancy.simulators.narx import NarxSimulator
+from islands.discrepancy.simulators.ode import make_ode_simulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, RecordError, SettingsError, lookup
 from islands.io.models import model_from_json
+from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.spec_base import ParameterRange, SimulatorEntry
 from islands.io.simulator_spec.specification import (
     SIMULATORS,
@@ -176,6 +178,11 @@ def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapp
         added.append(effect)
         values += [each.parameters[name].value for name in names]
     return SavedExtension(inner, tuple(added), np.array(values), scales)
+
+
+def make_ode(spec: OdeSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
+    """Make a simulator of the equations in a specification."""
+    return make_ode_simulator(spec.make_system(), record)
 
 
 def make_linear(spec: LinearSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:

@@ -1,11 +1,15 @@
 """Parts of specifications: base classes, effects of an extended simulation, and the type of a table entry."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, FiniteFloat, PositiveFloat
+
+from islands.errors import ModelError, SettingsError
 
 
 class SpecModel(BaseModel):
@@ -104,3 +108,14 @@ class SimulatorEntry:
     parameters: Mapping[str, ParameterRange] = field(default_factory=dict)
     estimated: str = ""
     is_remote: bool = True
+
+
+def read_object(path: str, failure: type[ModelError] | type[SettingsError]) -> dict[str, Any]:
+    """Read a file that holds a JSON object."""
+    try:
+        found = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise failure(f"{path} cannot be read as JSON ({error}): give a file with an object") from error
+    if not isinstance(found, dict):
+        raise failure(f"{path} does not hold a JSON object: write one like {{...}}")
+    return found

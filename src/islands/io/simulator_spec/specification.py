@@ -4,7 +4,6 @@ This module checks specifications and does not import the kernels; `islands.io.s
 simulators. To add a simulator, write its class and add an entry to `SIMULATORS`.
 """
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from pydantic import ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from islands.errors import ModelError, SettingsError, lookup
+from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.spec_base import (
     EffectSpec,
     ParameterRange,
@@ -20,6 +20,7 @@ from islands.io.simulator_spec.spec_base import (
     SimulatorEntry,
     SimulatorSpec,
     SpecModel,
+    read_object,
 )
 
 #: Name of the file of an extended simulation in the folder of a diagnosis.
@@ -37,7 +38,7 @@ class PhysicalSpec(SimulatorSpec):
     @classmethod
     def from_text(cls, kind: str, text: str) -> "LocalSpec":
         """Parse the path of a JSON file with parameters, or nothing."""
-        return cls(kind=kind, parameters=_read_object(text, SettingsError) if text else {})
+        return cls(kind=kind, parameters=read_object(text, SettingsError) if text else {})
 
 
 class LinearSpec(SimulatorSpec):
@@ -95,7 +96,7 @@ class ModelSpec(SimulatorSpec):
     @classmethod
     def from_text(cls, kind: str, text: str) -> "LocalSpec":
         """Parse the path of a model file or of an extended simulation."""
-        document = _read_object(text, ModelError)
+        document = read_object(text, ModelError)
         if document.get("schema") == EXTENDED_SCHEMA:
             return LocalExtendedSpec.model_validate(document)
         return cls.model_validate({"kind": kind, "model": document, "name": f"model {Path(text).name}"})
@@ -182,6 +183,14 @@ _ENTRIES = (
         estimated="k1, k2, k3; both levels at the first sample",
     ),
     SimulatorEntry(
+        "ode",
+        ":FILE.toml",
+        "Differential equations that you write: a file with equations, parameters and states",
+        OdeSpec,
+        f"{_FACTORY}:make_ode",
+        estimated="the states at the first sample",
+    ),
+    SimulatorEntry(
         "linear",
         ":ORDER[:DELAY]",
         "Linear model of order 0 to 10, with as many zeros as poles; the input acts DELAY samples late",
@@ -228,12 +237,12 @@ else:
 # Type checkers require explicit unions; a test compares both with the table.
 #: Specifications that REST accepts.
 SimulationSpec: TypeAlias = Annotated[
-    PhysicalSpec | LinearSpec | ModelSpec | ColumnSpec | ExtendedSpec, Field(discriminator="kind")
+    PhysicalSpec | OdeSpec | LinearSpec | ModelSpec | ColumnSpec | ExtendedSpec, Field(discriminator="kind")
 ]
 
 #: Specifications that the command line and the Python functions accept.
 LocalSpec: TypeAlias = Annotated[
-    PhysicalSpec | LinearSpec | ModelSpec | ColumnSpec | LocalExtendedSpec | ProgramSpec,
+    PhysicalSpec | OdeSpec | LinearSpec | ModelSpec | ColumnSpec | LocalExtendedSpec | ProgramSpec,
     Field(discriminator="kind"),
 ]
 
@@ -256,8 +265,8 @@ def parse_spec(text: str) -> LocalSpec:
         spec: LocalSpec = entry.spec.from_text(kind, arguments)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"]))
-        raise SettingsError(f"{text}: {where}: {first['msg']}") from error
+        where = "".join(f"{part}." for part in first["loc"])[:-1]
+        raise SettingsError(": ".join(filter(None, (text, where, first["msg"])))) from error
     return spec
 
 
@@ -277,17 +286,6 @@ def find_extended_file(path: str) -> str:
 def is_extended(path: str) -> bool:
     """Return whether a file holds an extended simulation; False if it cannot be read."""
     try:
-        return _read_object(path, ModelError).get("schema") == EXTENDED_SCHEMA
+        return read_object(path, ModelError).get("schema") == EXTENDED_SCHEMA
     except ModelError:
         return False
-
-
-def _read_object(path: str, failure: type[ModelError] | type[SettingsError]) -> dict[str, Any]:
-    """Read a file that holds a JSON object."""
-    try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise failure(f"{path} cannot be read as JSON ({error}): give a file with an object") from error
-    if not isinstance(found, dict):
-        raise failure(f"{path} does not hold a JSON object: write one like {{...}}")
-    return found

@@ -1,0 +1,98 @@
+"""Specification of a simulator that a user writes as equations: a TOML file, or its content as JSON."""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, FiniteFloat, ValidationInfo, model_validator
+from pydantic_core import PydanticCustomError
+
+from islands.errors import ModelError, SettingsError
+from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
+from islands.systems.ode.equation_parser import MAX_CHARACTERS
+from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.system_document import MAX_PARAMETERS, MAX_STATES, describe_system, make_system
+
+_Name = Annotated[str, Field(min_length=1, max_length=100)]
+_Unit = Annotated[str, Field(max_length=50)]
+
+
+class OdeParameterSpec(SpecModel):
+    """Parameter of equations; see `OdeParameter`."""
+
+    value: FiniteFloat
+    unit: _Unit = ""
+    tolerance: FiniteFloat | None = None
+    lower: FiniteFloat | None = None
+    upper: FiniteFloat | None = None
+    fixed: bool = False
+
+
+class OdeStateSpec(SpecModel):
+    """State of equations; see `OdeState`."""
+
+    unit: _Unit = ""
+    initial: FiniteFloat | None = None
+    fixed: bool = False
+    lower: FiniteFloat | None = None
+    upper: FiniteFloat | None = None
+
+
+class OdeForceSpec(SpecModel):
+    """Coordinate of force laws; see `OdeForce`."""
+
+    coordinate: _Name
+    rate: _Name
+    unit: _Unit = ""
+    drive: Annotated[str, Field(max_length=500)] = ""
+
+
+def _allow_number(given: Any) -> Any:
+    return {"value": given} if isinstance(given, int | float) else given
+
+
+class OdeSpec(SimulatorSpec):
+    """Differential equations, given as text, with their parameters and states."""
+
+    kind: Literal["ode"]
+    name: _Name
+    summary: Annotated[str, Field(max_length=500)] = ""
+    input: _Name
+    channels: Annotated[tuple[_Name, ...], Field(max_length=15)] = ()
+    equations: Annotated[str, Field(max_length=MAX_CHARACTERS)]
+    output: Annotated[str, Field(min_length=1, max_length=2000)]
+    parameters: Annotated[
+        dict[_Name, Annotated[OdeParameterSpec, BeforeValidator(_allow_number)]],
+        Field(max_length=MAX_PARAMETERS),
+    ] = Field(default_factory=dict)
+    states: Annotated[dict[_Name, OdeStateSpec], Field(max_length=MAX_STATES)] = Field(default_factory=dict)
+    force: OdeForceSpec | None = None
+    input_unit: _Unit = ""
+    output_unit: _Unit = ""
+
+    @model_validator(mode="after")
+    def _check_equations(self, _info: ValidationInfo) -> "OdeSpec":
+        try:
+            self.make_system()
+        except ModelError as error:
+            raise PydanticCustomError("equations", "{why}", {"why": str(error)}) from error
+        return self
+
+    def make_system(self) -> OdeSystem:
+        """Return the system of the specification."""
+        return make_system(self.model_dump(exclude_defaults=True, exclude={"kind"}))
+
+    @classmethod
+    def from_system(cls, system: OdeSystem) -> "OdeSpec":
+        """Return the specification of a system."""
+        return cls.model_validate({"kind": "ode", **describe_system(system)})
+
+    @classmethod
+    def from_text(cls, kind: str, text: str) -> "OdeSpec":
+        """Parse the path of a TOML file."""
+        try:
+            document = tomllib.loads(Path(text).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise SettingsError(f"{text} cannot be read as TOML ({error}): write ode:FILE.toml") from error
+        document.setdefault("name", Path(text).stem)
+        return cls.model_validate({**document, "kind": kind})

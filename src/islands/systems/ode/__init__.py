@@ -1,0 +1,5 @@
+"""Systems of ordinary differential equations that users write as text.
+
+Read `ode_system` first. `equation_parser` reads equations, `ode_program` translates a system to instructions,
+and `ode_kernel` integrates them for eight sets of values at once. No system is compiled.
+"""

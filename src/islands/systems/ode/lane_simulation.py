@@ -1,0 +1,199 @@
+"""Simulation of a system for several sets of values at once, and the signals that it reads."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.kernels.simd import VECTOR, padded_size
+from islands.systems.mechanics import WIDTH, Elements
+from islands.systems.ode.equation_parser import TIME
+from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol
+from islands.systems.ode.ode_kernel import LaneForces, integrate
+from islands.systems.ode.ode_program import OdeProgram
+
+Signal = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SampledSignal:
+    """A signal at the start, in the middle and at the end of each step, each of shape (samples,).
+
+    The end of a step is the start of the next one, unless the signal jumps there.
+    """
+
+    start: Signal
+    middle: Signal
+    end: Signal
+
+    def differentiate(self, dt: float) -> "SampledSignal":
+        """Return the rate: the derivative of the parabola through the values of each step."""
+        first, second = self.middle - self.start, self.end - self.middle
+        return SampledSignal((3.0 * first - second) / dt, (first + second) / dt, (3.0 * second - first) / dt)
+
+    def delay(self, seconds: float, dt: float) -> "SampledSignal":
+        """Return the signal delayed by linear interpolation; before the first sample it is constant.
+
+        A held signal is averaged over the step, so that the result is continuous in the delay.
+        """
+        steps = np.arange(self.start.size, dtype=np.float64) - seconds / dt
+        if np.array_equal(self.start, self.middle) and np.array_equal(self.start, self.end):
+            held = np.interp(steps, np.arange(self.start.size), self.start)
+            return SampledSignal(held, held, held)
+        fine = np.append(np.column_stack([self.start, self.middle]).reshape(-1), self.end[-1])
+        places = 0.5 * np.arange(fine.size)
+        return SampledSignal(*(np.interp(steps + part, places, fine) for part in (0.0, 0.5, 1.0)))
+
+
+def interpolate_linearly(signal: Signal) -> SampledSignal:
+    """Return a signal that is linear between its samples, and constant after the last one."""
+    end = np.append(signal[1:], signal[-1])
+    return SampledSignal(signal, (signal + end) / 2, end)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaneInput:
+    """Values and signals of one simulation.
+
+    Attributes
+    ----------
+    parameters, initial_states : mapping
+        Values of the parameters and the states at the first sample by name.
+    signals : mapping
+        Input, channels and time by name. Lanes share a signal if it is the same object.
+    elements : Elements or None
+        Force laws with their values; None for none. Their signs are not used: forces resist.
+    limits : mapping
+        Lower and upper limits of states by name; other states have none.
+    """
+
+    parameters: Mapping[str, float]
+    initial_states: Mapping[str, float]
+    signals: Mapping[str, SampledSignal]
+    elements: Elements | None = None
+    limits: Mapping[str, tuple[float, float]] | None = None
+
+
+def simulate_lanes(program: OdeProgram, dt: float, lanes: Sequence[LaneInput]) -> NDArray[np.float64]:
+    """Simulate a system, eight lanes at a time.
+
+    Parameters
+    ----------
+    program : OdeProgram
+    dt : float
+        Step in seconds, one per sample.
+    lanes : sequence of LaneInput
+        All have the same force laws.
+
+    Returns
+    -------
+    ndarray, shape (lanes, outputs, samples)
+        NaN in all samples of a lane that diverges. A lane does not depend on the others.
+    """
+    return np.concatenate(
+        [
+            _simulate_eight(program, dt, lanes[first : first + VECTOR])
+            for first in range(0, len(lanes), VECTOR)
+        ]
+    )
+
+
+def _simulate_eight(program: OdeProgram, dt: float, lanes: Sequence[LaneInput]) -> NDArray[np.float64]:
+    instructions = program.instructions
+    full = [*lanes, *[lanes[0]] * (VECTOR - len(lanes))]
+    arena = padded_size(VECTOR * instructions.rows)
+    rows = arena.reshape(-1, VECTOR)
+    count = len(program.constants)
+    rows[:count] = program.constants[:, None]
+    states = instructions.states
+    for lane, each in enumerate(full):
+        rows[count : count + len(program.parameters), lane] = [
+            each.parameters[name] for name in program.parameters
+        ]
+        rows[states : states + len(program.states), lane] = [
+            each.initial_states[name] for name in program.states
+        ]
+        if each.elements is not None:
+            first = states + len(program.states)
+            rows[first : first + each.elements.forces.size, lane] = each.elements.initial_states
+    shared, own, order = _pack_signals(program.signals, dt, full)
+    samples = len(next(iter(lanes[0].signals.values())).start)
+    out = np.empty((samples, instructions.outputs.size, VECTOR))
+    instructions = instructions._replace(signals=instructions.signals[order])
+    lower, upper = _pack_limits(program.states, full)
+    integrate(instructions, arena, shared, own, dt, lower, upper, _pack_elements(full), out)
+    return np.ascontiguousarray(out.transpose(2, 1, 0)[: len(lanes)])
+
+
+def _pack_signals(
+    expressions: Sequence[OdeExpression], dt: float, lanes: Sequence[LaneInput]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Return the shared signals, those of each lane, and the order of both among all signals."""
+    samples = len(next(iter(lanes[0].signals.values())).start)
+    made: dict[tuple[object, ...], SampledSignal] = {}
+    shared, own, shared_places, own_places = [], [], [], []
+    for place, expression in enumerate(expressions):
+        found = [_make_signal(expression, dt, lane, made) for lane in lanes]
+        if all(each is found[0] for each in found):
+            shared.append(found[0])
+            shared_places.append(place)
+        else:
+            own.append(found)
+            own_places.append(place)
+    of_all, of_lanes = np.empty((samples, 3, len(shared))), np.empty((samples, 3, len(own), VECTOR))
+    for index, signal in enumerate(shared):
+        _copy_signal(signal, of_all[:, :, index])
+    for index, signals in enumerate(own):
+        for lane, signal in enumerate(signals):
+            _copy_signal(signal, of_lanes[:, :, index, lane])
+    return of_all, of_lanes, np.array([*shared_places, *own_places], dtype=np.int64)
+
+
+def _copy_signal(signal: SampledSignal, target: NDArray[np.float64]) -> None:
+    target[:, 0], target[:, 1], target[:, 2] = signal.start, signal.middle, signal.end
+
+
+def _make_signal(
+    expression: OdeExpression, dt: float, lane: LaneInput, made: dict[tuple[object, ...], SampledSignal]
+) -> SampledSignal:
+    match expression:
+        case Symbol(name):
+            return lane.signals[name]
+        case Operation("rate", (Symbol(name),)):
+            signal = lane.signals[name]
+            key: tuple[object, ...] = "rate", id(signal)
+            if key not in made:
+                made[key] = signal.differentiate(dt)
+        case Operation("delay", (Symbol(name), Symbol() | Number() as delay)):
+            signal = lane.signals[name]
+            seconds = delay.value if isinstance(delay, Number) else lane.parameters[delay.name]
+            key = "delay", id(signal), float(seconds)
+            if key not in made:
+                made[key] = signal.delay(max(float(seconds), 0.0), dt)
+        case _:
+            raise AssertionError(expression)
+    return made[key]
+
+
+def _pack_limits(states: Sequence[str], lanes: Sequence[LaneInput]) -> tuple[Signal, Signal]:
+    if not any(lane.limits for lane in lanes):
+        return np.empty(0), np.empty(0)
+    free = (-np.inf, np.inf)
+    bounds = np.array([[(lane.limits or {}).get(name, free) for lane in lanes] for name in states])
+    return np.ascontiguousarray(bounds[..., 0].reshape(-1)), np.ascontiguousarray(bounds[..., 1].reshape(-1))
+
+
+def _pack_elements(lanes: Sequence[LaneInput]) -> LaneForces:
+    first = lanes[0].elements
+    if first is None:
+        none = np.empty(0, dtype=np.int64)
+        return LaneForces(none, none, np.empty((0, VECTOR, WIDTH)))
+    numbers = np.stack([lane.elements.numbers for lane in lanes if lane.elements is not None], axis=1)
+    return LaneForces(first.forces, first.state_derivatives, np.ascontiguousarray(numbers))
+
+
+def make_time(start: float, samples: int, dt: float) -> dict[str, SampledSignal]:
+    """Return the time as a signal, under its name in equations."""
+    time = start + dt * np.arange(samples, dtype=np.float64)
+    return {TIME: SampledSignal(time, time + 0.5 * dt, time + dt)}

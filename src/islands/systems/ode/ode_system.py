@@ -1,0 +1,271 @@
+"""Systems of ordinary differential equations: states, parameters, equations, and the output."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from math import inf
+
+from islands.errors import ModelError
+from islands.systems.ode.equation_parser import FORCE, TIME, check_name, parse_expression
+from islands.systems.ode.ode_expression import (
+    SIGNAL_FUNCTIONS,
+    OdeExpression,
+    Operation,
+    Symbol,
+    find_symbols,
+    render,
+)
+
+#: Target of `OdeSystem.with_term` for a term that is added to the output.
+OUTPUT = "output"
+
+
+@dataclass(frozen=True, slots=True)
+class OdeParameter:
+    """A parameter of the equations.
+
+    Attributes
+    ----------
+    name : str
+    value : float
+        Nominal value.
+    unit : str
+    tolerance : float or None
+        Relative standard deviation of the true value about the nominal one; None if it is not known.
+    lower, upper : float or None
+        Bounds of a calibration; by default a twentieth and twenty times the value.
+    fixed : bool
+        Whether the value is exact, so that it is not calibrated.
+    """
+
+    name: str
+    value: float
+    unit: str = ""
+    tolerance: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    fixed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class OdeState:
+    """A state: the solution of an equation ``dx/dt = ...``.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+    initial : float or None
+        Value at the first sample, nominal if it is estimated. None for the measured output if that is the
+        state itself, otherwise zero.
+    fixed : bool
+        Whether the initial value is exact, so that it is not estimated.
+    lower, upper : float
+        Limits, such as the stops of a cylinder: the state does not leave them.
+    """
+
+    name: str
+    unit: str = ""
+    initial: float | None = None
+    fixed: bool = False
+    lower: float = -inf
+    upper: float = inf
+
+
+@dataclass(frozen=True, slots=True)
+class OdeForce:
+    """Coordinate that force laws act on; the equations contain their sum as ``force``.
+
+    Attributes
+    ----------
+    coordinate, rate : str
+        Names of the states or variables that are the coordinate and its rate.
+    unit : str
+        Unit of a force; by default that of the input.
+    drive : expression
+        Signal whose peak is a typical force, by default the input.
+    """
+
+    coordinate: str
+    rate: str
+    unit: str
+    drive: OdeExpression
+
+
+@dataclass(frozen=True, slots=True)
+class OdeSystem:
+    """States x with ``dx/dt = f(x, u, parameters, t)`` and one output, as expressions.
+
+    A system is immutable and is not compiled, so that an extended system is as cheap as the original one.
+
+    Attributes
+    ----------
+    name, summary : str
+    input : str
+        Name of the signal that drives the system.
+    channels : tuple of str
+        Names of further measured signals that the equations read.
+    derivatives : tuple of (str, expression)
+        Derivative of every state, in the order of the states.
+    variables : tuple of (str, expression)
+        Intermediate variables, in any order.
+    output : expression
+    parameters : tuple of OdeParameter
+    states : tuple of OdeState
+    force : OdeForce or None
+        Where force laws act; None if they cannot.
+    input_unit, output_unit : str
+        Units that the equations assume; empty if those of the record are taken.
+    """
+
+    name: str
+    input: str
+    derivatives: tuple[tuple[str, OdeExpression], ...]
+    variables: tuple[tuple[str, OdeExpression], ...]
+    output: OdeExpression
+    parameters: tuple[OdeParameter, ...]
+    states: tuple[OdeState, ...]
+    summary: str = ""
+    channels: tuple[str, ...] = ()
+    force: OdeForce | None = None
+    input_unit: str = ""
+    output_unit: str = ""
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the input and of the channels."""
+        return (self.input, *self.channels)
+
+    def with_term(
+        self, target: str, term: str | OdeExpression, parameters: Sequence[OdeParameter] = ()
+    ) -> "OdeSystem":
+        """Return the system with one more term in one equation.
+
+        Parameters
+        ----------
+        target : str
+            A state, to whose derivative the term is added, a variable, or ``output``.
+        term : str or expression
+        parameters : sequence of OdeParameter
+            New parameters in the term.
+
+        Raises
+        ------
+        ModelError
+            There is no such equation, the term has an unknown name, or a new parameter has the name of
+            something else.
+        """
+        place = repr(term) if isinstance(term, str) else repr(render(term))
+        added = parse_expression(term, place) if isinstance(term, str) else term
+        known = self.find_names()
+        for parameter in parameters:
+            check_name(parameter.name, place)
+            if parameter.name in known:
+                raise ModelError(f"{place}: {parameter.name!r} has a meaning already: take another name")
+        extended = replace(self, parameters=(*self.parameters, *parameters))
+        check_symbols(added, extended, place)
+
+        def add(equations: Iterable[tuple[str, OdeExpression]]) -> tuple[tuple[str, OdeExpression], ...]:
+            return tuple(
+                (name, Operation("add", (right, added)) if name == target else right)
+                for name, right in equations
+            )
+
+        if target == OUTPUT:
+            return replace(extended, output=Operation("add", (self.output, added)))
+        if target not in {name for name, _ in (*self.derivatives, *self.variables)}:
+            raise ModelError(f"there is no equation of {target!r}: {_suggest(target, known)}")
+        extended = replace(extended, derivatives=add(self.derivatives), variables=add(self.variables))
+        sort_variables(extended)
+        return extended
+
+    def with_values(self, values: Mapping[str, float]) -> "OdeSystem":
+        """Return the system with other nominal values of parameters; other names are ignored."""
+        return replace(
+            self,
+            parameters=tuple(
+                replace(each, value=float(values.get(each.name, each.value))) for each in self.parameters
+            ),
+        )
+
+    def find_names(self) -> dict[str, str]:
+        """Return the meaning of each name in expressions."""
+        return {
+            TIME: "the time",
+            **({FORCE: "the sum of the forces"} if self.force else {}),
+            self.input: "the input",
+            **dict.fromkeys(self.channels, "a channel"),
+            **dict.fromkeys((name for name, _ in self.derivatives), "a state"),
+            **dict.fromkeys((name for name, _ in self.variables), "a variable"),
+            **{each.name: "a parameter" for each in self.parameters},
+        }
+
+
+def sort_variables(system: OdeSystem) -> tuple[str, ...]:
+    """Return the names of the variables in an order in which each one follows those that it depends on.
+
+    Raises
+    ------
+    ModelError
+        Variables depend on each other in a cycle.
+    """
+    right_sides = dict(system.variables)
+    if system.force is not None:
+        # The forces are computed from the coordinate and its rate.
+        right_sides[FORCE] = Operation("add", (Symbol(system.force.coordinate), Symbol(system.force.rate)))
+    ordered: dict[str, None] = {}
+    open_names: list[str] = []
+
+    def visit(name: str) -> None:
+        if name in ordered or name not in right_sides:
+            return
+        if name in open_names:
+            cycle = " -> ".join([*open_names[open_names.index(name) :], name])
+            raise ModelError(
+                f"the variables depend on each other: {cycle}. Solve for one of them, or make it a state"
+            )
+        open_names.append(name)
+        for each in find_symbols(right_sides[name]):
+            visit(each)
+        open_names.pop()
+        ordered[name] = None
+
+    for name in right_sides:
+        visit(name)
+    return tuple(name for name in ordered if name != FORCE)
+
+
+def check_symbols(expression: OdeExpression, system: OdeSystem, place: str) -> None:
+    """Raise `ModelError` if an expression has an unknown name, or a rate or delay of what is not measured."""
+    known = system.find_names()
+    for name in find_symbols(expression):
+        if name == FORCE and system.force is None:
+            raise ModelError(f"{place}: force needs a table [force] with a coordinate and its rate")
+        if name not in known:
+            raise ModelError(f"{place}: unknown name {name!r}: {_suggest(name, known)}")
+    _check_signals(expression, system, place)
+
+
+def _check_signals(expression: OdeExpression, system: OdeSystem, place: str) -> None:
+    match expression:
+        case Operation(function, (Symbol(name), *others)) if function in SIGNAL_FUNCTIONS:
+            if name not in system.signals:
+                raise ModelError(
+                    f"{place}: {function}({name}) is not possible, since {name} is not measured: take the "
+                    f"input or a channel ({', '.join(system.signals)})"
+                )
+            for other in others:
+                if isinstance(other, Symbol) and system.find_names()[other.name] != "a parameter":
+                    raise ModelError(f"{place}: the delay {other.name} has to be a parameter or a number")
+        case Operation(_, arguments):
+            for argument in arguments:
+                _check_signals(argument, system, place)
+
+
+def _suggest(name: str, known: Mapping[str, str]) -> str:
+    close = get_close_matches(name, known, n=1, cutoff=0.5)
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    return (
+        f"{hint}Known are {', '.join(known)}; define others by an equation, in [parameters], or as the input "
+        "or a channel"
+    )
