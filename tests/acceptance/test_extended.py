@@ -16,7 +16,7 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.io.records import write_record
 from islands.io.simulator_spec.document import extended_json
 from support.command_line import fail, succeed
-from support.simulated_records import made
+from support.simulated_records import EQUATIONS, made
 
 #: Cubic stiffness in V / um^3.
 STRENGTH = 3e-5
@@ -81,7 +81,7 @@ def test_exported_program_reproduces_the_record(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "options", "message"),
     [
-        ({}, ("--mode", "one-step"), "an extended simulation supports free runs only"),
+        ({}, ("--mode", "one-step"), "a simulation supports free runs only"),
         ({"times": 0}, (), "times"),
         ({"core": {"kind": "pendulum"}}, (), "pendulum"),
         ({"effects": [{"name": "wormhole", "parameters": {}}]}, (), "has no effect 'wormhole'"),
@@ -100,3 +100,14 @@ def test_invalid_extended_simulation_is_rejected_in_one_line(
 def test_unsupported_format_is_rejected(folder: Path) -> None:
     message = fail("show", folder / "extended.json", "--format", "c")
     assert "bouc-wen-piezo has no closed form as a difference equation: take the format plain" in message
+
+
+def test_equations_are_simulated_without_a_diagnosis(tmp_path: Path) -> None:
+    case = made()["ode"]
+    write_record(case.record, tmp_path / "record.csv")
+    path = f"ode:{EQUATIONS / 'second-order.toml'}"
+    printed = succeed("simulate", path, tmp_path / "record.csv", "--input", "u_N", "--output", "y_m")
+    assert "free-run: with second-order" in printed
+    assert "R2 1.00000" in printed
+    assert "has no column F" in fail("simulate", path, tmp_path / "record.csv")
+    assert "free runs only" in fail("simulate", path, tmp_path / "record.csv", "--mode", "one-step")

@@ -25,6 +25,15 @@ def submit_diagnosis(service, order, simulation):
     return service.client.post("/v1/discrepancies", json={**order, "simulation": simulation})
 
 
+ODE = {
+    "kind": "ode",
+    "name": "lag",
+    "input": "u",
+    "equations": "dx/dt = (u - x)/tau",
+    "output": "x",
+    "parameters": {"tau": {"value": 0.1, "unit": "s", "tolerance": 0.1}},
+}
+
 ACCEPTED = {
     "extended": extended(),
     "extended twice": extended(extended()),
@@ -44,6 +53,8 @@ ACCEPTED = {
     "second-order": {"kind": "second-order", "parameters": {"m": 2.0}},
     "rigid-axis": {"kind": "rigid-axis"},
     "cascaded-tanks": {"kind": "cascaded-tanks"},
+    "equations": ODE,
+    "extended equations": extended(ODE),
 }
 
 
@@ -63,6 +74,10 @@ REFUSED = {
     "a delay below zero": ({"kind": "linear", "order": 1, "delay": -1}, "/simulation/linear/delay: "),
     "too few coefficients": ({"kind": "linear", "order": 2, "numerator": [1.0]}, "order 2 takes 3 and 2"),
     "too many steps": (extended(times=1000), "/simulation/extended/times: "),
+    "an unknown name": ({**ODE, "output": "z"}, "output, 'z': unknown name 'z'"),
+    "no number": ({**ODE, "parameters": {"tau": "1 s"}}, "/simulation/ode/parameters/tau: "),
+    "code in equations": ({**ODE, "equations": "dx/dt = open('f').read()"}, "cannot read"),
+    "too many equations": ({**ODE, "equations": "# \n" * 9000}, "/simulation/ode/equations: "),
     "another version": (extended(schema="islands.extended/2"), "/simulation/extended/schema: "),
     "no scales": (extended(scales={}), "/simulation/extended/scales/"),
 }

@@ -8,6 +8,7 @@ import typer
 from islands.errors import SettingsError
 from islands.io.models import read_model
 from islands.io.result_models import find_model_file
+from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import (
     SIMULATORS,
     LocalExtendedSpec,
@@ -50,7 +51,7 @@ Rows = Annotated[
 ModelFile = Annotated[
     str,
     typer.Argument(
-        help="A model file, a result folder, an extended.json, or published:12, published:13, published:14."
+        help="A model file, a result folder, an extended.json, ode:FILE.toml, or published:12, :13, :14."
     ),
 ]
 Channels = Annotated[
@@ -114,6 +115,12 @@ def extended(text: str) -> LocalExtendedSpec | None:
     found = parse_spec(f"model:{text}")
     assert isinstance(found, LocalExtendedSpec)
     return found
+
+
+def written_simulation(text: str) -> OdeSpec | None:
+    """Read a simulation that is given as equations, ``ode:FILE.toml``; return None for anything else."""
+    found = parse_spec(text) if text.startswith("ode:") else None
+    return found if isinstance(found, OdeSpec) else None
 
 
 def model(text: str) -> Model:

@@ -27,6 +27,7 @@ from islands.io.result_models import (
     read_preprocessing,
 )
 from islands.io.simulator_spec.factory import simulate_spec
+from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
@@ -93,7 +94,7 @@ def simulate(
     if len(outputs) > 1:
         raise SettingsError(f"the model has one output, got {', '.join(outputs)}: give one --output")
     output_column = outputs[0] if outputs else None
-    extended = options.extended(model)
+    extended = options.written_simulation(model) or options.extended(model)
     if bands is not None and (mode != "free-run" or extended is not None):
         raise SettingsError("--bands are for free runs of models of a result folder")
     if extended is not None:
@@ -147,7 +148,7 @@ def _describe_steps(done: Preprocessing) -> str:
 
 
 def _simulate_extended(
-    spec: LocalExtendedSpec,
+    spec: LocalExtendedSpec | OdeSpec,
     record: Path,
     mode: str,
     out: Path | None,
@@ -157,18 +158,25 @@ def _simulate_extended(
     rows: str | None,
     reading: ReadingOptions,
 ) -> None:
-    """Simulate the extended simulation of a diagnosis, starting at the record's first samples."""
+    """Simulate equations or the result of a diagnosis, with initial states that are fitted to the record."""
     if mode != "free-run":
-        raise SettingsError(f"an extended simulation supports free runs only: --mode {mode} is for models")
+        raise SettingsError(f"a simulation supports free runs only: --mode {mode} is for models")
+    if isinstance(spec, OdeSpec):
+        expected, expected_output, effects = (spec.input, *spec.channels), spec.output, [spec.name]
+    else:
+        expected, expected_output = spec.inputs, spec.output
+        effects = [effect.name for effect in spec.effects]
     inner = innermost(spec)
     recorded = (inner.column,) if isinstance(inner, ColumnSpec) else ()
-    driving = options.columns(inputs or list(spec.inputs))
+    driving = options.columns(inputs or list(expected))
     names = [*driving, *recorded]
-    whole = read_dataset(record, names, output_column or spec.output, dt, parse_rows(rows), options=reading)
+    whole = read_dataset(
+        record, names, output_column or expected_output, dt, parse_rows(rows), options=reading
+    )
     data = whole.first_inputs(len(driving))
     compile_kernels()
     y = simulate_spec(spec, data, dict.fromkeys(recorded, whole.u[:, -1]))
-    _print_metrics(data, y, f"{mode}: with {', '.join(effect.name for effect in spec.effects)}", out)
+    _print_metrics(data, y, f"{mode}: with {', '.join(effects)}", out)
 
 
 def _print_metrics(

@@ -5,14 +5,19 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from islands.discrepancy.effects import get_summary
+from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import LocalExtendedSpec
 
 
 def as_text(spec: LocalExtendedSpec) -> str:
     """Describe the simulator, and every effect with its equation and its values."""
-    simulator = spec.core.model_dump(mode="json", exclude_defaults=True)
-    kind = simulator.pop("kind", "extended")
-    lines = [f"{spec.output} from {', '.join(spec.inputs)}: {kind} {json.dumps(simulator)}"]
+    lines = [f"{spec.output} from {', '.join(spec.inputs)}: "]
+    if isinstance(spec.core, OdeSpec):
+        lines[0] += spec.core.name
+        lines += [f"    {line}" for line in _describe_equations(spec.core)]
+    else:
+        simulator = spec.core.model_dump(mode="json", exclude_defaults=True)
+        lines[0] += f"{simulator.pop('kind', 'extended')} {json.dumps(simulator)}"
     if spec.times > 1 or spec.hold != "first-order":
         lines.append(f"solved with {spec.times} steps per sample; input between samples: {spec.hold}")
     for effect in spec.effects:
@@ -22,6 +27,15 @@ def as_text(spec: LocalExtendedSpec) -> str:
         lines.append(f"{effect.name} ({effect.site}): {get_summary(effect.name)}")
         lines.append(f"    {values}")
     return "\n".join(lines) + "\n"
+
+
+def _describe_equations(spec: OdeSpec) -> list[str]:
+    """Return the equations, the output and the values of the parameters, one per line."""
+    return [
+        *spec.equations.splitlines(),
+        f"output = {spec.output}",
+        *(f"{name} = {each.value:.6g} {each.unit}".rstrip() for name, each in spec.parameters.items()),
+    ]
 
 
 def as_json(spec: LocalExtendedSpec) -> str:
