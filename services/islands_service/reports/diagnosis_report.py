@@ -5,7 +5,8 @@ import io
 from typing import Any
 
 from islands.discrepancy.detectability import NOTHING, SelfTest
-from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
+from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Finding, Verdict
 from islands.discrepancy.surrogates import STRENGTHS
 from islands.figures.discrepancy import DISCREPANCY_FIGURES
@@ -18,6 +19,7 @@ _VERDICTS = {
     Verdict.NAMED: "The simulation lacks known effects, which explain the discrepancy.",
     Verdict.REMAINDER: "The simulation lacks known effects, which explain most of the discrepancy.",
     Verdict.UNKNOWN: "The simulation is wrong, and no known effect explains the discrepancy.",
+    Verdict.GROSS_ERROR: "Record and simulation do not match as they are: correct the record first.",
 }
 
 #: Captions of the figures, in the order of the report.
@@ -88,7 +90,8 @@ def _finding(finding: Finding) -> str:
         else f", {100 * finding.explained_fraction:.0f} % of the misfit"
     )
     confounded = f"; confounded with {', '.join(finding.equivalents)}" if finding.equivalents else ""
-    return f"{finding.name}: {values}; confidence {finding.confidence:.2f}{share}{confounded}"
+    values = f": {values}" if values else ""
+    return f"{finding.name}{values}; confidence {finding.confidence:.2f}{share}{confounded}"
 
 
 def summarise_self_test(tested: SelfTest) -> str:
@@ -147,7 +150,11 @@ def diagnosis_report(
     proposal : ResidualFormula, optional
         Formula for the unexplained residual.
     """
-    figures = [(_CAPTIONS[each], _inline(draw(found))) for each, draw in DISCREPANCY_FIGURES.items()]
+    figures = [
+        (_CAPTIONS[each], _inline(draw(found)))
+        for each, draw in DISCREPANCY_FIGURES.items()
+        if found.candidates or each != "ladder"
+    ]
     text = TEMPLATES.get_template("diagnosis.html").render(
         name=name,
         found=found,

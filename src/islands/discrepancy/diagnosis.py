@@ -21,13 +21,15 @@ from islands.discrepancy.calibration.preparation import (
     validate_prior,
 )
 from islands.discrepancy.effects import EFFECTS
+from islands.discrepancy.findings import describe_gross_errors, describe_noise, list_record_findings
 from islands.discrepancy.gross_errors.channel_admission import admit_channels
+from islands.discrepancy.gross_errors.closed_loop import find_closed_loop
+from islands.discrepancy.gross_errors.gross_error import GrossError
+from islands.discrepancy.gross_errors.gross_error_search import explain_divergence, find_gross_errors
 from islands.discrepancy.gross_errors.record_finding import RecordFinding
 from islands.discrepancy.inference.experiment_design import suggest_experiment
 from islands.discrepancy.inference.holdout import HoldoutGain, measure_gain
-from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
-from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.inference.strategies import (
     SearchOutcome,
     assess_evidence,
@@ -36,17 +38,16 @@ from islands.discrepancy.inference.strategies import (
     search_with_model_error,
 )
 from islands.discrepancy.inference.verdict import (
-    CONFIDENCE_TEMPERATURE,
     Finding,
-    Value,
     Verdict,
     describe_effects,
     explained_fraction,
 )
-from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext
+from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.errors import RecordError
 from islands.evolution.progress import ProgressCallback, ignore_progress
 
 #: Maximum number of searches, one after each change of the intersample behaviour or the step size.
@@ -170,13 +171,20 @@ def diagnose(
     prior_std = validate_prior({**get_tolerances(simulator), **(tolerance or {})}, simulator)
     fitted = count_fitted_samples(record)
     record, record_findings = admit_channels(record, fitted)
-    context = make_context(record, simulator, fitted)
+    try:
+        context = make_context(record, simulator, fitted)
+    except RecordError as error:
+        raise explain_divergence(error, record, simulator, fitted, prior_std) from error
     rng = np.random.default_rng(seed)
     simulation = ExtendedSimulator(simulator, (), context)
     estimation_part = np.arange(record.samples) < fitted
     target = Target(record.y, estimation_part, None, prior_std, segments=record.segments)
     progress("calibrating the simulation", 0.0)
     base = calibrate(simulation, target, simulation.nominal)
+    progress("looking for gross errors of the record", 0.01)
+    if gross_errors := find_gross_errors(record, simulator, base, fitted, prior_std):
+        found = _make_gross_diagnosis(record, base, gross_errors, fitted)
+        return replace(found, record_findings=(*found.record_findings, *record_findings))
     simulator = select_intersample(base, target)
     effects = select_effects(simulator, context, prior_std, catalogue)
     for _ in range(MAX_ROUNDS):
@@ -203,7 +211,31 @@ def diagnose(
         second = assess_evidence(model_error, fitted, rng)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome
     found = _make_diagnosis(record, outcome, base, effects, fitted, rng, progress, parallel_map)
-    return replace(found, record_findings=record_findings)
+    closed_loop = find_closed_loop(found.best, record.y, fitted, record.input_names[0])
+    return replace(found, record_findings=(*record_findings, *closed_loop))
+
+
+def _make_gross_diagnosis(
+    record: Dataset, base: CalibrationResult, errors: Sequence[GrossError], fitted: int
+) -> Diagnosis:
+    """Describe gross errors. No effects are searched for; the best fit is that of the corrected record."""
+    best = errors[0]
+    return Diagnosis(
+        verdict=Verdict.GROSS_ERROR,
+        effects=describe_gross_errors(errors),
+        candidates=(),
+        gain=None,
+        residual_structure={},
+        suggested_experiment="",
+        record=record,
+        estimation_samples=fitted,
+        base=base,
+        best=best.fit_of_record or base,
+        noise_floor=best.rmse,
+        is_noise_floor_measured=False,
+        nominal_rmse=float(np.sqrt(np.mean((record.y - base.output)[fitted:] ** 2))),
+        record_findings=list_record_findings(errors),
+    )
 
 
 def _make_diagnosis(
@@ -240,7 +272,7 @@ def _make_diagnosis(
         )
     residual = (record.y - hypothesis.fit.output)[:fitted]
     context = hypothesis.fit.simulation.context
-    noise = _detect_noise(record.y[:fitted], residual, context) if verdict != Verdict.UNKNOWN else ()
+    noise = describe_noise(record.y[:fitted], residual, context) if verdict != Verdict.UNKNOWN else ()
     as_given = evaluate_fit(base.simulation, target, base.simulation.nominal)
     nominal = fit_initial_states(as_given, target, 0).output
     return Diagnosis(
@@ -265,35 +297,3 @@ def _make_diagnosis(
         outcome.is_noise_floor_measured,
         float(np.sqrt(np.mean((record.y - nominal)[holdout] ** 2))),
     )
-
-
-def _detect_noise(y: Signal, residual: Signal, context: SimulationContext) -> tuple[Finding, ...]:
-    """Run the noise detectors in order; skip those that an earlier finding excludes."""
-    findings: list[Finding] = []
-    for detector in DETECTORS.values():
-        if any(each.name in detector.excluded_by for each in findings):
-            continue
-        detection = detector.detect(y, residual, context)
-        if detection is not None and detection.score_gain > MIN_GAIN:
-            score = detection.score_gain
-            values = {name: Value(value, unit, None) for name, (value, unit) in detection.parameters.items()}
-            confidence = 1.0 / (1.0 + float(np.exp(-score / (2 * CONFIDENCE_TEMPERATURE))))
-            findings.append(Finding(detector.name, detector.family, confidence, (), values, score, None))
-    return tuple(findings)
-
-
-@dataclass(frozen=True, slots=True)
-class ResidualFormula:
-    """A formula for the residual of the best simulation.
-
-    Attributes
-    ----------
-    formula : str
-        Formula of the residual, measured minus simulated output, in free run. Its regressors are past values
-        of the residual, the input and the simulated output.
-    explains : float
-        Fraction of the residual's mean square that the formula predicts over the hold-out part.
-    """
-
-    formula: str
-    explains: float

@@ -11,6 +11,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
 from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.segments import map_segments
 from islands.figures.diverging_lines import break_line
@@ -144,8 +145,7 @@ def draw_screening(diagnosis: Diagnosis) -> Figure:
     named = {finding.name for finding in diagnosis.effects}
     figure = blank(0.9 + 0.26 * len(shown), "Screened effects, each added alone to the calibrated simulation")
     axes = figure.subplots()
-    places = np.arange(len(shown))
-    gains = [candidate.score for candidate in shown]
+    places, gains = np.arange(len(shown)), [candidate.score for candidate in shown]
     colours = [SIMULATED if candidate.name in named else FRAME for candidate in shown]
     axes.barh(places, gains, color=colours, height=0.7)
     axes.set_yticks(places, [candidate.name for candidate in shown])
@@ -172,10 +172,10 @@ def _input_label(diagnosis: Diagnosis) -> str:
 
 def _outputs(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:
     """Return name, colour and values of each simulated output."""
-    before = [("simulated", BEFORE, diagnosis.base.output)]
-    if diagnosis.best is diagnosis.base:
-        return before
-    return [*before, ("extended", SIMULATED, diagnosis.best.output)]
+    name = "corrected" if diagnosis.verdict == Verdict.GROSS_ERROR else "extended"
+    after = (name, SIMULATED, diagnosis.best.output)
+    before = ("simulated", BEFORE, diagnosis.base.output)
+    return [before] if diagnosis.best is diagnosis.base else [before, after]
 
 
 def _residuals(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:

@@ -5,7 +5,8 @@ from dataclasses import asdict
 from typing import Any
 
 from islands.discrepancy.detectability import SelfTest
-from islands.discrepancy.diagnosis import Candidate, Diagnosis, ResidualFormula
+from islands.discrepancy.diagnosis import Candidate, Diagnosis
+from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Finding
 from islands.io.result_folder import record_document
 

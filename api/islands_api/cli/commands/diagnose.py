@@ -10,8 +10,10 @@ import typer
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.detectability import SelfTest, self_test
-from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
+from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.diagnosis import diagnose as run_diagnosis
+from islands.discrepancy.findings import ResidualFormula
+from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.facade.explain_residual import explain_residual
@@ -78,7 +80,9 @@ def diagnose(
             formula = explain_residual(diagnosis, seed)
             wall = perf_counter() - began
             limits = (
-                _run_self_test(diagnosis, simulator, tolerances, seed, parallel, show) if tested else None
+                _run_self_test(diagnosis, simulator, tolerances, seed, parallel, show)
+                if tested and diagnosis.verdict != Verdict.GROSS_ERROR
+                else None
             )
         show("figures", 0.9)
         write(diagnosis, out, ", ".join(path.name for path in records), wall, limits, formula)

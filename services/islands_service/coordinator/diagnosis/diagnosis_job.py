@@ -5,7 +5,8 @@ from time import sleep
 
 import structlog
 
-from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula, diagnose
+from islands.discrepancy.diagnosis import Diagnosis, diagnose
+from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.evolution.engine import Engine
 from islands.facade.explain_residual import explain_residual

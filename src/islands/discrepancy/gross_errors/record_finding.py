@@ -25,12 +25,16 @@ class RecordFinding:
         What to do, as a sentence.
     parameters : mapping
         Values by name, each with its unit; the unit of a fraction or a factor is empty.
+    errors : tuple of float or None
+        RMS errors of the calibrated simulation over the estimation part, as given and with the correction,
+        relative to the standard deviation of the output; None if the finding explains no misfit.
     """
 
     name: str
     description: str
     advice: str
     parameters: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    errors: tuple[float, float] | None = None
 
     @property
     def text(self) -> str:
@@ -46,4 +50,5 @@ class RecordFinding:
             "parameters": {
                 name: {"value": value, "unit": unit} for name, (value, unit) in self.parameters.items()
             },
+            "errors": None if self.errors is None else {"before": self.errors[0], "after": self.errors[1]},
         }

@@ -50,6 +50,7 @@ class Verdict(StrEnum):
     NAMED = "named"
     REMAINDER = "named with remainder"
     UNKNOWN = "unknown"
+    GROSS_ERROR = "gross error"
 
 
 @dataclass(frozen=True, slots=True)

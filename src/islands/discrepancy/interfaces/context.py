@@ -182,6 +182,9 @@ class Parameter:
         Bounds.
     initial : bool
         Whether the parameter is an initial state, which belongs to the record and not to the simulator.
+    is_positive : bool
+        Whether only positive values are physically possible, as of a mass. A calibrated value may be negative
+        if the record requires it.
     """
 
     name: str
@@ -191,6 +194,7 @@ class Parameter:
     lower: float = -inf
     upper: float = inf
     initial: bool = False
+    is_positive: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", simplify_unit(self.unit))

@@ -60,6 +60,7 @@ class SecondOrderSimulator:
                 abs(0.03 * system.damping) + abs(1e-4 * critical),
                 min(0.0, 10.0 * critical),
                 max(0.0, 10.0 * critical),
+                is_positive=True,
             ),
             _make_parameter("k", f"{force}/{length}", system.stiffness, 0.01),
             Parameter("initial position", length, system.position, 0.02 * self.size, initial=True),
@@ -113,4 +114,5 @@ def make_second_order(
 
 def _make_parameter(name: str, unit: str, nominal: float, relative_scale: float) -> Parameter:
     ends = (0.05 * nominal, 20.0 * nominal)
-    return Parameter(name, unit, nominal, relative_scale * abs(nominal), min(ends), max(ends))
+    scale = relative_scale * abs(nominal)
+    return Parameter(name, unit, nominal, scale, min(ends), max(ends), is_positive=True)

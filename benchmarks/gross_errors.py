@@ -1,0 +1,210 @@
+"""Gross errors in simulated records: how often each is found, and false findings on other records.
+
+    python benchmarks/gross_errors.py SYSTEM ... [--first SEED] [--count N]
+    python benchmarks/gross_errors.py SYSTEM ... --others [--pole POLE] [--band LOW HIGH]
+
+SYSTEM is piezo, second-order, tanks or linear (identified on the same record without the error). Parameters
+of the simulation are given, with the tolerances of the trials. With ``--others`` the records have no gross
+error, but all faults of the trials with a misfit of LOW to HIGH standard deviations of the noise, whose pole
+is POLE.
+"""
+
+import argparse
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(library, "1")
+
+import numpy as np  # noqa: E402 - after the environment is set
+
+from islands.data.dataset import Dataset  # noqa: E402
+from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate  # noqa: E402
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context  # noqa: E402
+from islands.discrepancy.detectability import estimate_rate  # noqa: E402
+from islands.discrepancy.gross_errors.channel_admission import admit_channels  # noqa: E402
+from islands.discrepancy.gross_errors.closed_loop import find_closed_loop  # noqa: E402
+from islands.discrepancy.gross_errors.gross_error import GrossError  # noqa: E402
+from islands.discrepancy.gross_errors.gross_error_search import find_gross_errors  # noqa: E402
+from islands.discrepancy.interfaces.simulator import Simulator  # noqa: E402
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator  # noqa: E402
+from islands.discrepancy.simulators.extended import ExtendedSimulator  # noqa: E402
+from islands.discrepancy.simulators.linear import estimate_linear  # noqa: E402
+from islands.io.simulator_spec.factory import make_simulator  # noqa: E402
+from islands.io.simulator_spec.specification import PhysicalSpec  # noqa: E402
+from islands.performance.trials.cases import CASES, SimulatedCase  # noqa: E402
+from islands.performance.trials.injection.measurement import inject  # noqa: E402
+
+#: Place of the neighbour among the inputs of a record.
+NEIGHBOUR = 2
+
+#: Entry of the table of trial cases for each system.
+SYSTEMS = {
+    "piezo": CASES["bouc-wen-piezo"],
+    "second-order": CASES["second-order"],
+    "tanks": CASES["cascaded-tanks"],
+    "linear": CASES["second-order"],
+}
+
+
+def scale_input(record: Dataset, factor: float) -> Dataset:
+    """Return the record with its first input multiplied."""
+    return replace(record, u=np.column_stack([factor * record.u[:, 0], record.u[:, 1:]]))
+
+
+def exchange(record: Dataset, place: int) -> Dataset:
+    """Return the record with an input exchanged for the output."""
+    u = record.u.copy()
+    u[:, place] = record.y
+    return replace(record, u=u, y=record.u[:, place])
+
+
+def exchange_inputs(record: Dataset) -> Dataset:
+    """Return the record with the input and the neighbour exchanged."""
+    return replace(record, u=record.u[:, [NEIGHBOUR, 1, 0]])
+
+
+def move(record: Dataset, samples: int) -> Dataset:
+    """Return the record with an output that is recorded later."""
+    moved = replace(record, y=np.roll(record.y, samples))
+    return moved[max(samples, 0) : record.samples + min(samples, 0)]
+
+
+def time_error(factor: float) -> Callable[[Dataset], Dataset]:
+    """Return the function that multiplies the sampling time."""
+    return lambda record: replace(record, dt=factor * record.dt)
+
+
+def output_error(factor: float) -> Callable[[Dataset], Dataset]:
+    """Return the function that multiplies the output."""
+    return lambda record: replace(record, y=factor * record.y)
+
+
+#: Injected error, its name and value, and the systems in which it is not identifiable.
+ERRORS: Mapping[str, tuple[Callable[[Dataset], Dataset], str, float | None, tuple[str, ...]]] = {
+    "dt / 1000": (time_error(1e-3), "sampling-time", 1e-3, ("piezo", "linear")),
+    "dt * 2": (time_error(2.0), "sampling-time", 2.0, ("piezo", "linear")),
+    "dt / 10": (time_error(0.1), "sampling-time", 0.1, ("piezo", "linear")),
+    "y * 1000": (output_error(1e3), "output-unit", 1e3, ()),
+    "y / 9.81": (output_error(1 / 9.80665), "output-unit", 1 / 9.80665, ()),
+    "y * 2 pi": (output_error(2 * np.pi), "output-unit", 2 * np.pi, ()),
+    "y * pi / 180": (output_error(np.pi / 180), "output-unit", np.pi / 180, ()),
+    "u * 1000": (lambda record: scale_input(record, 1e3), "input-unit", 1e3, ()),
+    "u * 9.81": (lambda record: scale_input(record, 9.80665), "input-unit", 9.80665, ()),
+    "u / 2 pi": (lambda record: scale_input(record, 0.5 / np.pi), "input-unit", 0.5 / np.pi, ()),
+    "- y": (output_error(-1.0), "sign", None, ()),
+    "- u": (lambda record: scale_input(record, -1.0), "sign", None, ()),
+    "u and w exchanged": (exchange_inputs, "swapped-channels", None, ()),
+    "y and w exchanged": (lambda record: exchange(record, NEIGHBOUR), "swapped-channels", None, ()),
+    "u and y exchanged": (lambda record: exchange(record, 0), "swapped-channels", None, ()),
+    "y 10 samples early": (lambda record: move(record, -10), "time-offset", -10.0, ()),
+    "y 60 samples early": (lambda record: move(record, -60), "time-offset", -60.0, ()),
+    "y 100 samples late": (lambda record: move(record, 100), "time-offset", 100.0, ()),
+}
+
+
+def make_given_simulator(name: str, record: Dataset, clean: Dataset) -> tuple[Simulator, Mapping[str, float]]:
+    """Return the simulator of a system with given parameters, and their tolerances."""
+    if name == "piezo":
+        return BoucWenPiezoSimulator(), SYSTEMS[name].tolerance
+    if name == "linear":
+        linear = estimate_linear(2, 0, clean[: clean.samples // 2])
+        known = [each.name for each in linear.parameters if each.name[0] in "ab" and each.nominal]
+        return linear, dict.fromkeys(known, 0.01)
+    kind, given = (
+        ("second-order", {"m": 8e-4, "c": 8e-3, "k": 2.0})
+        if name == "second-order"
+        else ("cascaded-tanks", {"k1": 0.05, "k2": 0.05, "k3": 0.04})
+    )
+    tolerance = {each: 0.06 if each == "c" else 0.02 for each in given}
+    return make_simulator(PhysicalSpec(kind=kind, parameters=given), record), tolerance
+
+
+def draw(case: SimulatedCase, names: tuple[str, ...], seed: int, pole: float, band: object) -> Dataset:
+    """Draw a record of a trial."""
+    rng = np.random.default_rng([seed, *map(ord, "".join(names))])
+    return inject(names, rng, None, pole, band if names else None, False, case.system, True, case.free).record
+
+
+def find(record: Dataset, simulator: Simulator, tolerance: Mapping[str, float]) -> tuple[list, list[str]]:
+    """Return the gross errors, and the names of all other findings about a record."""
+    fitted = count_fitted_samples(record)
+    admitted, channels = admit_channels(record, fitted)
+    simulation = ExtendedSimulator(simulator, (), make_context(admitted, simulator, fitted))
+    target = Target(record.y, np.arange(record.samples) < fitted, None, tolerance)
+    base = calibrate(simulation, target, simulation.nominal)
+    errors = find_gross_errors(admitted, simulator, base, fitted, tolerance)
+    closed = find_closed_loop(base, record.y, fitted, "u")
+    return list(errors), [each.name for each in (*channels, *closed)]
+
+
+def has_value(error: GrossError, value: float | None) -> bool:
+    """Return whether a gross error has a value, if one is given."""
+    return value is None or any(np.isclose(value, each) for each, _ in error.correction.parameters.values())
+
+
+def count_found(name: str, seeds: range) -> None:
+    """Print how often each gross error is found."""
+    for label, (spoil, error, value, hidden) in ERRORS.items():
+        if name in hidden:
+            continue
+        first = among = 0
+        for seed in seeds:
+            clean = draw(SYSTEMS[name], (), seed, 0.0, None)
+            record = spoil(clean)
+            found, _ = find(record, *make_given_simulator(name, record, clean))
+            right = [
+                each.name == error
+                and (
+                    value is None
+                    or any(np.isclose(value, each[0]) for each in each.correction.parameters.values())
+                )
+                for each in found
+            ]
+            first += bool(right and right[0])
+            among += any(right)
+        rates = (f"{estimate_rate(count, len(seeds)).value:.0%}" for count in (first, among))
+        print(
+            f"{name:13} {label:20} first {first}, among {among} of {len(seeds)}: {', '.join(rates)}",
+            flush=True,
+        )
+
+
+def count_false(name: str, seeds: range, pole: float, band: tuple[float, float]) -> None:
+    """Print how many records without a gross error have a finding."""
+    case, found, records = SYSTEMS[name], Counter(), 0
+    for names in ((), *((fault,) for fault in (*case.system.known, *case.system.unknown))):
+        for seed in seeds:
+            try:
+                record = draw(case, names, seed, pole, band)
+                clean = draw(case, (), seed, pole, None)
+            except ValueError:  # no strength of this fault has such a misfit
+                continue
+            errors, others = find(record, *make_given_simulator(name, record, clean))
+            records += 1
+            found.update((names, each) for each in (*(error.name for error in errors), *others))
+    print(f"{name:13} pole {pole}, misfit {band}: {records} records, found {dict(found)}", flush=True)
+
+
+def main() -> None:
+    """Run the trials that are asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("systems", nargs="+", choices=SYSTEMS)
+    parser.add_argument("--first", type=int, default=7_000_000)
+    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--others", action="store_true")
+    parser.add_argument("--pole", type=float, default=0.0)
+    parser.add_argument("--band", type=float, nargs=2, default=(1.0, 4.0))
+    asked = parser.parse_args()
+    seeds = range(asked.first, asked.first + asked.count)
+    for name in asked.systems:
+        if asked.others:
+            count_false(name, seeds, asked.pole, tuple(asked.band))
+        else:
+            count_found(name, seeds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+"""Corrections of scales: wrong sampling time, wrong unit of the output or the input, flipped sign."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import pi
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.gross_errors.correction import Correction
+
+#: Factors between units that are confused, each with an example; their inverses are tried as well.
+UNIT_FACTORS = (
+    (10.0, "mm and cm"),
+    (100.0, "a fraction and per cent"),
+    (1e3, "m and mm"),
+    (1e6, "m and um"),
+    (9.80665, "kgf and N"),
+    (2 * pi, "revolutions and radians"),
+    (180 / pi, "radians and degrees"),
+    (60.0, "revolutions per second and per minute"),
+    (30 / pi, "rad/s and revolutions per minute"),
+    (25.4, "inches and mm"),
+    (3.6, "m/s and km/h"),
+)
+
+#: Factors of a wrong sampling time; their inverses are tried as well.
+TIME_FACTORS = (2.0, 4.0, 5.0, 10.0, 20.0, 50.0, 60.0, 100.0, 1e3)
+
+
+def correct_sampling_time(record: Dataset) -> Iterator[Correction]:
+    """Yield the record with other sampling times."""
+    for size in TIME_FACTORS:
+        for factor in (size, 1.0 / size):
+            dt = record.dt / factor
+            yield Correction(
+                "sampling-time",
+                replace(record, dt=dt),
+                f"The sampling time seems to be {dt:.6g} s, and not {record.dt:.6g} s.",
+                f"Give --dt {dt:.6g} (library: dt=), or correct the time column.",
+                {"factor": (factor, ""), "sampling time": (dt, "s")},
+            )
+
+
+def correct_output_unit(record: Dataset) -> Iterator[Correction]:
+    """Yield the record with the output in other units."""
+    name = record.output_name
+    for factor, words in _list_factors(name):
+        yield Correction(
+            "output-unit",
+            replace(record, y=record.y / factor),
+            f"The output {name} seems to be in another unit than that of the simulation: {words}",
+            f"Divide column {name} by {factor:.6g}, or give the parameters of the simulation in its unit.",
+            {"factor": (factor, "")},
+            scale=1.0 / factor,
+        )
+
+
+def correct_input_unit(record: Dataset) -> Iterator[Correction]:
+    """Yield the record with the input in other units."""
+    name = record.input_names[0]
+    for factor, words in _list_factors(name):
+        u = record.u.copy()
+        u[:, 0] /= factor
+        yield Correction(
+            "input-unit",
+            replace(record, u=u),
+            f"The input {name} seems to be in another unit than that of the simulation: {words}",
+            f"Divide column {name} by {factor:.6g}, or give the parameters of the simulation in its unit.",
+            {"factor": (factor, "")},
+        )
+
+
+def _list_factors(name: str) -> Iterator[tuple[float, str]]:
+    """Yield each factor of a recorded signal, with the words for it."""
+    for size, example in UNIT_FACTORS:
+        for factor in (size, 1.0 / size):
+            many = f"{factor:.6g} times" if factor > 1.0 else f"1/{size:.6g} of"
+            yield factor, f"{name} is {many} the value that the simulation expects, as between {example}."
+
+
+def correct_sign(record: Dataset) -> Iterator[Correction]:
+    """Yield the record with the output inverted, and with the input inverted."""
+    u = record.u.copy()
+    u[:, 0] *= -1.0
+    for role, name, corrected, scale in (
+        ("output", record.output_name, replace(record, y=-record.y), -1.0),
+        ("input", record.input_names[0], replace(record, u=u), 1.0),
+    ):
+        yield Correction(
+            "sign",
+            corrected,
+            f"The sign of the {role} {name} seems to be flipped.",
+            f"Multiply column {name} by -1, or choose the direction of the simulation accordingly.",
+            scale=scale,
+        )
