@@ -11,6 +11,8 @@ from islands.discrepancy.inference.noise_detectors import DETECTORS, NoiseDetect
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
 from islands.io.simulator_spec.specification import SIMULATORS
+from islands.systems.ode.equation_parser import NAMED_FUNCTIONS
+from islands.systems.ode.ode_expression import FUNCTIONS
 
 Entry = Effect | EffectTemplate | NoiseDetector
 
@@ -106,4 +108,19 @@ def simulators() -> str:
         "Values of `islands diagnose --simulation` and of the argument `simulation` of `islands.diagnose`.",
         table(("Simulator", "Meaning", "Parameters in `FILE.json`", "Estimated unless given"), rows),
         '`FILE.json` is an object with the parameters that are known: `{"m": 1.2, "k": 4000}`.\n',
+        "`FILE.toml` contains equations: see "
+        "[Write a simulation as equations](../how-to/write-a-simulation.md).\n",
+        section(
+            "Functions in equations",
+            "In addition to the operators `+ - * / **` and the comparisons `< <= > >=`.",
+            table(("Function", "Meaning"), _functions()),
+        ),
     )
+
+
+def _functions() -> Iterator[tuple[str, str]]:
+    """Return the rows of the functions in equations, without the operators."""
+    for name in NAMED_FUNCTIONS:
+        yield code(name), escape(FUNCTIONS[name].summary)
+    yield code("rate"), "`rate(u)`: slope of the input or of a channel between samples"
+    yield code("delay"), "`delay(u, tau)`: input or channel tau seconds ago, interpolated linearly"

@@ -27,14 +27,19 @@ from islands.systems.ode.lane_simulation import (
 from islands.systems.ode.ode_expression import OdeExpression, Symbol
 from islands.systems.ode.ode_program import OdeProgram, generate_program
 from islands.systems.ode.ode_system import OdeParameter, OdeState, OdeSystem
+from islands.systems.ode.system_document import MAX_STEPS
 
 #: Prefix of the parameter that is added to the derivative of a state.
 _OFFSET = "input_offset_"
 
 
+#: Numbers of steps per sample that are tried until a nominal simulation does not diverge.
+_STEPS = (1, 2, 4, 8, 16, 32, 64, 128, MAX_STEPS)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class OdeSimulator:
-    """``dx/dt = f(x, u, parameters, t)`` by RK4 with one step per sample.
+    """``dx/dt = f(x, u, parameters, t)`` by RK4.
 
     Attributes
     ----------
@@ -145,8 +150,7 @@ class OdeSimulator:
         """Simulate expressions of the system at its nominal values, shape (expressions, samples)."""
         nominal = np.array([each.nominal for each in self.parameters])
         program = generate_program(self.system, outputs)
-        found: Signal = self._run(program, (), [SimulationRun(nominal, context.u, {}, ())], context)[0]
-        return found
+        return self._run(program, (), [SimulationRun(nominal, context.u, {}, ())], context)[0]
 
     def _get_program(self, offsets: tuple[str, ...], laws: int) -> OdeProgram:
         key = offsets, laws
@@ -165,6 +169,7 @@ class OdeSimulator:
         runs: Sequence[SimulationRun],
         context: SimulationContext,
     ) -> Signal:
+        steps = max(self.system.steps, 1)
         common = self._make_common_signals(runs[0].x.size, context)
         made: dict[int, SampledSignal] = {}
         lanes = []
@@ -173,11 +178,12 @@ class OdeSimulator:
             gain = gain_over_time(effects, context)
             if isinstance(gain, float):
                 if id(run.x) not in made:
-                    made[id(run.x)] = SampledSignal(run.x, *context.get_intersample_values(run.x))
+                    sampled = SampledSignal(run.x, *context.get_intersample_values(run.x))
+                    made[id(run.x)] = sampled.refine(steps)
                 signal = made[id(run.x)]
             else:
                 between = context.get_intersample_values(run.x) * gain
-                signal = SampledSignal(run.x * gain, between[0], between[1])
+                signal = SampledSignal(run.x * gain, between[0], between[1]).refine(steps)
             given = {each.name: float(v) for each, v in zip(self.parameters, run.values, strict=True)}
             lanes.append(
                 LaneInput(
@@ -191,7 +197,7 @@ class OdeSimulator:
                     self._find_limits(effects),
                 )
             )
-        return simulate_lanes(program, context.dt, lanes)
+        return simulate_lanes(program, context.dt / steps, lanes)[:, :, ::steps]
 
     def _make_common_signals(self, samples: int, context: SimulationContext) -> dict[str, SampledSignal]:
         """Return the time and the channels, which are linear between their samples."""
@@ -200,7 +206,7 @@ class OdeSimulator:
             signal = context.channels[recorded]
             steps = np.arange(samples) * (signal.size / samples)
             found[name] = interpolate_linearly(np.interp(steps, np.arange(signal.size), signal))
-        return found
+        return {name: signal.refine(max(self.system.steps, 1)) for name, signal in found.items()}
 
     def _find_limits(self, effect_parameters: Mapping[str, float]) -> dict[str, tuple[float, float]]:
         found = {}
@@ -230,13 +236,13 @@ def make_ode_simulator(system: OdeSystem, record: Dataset) -> OdeSimulator:
     """
     _check_units(system, record)
     channels = {name: _find_channel(name, record) for name in system.channels}
-    first = record[:1].y[0] if np.isfinite(record.y[0]) else 0.0
-    initial = {each.name: _find_initial(each, system, float(first)) for each in system.states}
-    typical = {each.name: 1.0 for each in system.states}
-    rough = OdeSimulator(system, initial, {**typical, **{f"d{name}/dt": 1.0 for name in typical}}, channels)
+    first = float(np.nan_to_num(record.y[0]))
+    initial = {each.name: _find_initial(each, system, first) for each in system.states}
+    sized = [*initial, *(f"d{name}/dt" for name in initial)]
+    rough = OdeSimulator(system, initial, dict.fromkeys(sized, 1.0), channels)
     part = record.longest_segment
     names, units = part.input_names, part.input_units
-    signals = {name: np.ascontiguousarray(part.u[:, index]) for index, name in enumerate(names)}
+    signals = {name: np.ascontiguousarray(u) for name, u in zip(names, part.u.T, strict=True)}
     context = SimulationContext(
         u=signals[names[0]],
         dt=part.dt,
@@ -249,14 +255,17 @@ def make_ode_simulator(system: OdeSystem, record: Dataset) -> OdeSimulator:
         fit_end_time=part.samples * part.dt,
     )
     expressions = tuple(Symbol(name) for name in initial) + tuple(right for _, right in system.derivatives)
-    sizes = [peak_amplitude(signal) for signal in rough._simulate_nominal(context, expressions)]
-    if not np.isfinite(sizes).all():
+    for steps in (system.steps,) if system.steps else _STEPS:
+        rough = replace(rough, system=replace(system, steps=steps))
+        sizes = [peak_amplitude(signal) for signal in rough._simulate_nominal(context, expressions)]
+        if np.isfinite(sizes).all():
+            break
+    else:
         raise RecordError(
             f"the simulation {system.name} diverges on this input: check its equations, the values and units "
             "of its parameters, and the sampling time"
         )
-    names_of_sizes = [*initial, *(f"d{name}/dt" for name in initial)]
-    return replace(rough, sizes=dict(zip(names_of_sizes, sizes, strict=True)))
+    return replace(rough, sizes=dict(zip(sized, sizes, strict=True)))
 
 
 def _find_initial(state: OdeState, system: OdeSystem, measured: float) -> float:

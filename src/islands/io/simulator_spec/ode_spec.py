@@ -11,7 +11,13 @@ from islands.errors import ModelError, SettingsError
 from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
 from islands.systems.ode.equation_parser import MAX_CHARACTERS
 from islands.systems.ode.ode_system import OdeSystem
-from islands.systems.ode.system_document import MAX_PARAMETERS, MAX_STATES, describe_system, make_system
+from islands.systems.ode.system_document import (
+    MAX_PARAMETERS,
+    MAX_STATES,
+    MAX_STEPS,
+    describe_system,
+    make_system,
+)
 
 _Name = Annotated[str, Field(min_length=1, max_length=100)]
 _Unit = Annotated[str, Field(max_length=50)]
@@ -69,6 +75,7 @@ class OdeSpec(SimulatorSpec):
     force: OdeForceSpec | None = None
     input_unit: _Unit = ""
     output_unit: _Unit = ""
+    steps: Annotated[int, Field(ge=0, le=MAX_STEPS)] = 0
 
     @model_validator(mode="after")
     def _check_equations(self, _info: ValidationInfo) -> "OdeSpec":

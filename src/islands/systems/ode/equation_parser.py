@@ -52,7 +52,10 @@ _COMPARISONS: Mapping[type[ast.cmpop], tuple[str, bool]] = MappingProxyType(
     }
 )
 
-_CALLABLE = tuple(name for name in FUNCTIONS if name not in {*_BINARY.values(), "neg", "less", "less_equal"})
+#: Functions that are written by their names; the others are operators.
+NAMED_FUNCTIONS = tuple(
+    name for name in FUNCTIONS if name not in {*_BINARY.values(), "neg", "less", "less_equal"}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +176,7 @@ def _read(node: ast.expr, place: str, depth: int) -> OdeExpression:
             return _make_call(name, tuple(read(argument) for argument in arguments), place)
     raise ModelError(
         f"{place}: cannot read {ast.unparse(node)!r}: use numbers, names, + - * / **, one comparison with "
-        f"< <= > >=, and the functions {', '.join([*_CALLABLE, *SIGNAL_FUNCTIONS])}"
+        f"< <= > >=, and the functions {', '.join([*NAMED_FUNCTIONS, *SIGNAL_FUNCTIONS])}"
     )
 
 
@@ -198,8 +201,8 @@ def _make_call(name: str, arguments: tuple[OdeExpression, ...], place: str) -> O
             f"{place}: write rate(F) and delay(F, tau) with the name of the input or of a channel; "
             "tau is a parameter or a number, in seconds"
         )
-    if name not in _CALLABLE:
-        raise ModelError(f"{place}: unknown function {name!r}: take one of {', '.join(_CALLABLE)}")
+    if name not in NAMED_FUNCTIONS:
+        raise ModelError(f"{place}: unknown function {name!r}: take one of {', '.join(NAMED_FUNCTIONS)}")
     if name in ("min", "max") and len(arguments) > 2:
         *first, last = arguments
         return Operation(name, (_make_call(name, tuple(first), place), last))

@@ -116,6 +116,8 @@ class OdeSystem:
         Where force laws act; None if they cannot.
     input_unit, output_unit : str
         Units that the equations assume; empty if those of the record are taken.
+    steps : int
+        Integration steps per sample; 0 for as few as the record requires.
     """
 
     name: str
@@ -130,6 +132,7 @@ class OdeSystem:
     force: OdeForce | None = None
     input_unit: str = ""
     output_unit: str = ""
+    steps: int = 0
 
     @property
     def signals(self) -> tuple[str, ...]:

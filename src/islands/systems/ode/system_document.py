@@ -26,6 +26,9 @@ from islands.systems.ode.ode_system import (
 #: Largest number of states.
 MAX_STATES = 40
 
+#: Largest number of integration steps per sample.
+MAX_STEPS = 256
+
 #: Largest number of parameters.
 MAX_PARAMETERS = 100
 
@@ -60,6 +63,7 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
         force=_make_force(document),
         input_unit=document.get("input_unit", ""),
         output_unit=document.get("output_unit", ""),
+        steps=document.get("steps", 0),
     )
     _check_sizes(system)
     _check_unique(system, equations)
@@ -172,6 +176,7 @@ def describe_system(system: OdeSystem) -> dict[str, Any]:
         "states": {each.name: _given(each, OdeState(each.name)) for each in system.states},
         "input_unit": system.input_unit,
         "output_unit": system.output_unit,
+        "steps": system.steps,
     }
     for each in system.parameters:
         document["parameters"][each.name]["value"] = each.value
@@ -182,7 +187,9 @@ def describe_system(system: OdeSystem) -> dict[str, Any]:
             "unit": system.force.unit,
             "drive": render(system.force.drive),
         }
-    return {key: value for key, value in document.items() if value not in ("", [], {}) or key == "equations"}
+    return {
+        key: value for key, value in document.items() if value not in ("", [], {}, 0) or key == "equations"
+    }
 
 
 def _given(entry: OdeParameter | OdeState, default: OdeParameter | OdeState) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from islands.errors import ModelError, RecordError, SettingsError
 from islands.io.simulator_spec.document import describe_extension
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import PhysicalSpec, parse_spec
+from support.repository import DOCS
 from support.simulated_records import EQUATIONS, wave
 
 Array = NDArray[np.float64]
@@ -211,11 +212,21 @@ def test_tolerances_are_those_of_the_file() -> None:
     assert get_tolerances(built_in("bouc-wen-piezo").simulator) == {}
 
 
+def test_the_example_of_the_guide_is_the_motor() -> None:
+    guide = (DOCS / "how-to" / "write-a-simulation.md").read_text("utf-8")
+    _, _, motor = (EQUATIONS / "dc-motor.toml").read_text("utf-8").partition("\n")
+    assert f"```toml\n{motor}```" in guide
+
+
 def test_a_record_without_the_channel_or_with_other_units_is_refused() -> None:
     with pytest.raises(RecordError, match=r"the equations read the channel room, and .* are none"):
         make_simulator(path_of("thermal-process"), make_record("thermal-process").first_inputs(1))
-    with pytest.raises(RecordError, match="the output of dc-motor is in rad/s, that of the record in m"):
-        make_simulator(path_of("dc-motor"), Dataset(**{**fields("dc-motor"), "output_unit": "m"}))
+    with pytest.raises(
+        RecordError, match="the output of thermal-process is in degC, that of the record in m"
+    ):
+        make_simulator(
+            path_of("thermal-process"), Dataset(**{**fields("thermal-process"), "output_unit": "m"})
+        )
 
 
 def fields(name: str) -> dict[str, object]:
@@ -223,6 +234,21 @@ def fields(name: str) -> dict[str, object]:
     return {
         each: getattr(record, each) for each in ("u", "y", "dt", "input_names", "input_units", "output_name")
     }
+
+
+def test_a_stiff_simulation_takes_as_many_steps_as_it_needs(tmp_path: Path) -> None:
+    """A damper that stops the mass within a tenth of a sample: the spring alone moves it."""
+    text = (EQUATIONS / "second-order.toml").read_text().replace("value = 4.0", "value = 500.0")
+    (tmp_path / "stiff.toml").write_text(text)
+    record = make_record("second-order")
+    simulation = extend(make_simulator(f"ode:{tmp_path}/stiff.toml", record), record)
+    assert simulation.simulator.system.steps == 4
+    finer = extend(ResampledSimulator(simulation.simulator, InterSample.FOH, 8), record)
+    output = simulation.simulate(simulation.nominal)
+    assert np.max(np.abs(output - finer.simulate(simulation.nominal))) < 1e-2 * np.ptp(output)
+    spec = describe_extension(simulation.simulator, simulation.nominal, ("drive",), "y")
+    again = extend(make_simulator(spec, record), record)
+    assert np.array_equal(again.simulate(again.nominal), output)
 
 
 def test_a_diverging_simulation_is_refused(tmp_path: Path) -> None:

@@ -217,3 +217,14 @@ def test_the_rate_of_a_parabola_is_exact() -> None:
     rate = parabola.differentiate(0.1)
     for part, ahead in ((rate.start, 0.0), (rate.middle, 0.05), (rate.end, 0.1)):
         assert part == pytest.approx(2 * (time + ahead), abs=1e-12)
+
+
+def test_a_divided_step_keeps_lines_parabolas_and_held_values() -> None:
+    line, held = interpolate_linearly(FORCE).refine(3), SampledSignal(FORCE, FORCE, FORCE).refine(4)
+    steps = np.arange(3 * SAMPLES) / 3
+    assert line.middle == pytest.approx(np.interp(steps + 1 / 6, np.arange(SAMPLES), FORCE), abs=1e-13)
+    assert line.end[:-1] == pytest.approx(line.start[1:], abs=1e-13)
+    for part in (held.start, held.middle, held.end):
+        assert np.array_equal(part, np.repeat(FORCE, 4))
+    parabola = SampledSignal(*((np.array([0.0, 0.1]) + ahead) ** 2 for ahead in (0.0, 0.05, 0.1))).refine(2)
+    assert parabola.end == pytest.approx(np.array([0.05, 0.1, 0.15, 0.2]) ** 2, abs=1e-15)

@@ -32,6 +32,7 @@ DOCUMENT: dict[str, Any] = {
     "states": {"x1": {"unit": "m", "initial": 0.5, "fixed": True}, "x2": {"lower": -1.0, "upper": 1.0}},
     "force": {"coordinate": "x1", "rate": "v1", "unit": "N", "drive": "coupling"},
     "input_unit": "N",
+    "steps": 2,
 }
 
 
