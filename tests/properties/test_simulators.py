@@ -1,11 +1,13 @@
 """Properties of every simulator: its declarations are correct, and effects at rest have no response."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.interfaces.context import SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.simulator import Simulator
@@ -177,3 +179,20 @@ def test_every_possible_effect_changes_the_output_at_a_starting_point(
             changes.append(np.max(np.abs(extended.simulate(values) - at_rest)))
         assert np.isfinite(changes).any(), effect.name
         assert np.nanmax(changes) > 0.0, effect.name
+
+
+def test_several_vectors_of_values_have_the_bits_of_one_by_one(
+    simulator: Simulator, alone: ExtendedSimulator, context: SimulationContext
+) -> None:
+    """With an effect on the input, in the equation and on the output, where these are possible."""
+    by_site = {each.site: each for each in possible_effects(simulator, context)}
+    extended = alone.with_effects(catalogue_order(by_site.values()))
+    points = np.tile(extended.nominal, (11, 1))
+    lower, upper = extended.bounds
+    for row, place in enumerate(np.linspace(0, extended.nominal.size - 1, 10).astype(int)):
+        points[row, place] = np.clip(points[row, place] + extended.scales[place], lower[place], upper[place])
+    fresh = replace(extended)
+    one_by_one = np.stack([fresh.simulate(point) for point in points])
+    assert np.array_equal(extended.simulate_batch(points), one_by_one)
+    assert np.array_equal(extended.simulate_batch(points[::-1]), one_by_one[::-1])
+    assert len(np.unique(one_by_one, axis=0)) > 1

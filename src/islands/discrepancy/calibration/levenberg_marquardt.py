@@ -226,17 +226,17 @@ def _compute_jacobian(
     ndarray, shape (estimation samples, parameters)
     """
     _, upper = simulation.bounds
-    columns = np.empty((int(np.count_nonzero(target.estimation_part)), values.size))
-    for index, scale in enumerate(simulation.scales):
-        if is_fixed is not None and is_fixed[index]:
-            columns[:, index] = 0.0
-            continue
-        step = (
-            DIFFERENCE_STEP if values[index] + DIFFERENCE_STEP * scale <= upper[index] else -DIFFERENCE_STEP
-        )
-        shifted = values.copy()
-        shifted[index] += step * scale
-        columns[:, index] = target.select((simulation.simulate(shifted) - output) / step)
+    columns = np.zeros((int(np.count_nonzero(target.estimation_part)), values.size))
+    free = np.arange(values.size) if is_fixed is None else np.flatnonzero(~is_fixed)
+    scales = simulation.scales[free]
+    steps = np.where(
+        values[free] + DIFFERENCE_STEP * scales <= upper[free], DIFFERENCE_STEP, -DIFFERENCE_STEP
+    )
+    points = np.tile(values, (free.size, 1))
+    points[np.arange(free.size), free] += steps * scales
+    shifted = simulation.simulate_batch(points) if free.size else points
+    for index, step, moved in zip(free, steps, shifted, strict=True):
+        columns[:, index] = target.select((moved - output) / step)
     # A simulation that diverges at the shifted value gives no information about that direction.
     return np.nan_to_num(columns, nan=0.0)
 

@@ -1,8 +1,10 @@
 """Interface of the simulators that are compared with a record."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
+
+import numpy as np
 
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
@@ -105,12 +107,15 @@ class SimulationRun:
     x : ndarray, shape (samples,)
     effect_parameters : mapping
     forces : sequence
+    intersample_values : ndarray, shape (2, samples), or None
+        Values of x between samples; None for those of the context.
     """
 
     values: Signal
     x: Signal
     effect_parameters: Mapping[str, float]
     forces: Forces
+    intersample_values: Signal | None = None
 
 
 @runtime_checkable
@@ -119,6 +124,19 @@ class BatchSimulator(Protocol):
 
     def simulate_batch(self, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
         """Simulate the outputs of runs with the same effects and force laws, shape (runs, samples)."""
+
+
+def simulate_runs(simulator: Simulator, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
+    """Simulate runs with the same effects and force laws, at once if the simulator can; (runs, samples)."""
+    if isinstance(simulator, BatchSimulator):
+        return simulator.simulate_batch(runs, context)
+    outputs = []
+    for run in runs:
+        own = context
+        if run.intersample_values is not None:
+            own = replace(context, u=run.x, intersample_values=run.intersample_values)
+        outputs.append(simulator.simulate(run.values, run.x, own, run.effect_parameters, run.forces))
+    return np.stack(outputs)
 
 
 def take_recording(simulator: Simulator, first: int, last: int) -> Simulator:

@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
-from islands.discrepancy.interfaces.simulator import Forces, Simulator, split_recordings
+from islands.discrepancy.interfaces.simulator import (
+    Forces,
+    SimulationRun,
+    Simulator,
+    simulate_runs,
+    split_recordings,
+)
 from islands.errors import SettingsError
 
 #: Cached outputs before the output maps: finite differences need the same one several times.
@@ -165,33 +171,65 @@ class ExtendedSimulator:
                 ]
             )
             return np.full_like(joined, np.nan) if np.isnan(joined).any() else joined
-        with np.errstate(over="ignore", invalid="ignore"):
-            y = (
-                self._simulate_core(values, effect_parameters, forces)
-                if effect_parameters or forces
-                else self._simulate_cached(values)
+        if effect_parameters or forces:
+            run = self._make_run(values, effect_parameters, forces)
+            with np.errstate(over="ignore", invalid="ignore"):
+                y = self.simulator.simulate(
+                    run.values, run.x, self.context, run.effect_parameters, run.forces
+                )
+            return self._apply_output_maps(y, values)
+        return self.simulate_batch(values[None])[0]
+
+    def simulate_batch(self, points: Signal) -> Signal:
+        """Simulate the whole record for several vectors of values, at once if the simulator can.
+
+        Parameters
+        ----------
+        points : ndarray, shape (points, parameters)
+
+        Returns
+        -------
+        ndarray, shape (points, samples)
+            As of `simulate`.
+        """
+        if self.parts:
+            joined = np.concatenate(
+                [
+                    part.simulate_batch(points[:, places])
+                    for part, places in zip(self.parts, self._places, strict=True)
+                ],
+                axis=1,
             )
+            joined[np.isnan(joined).any(axis=1)] = np.nan
+            return joined
+        keys = [values[self._before_output].tobytes() for values in points]
+        known = {key: self._cache[key] for key in keys if key in self._cache}
+        missing = {key: values for key, values in zip(keys, points, strict=True) if key not in known}
+        if missing:
+            runs = [self._make_run(values, _NONE, ()) for values in missing.values()]
+            with np.errstate(over="ignore", invalid="ignore"):
+                found = simulate_runs(self.simulator, runs, self.context)
+            known |= zip(missing, found, strict=True)
+            # Copies, since a row would keep the outputs of all points in memory.
+            self._cache.update({key: known[key].copy() for key in list(missing)[-_CACHE_SIZE:]})
+            while len(self._cache) > _CACHE_SIZE:
+                del self._cache[next(iter(self._cache))]
+        return np.stack(
+            [self._apply_output_maps(known[key], values) for key, values in zip(keys, points, strict=True)]
+        )
+
+    def _apply_output_maps(self, y: Signal, values: Signal) -> Signal:
+        with np.errstate(over="ignore", invalid="ignore"):
             for effect, part in zip(self.effects, self._slices[1:], strict=True):
                 if effect.site == Site.OUTPUT:
                     y = apply_map(effect, y, values[part], self.context)
             diverged = not float(np.max(np.abs(y))) < _DIVERGENCE_FACTOR * self.context.output_peak
         return np.full_like(y, np.nan) if diverged else y
 
-    def _simulate_cached(self, values: Signal) -> Signal:
-        """Simulate the output before the output maps, or return it from the cache."""
-        key = values[self._before_output].tobytes()
-        y = self._cache.get(key)
-        if y is None:
-            y = self._simulate_core(values, _NONE, ())
-            while len(self._cache) >= _CACHE_SIZE:
-                del self._cache[next(iter(self._cache))]
-            self._cache[key] = y
-        return y
-
-    def _simulate_core(
+    def _make_run(
         self, values: Signal, effect_parameters: Mapping[str, float], further: Forces
-    ) -> Signal:
-        """Simulate the output before the output maps."""
+    ) -> SimulationRun:
+        """Return the run of the simulator, with all effects but the output maps."""
         x, forces = self.context.u, list(further)
         parameters = dict(effect_parameters)
         simulator_values = values[: len(self.simulator.parameters)].copy()
@@ -209,7 +247,7 @@ class ExtendedSimulator:
                 case Site.FORCE:
                     assert isinstance(effect.form, ForceLaw)
                     forces.append((effect.form, values[part]))
-        return self.simulator.simulate(simulator_values, x, self.context, parameters, forces)
+        return SimulationRun(simulator_values, x, parameters, forces)
 
     def _get_parameter_index(self, effect: Effect) -> int:
         _, _, name = effect.name.partition(":")

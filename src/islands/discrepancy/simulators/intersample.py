@@ -1,6 +1,6 @@
 """Simulation with a smaller step than the sampling time, and the input between samples."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -9,7 +9,14 @@ import scipy
 
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.simulator import Forces, Simulator, get_tolerances, take_recording
+from islands.discrepancy.interfaces.simulator import (
+    Forces,
+    SimulationRun,
+    Simulator,
+    get_tolerances,
+    simulate_runs,
+    take_recording,
+)
 
 
 class SimulatorWrapper:
@@ -109,6 +116,18 @@ class ResampledSimulator(SimulatorWrapper):
         u, between = self._resample(x)
         resampled = replace(context, u=u, dt=context.dt / self.oversampling, intersample_values=between)
         return self.simulator.simulate(values, u, resampled, effect_parameters, forces)[:: self.oversampling]
+
+    def simulate_batch(self, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
+        """Simulate several runs; see `BatchSimulator.simulate_batch`."""
+        signals = [self._resample(run.x) for run in runs]
+        finer = [
+            replace(run, x=u, intersample_values=between)
+            for run, (u, between) in zip(runs, signals, strict=True)
+        ]
+        resampled = replace(
+            context, u=signals[0][0], dt=context.dt / self.oversampling, intersample_values=signals[0][1]
+        )
+        return simulate_runs(self.simulator, finer, resampled)[:, :: self.oversampling]
 
     def _resample(self, x: Signal) -> tuple[Signal, Signal]:
         key = x.tobytes()

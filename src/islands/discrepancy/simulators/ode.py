@@ -171,18 +171,20 @@ class OdeSimulator:
     ) -> Signal:
         steps = max(self.system.steps, 1)
         common = self._make_common_signals(runs[0].x.size, context)
-        made: dict[int, SampledSignal] = {}
+        made: dict[bytes, SampledSignal] = {}
         lanes = []
         for run in runs:
             effects = run.effect_parameters
+            known = run.intersample_values
+            between = context.get_intersample_values(run.x) if known is None else known
             gain = gain_over_time(effects, context)
             if isinstance(gain, float):
-                if id(run.x) not in made:
-                    sampled = SampledSignal(run.x, *context.get_intersample_values(run.x))
-                    made[id(run.x)] = sampled.refine(steps)
-                signal = made[id(run.x)]
+                key = run.x.tobytes()
+                if key not in made:
+                    made[key] = SampledSignal(run.x, *between).refine(steps)
+                signal = made[key]
             else:
-                between = context.get_intersample_values(run.x) * gain
+                between = between * gain
                 signal = SampledSignal(run.x * gain, between[0], between[1]).refine(steps)
             given = {each.name: float(v) for each, v in zip(self.parameters, run.values, strict=True)}
             lanes.append(
