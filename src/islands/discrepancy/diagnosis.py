@@ -10,13 +10,13 @@ from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
-    Target,
     calibrate,
     evaluate_fit,
 )
 from islands.discrepancy.calibration.preparation import (
     count_fitted_samples,
     make_context,
+    make_target,
     select_effects,
     validate_prior,
 )
@@ -26,9 +26,9 @@ from islands.discrepancy.gross_errors.channel_admission import admit_channels
 from islands.discrepancy.gross_errors.closed_loop import find_closed_loop
 from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.gross_errors.gross_error_search import explain_divergence, find_gross_errors
-from islands.discrepancy.gross_errors.record_finding import RecordFinding
+from islands.discrepancy.gross_errors.record_finding import RecordFinding, describe_gaps
 from islands.discrepancy.inference.experiment_design import suggest_experiment
-from islands.discrepancy.inference.holdout import HoldoutGain, measure_gain
+from islands.discrepancy.inference.holdout import HoldoutGain, compute_rmse, measure_gain
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.strategies import (
     SearchOutcome,
@@ -162,8 +162,8 @@ def diagnose(
     Raises
     ------
     RecordError
-        The record or one of its recordings is too short, or has gaps or a constant output, or the simulation
-        diverges on it.
+        The record or one of its recordings is too short, or has too few outputs or a constant one, or the
+        simulation diverges on it.
     SettingsError
         A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, two effects have the
         same name, or an effect is invalid.
@@ -171,14 +171,14 @@ def diagnose(
     prior_std = validate_prior({**get_tolerances(simulator), **(tolerance or {})}, simulator)
     fitted = count_fitted_samples(record)
     record, record_findings = admit_channels(record, fitted)
+    record_findings += describe_gaps(record)
     try:
         context = make_context(record, simulator, fitted)
     except RecordError as error:
         raise explain_divergence(error, record, simulator, fitted, prior_std) from error
     rng = np.random.default_rng(seed)
     simulation = ExtendedSimulator(simulator, (), context)
-    estimation_part = np.arange(record.samples) < fitted
-    target = Target(record.y, estimation_part, None, prior_std, segments=record.segments)
+    target = make_target(record, fitted, prior_std)
     progress("calibrating the simulation", 0.0)
     base = calibrate(simulation, target, simulation.nominal)
     progress("looking for gross errors of the record", 0.01)
@@ -233,7 +233,7 @@ def _make_gross_diagnosis(
         best=best.fit_of_record or base,
         noise_floor=best.rmse,
         is_noise_floor_measured=False,
-        nominal_rmse=float(np.sqrt(np.mean((record.y - base.output)[fitted:] ** 2))),
+        nominal_rmse=compute_rmse((record.y - base.output)[fitted:]),
         record_findings=list_record_findings(errors),
     )
 
@@ -295,5 +295,5 @@ def _make_diagnosis(
         hypothesis.fit if findings else base,
         floor**0.5,
         outcome.is_noise_floor_measured,
-        float(np.sqrt(np.mean((record.y - nominal)[holdout] ** 2))),
+        compute_rmse((record.y - nominal)[holdout]),
     )

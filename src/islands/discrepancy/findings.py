@@ -11,6 +11,7 @@ from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.inference.verdict import CONFIDENCE_TEMPERATURE, Finding, Value
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
+from islands.discrepancy.interfaces.segments import count_runs
 
 
 def describe_gross_errors(errors: Sequence[GrossError]) -> tuple[Finding, ...]:
@@ -45,8 +46,13 @@ def describe_noise(y: Signal, residual: Signal, context: SimulationContext) -> t
     Parameters
     ----------
     y, residual : ndarray, shape (samples,)
-        Measured output and residual over the estimation part.
+        Measured output and residual over the estimation part, NaN where the output is missing.
     """
+    is_known = ~np.isnan(residual)
+    if not is_known.all():
+        runs = count_runs(is_known, context.segments)
+        context = replace(context, u=context.u[: y.size][is_known], segments=runs)
+        y, residual = y[is_known], residual[is_known]
     findings: list[Finding] = []
     for detector in DETECTORS.values():
         if any(each.name in detector.excluded_by for each in findings):

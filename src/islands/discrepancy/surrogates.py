@@ -13,6 +13,7 @@ from islands.discrepancy.calibration.preparation import select_effects
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.inference.screening import transfer_parameters
 from islands.discrepancy.interfaces.effect import Effect, Signal
+from islands.discrepancy.interfaces.segments import count_runs
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
@@ -134,7 +135,8 @@ class Surrogates:
             if injection is None
             else self.simulate(self.effects[injection.effect], injection.values)
         )
-        return replace(self.record, y=simulated + self.draw_noise(case.seed))
+        y = simulated + self.draw_noise(case.seed)
+        return replace(self.record, y=np.where(np.isnan(self.record.y), np.nan, y))
 
 
 def make_surrogates(diagnosis: Diagnosis, simulator: Simulator, tolerance: Mapping[str, float]) -> Surrogates:
@@ -148,13 +150,15 @@ def make_surrogates(diagnosis: Diagnosis, simulator: Simulator, tolerance: Mappi
     best = diagnosis.best
     simulation = best.simulation.with_effects(())
     residual = (diagnosis.record.y - best.output)[: diagnosis.estimation_samples]
+    is_known = ~np.isnan(residual)
+    residual, runs = residual[is_known], count_runs(is_known, diagnosis.record.segments)
     return Surrogates(
         diagnosis.record,
         simulator,
         tolerance,
         simulation,
         transfer_parameters(best.values, best.simulation, simulation),
-        _limit_poles(fit_ar_noise(residual, segments=diagnosis.record.segments), diagnosis.record.samples),
+        _limit_poles(fit_ar_noise(residual, segments=runs), diagnosis.record.samples),
         float(np.sqrt(np.mean(residual**2))),
         diagnosis.estimation_samples,
     )

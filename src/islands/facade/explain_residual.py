@@ -75,7 +75,8 @@ def explain_residual(
         return None
     record = found.record
     residual = record.y - found.best.output
-    if np.sqrt(np.mean(residual**2)) <= ROUNDING * record.output_range:
+    is_known = ~np.isnan(residual)
+    if np.sqrt(np.mean(residual[is_known] ** 2)) <= ROUNDING * record.output_range:
         return None
     dataset = Dataset(
         u=np.column_stack([record.u[:, 0], found.best.output]),
@@ -101,8 +102,9 @@ def explain_residual(
     best, explained = None, MIN_EXPLAINED_FRACTION
     for each in result.models:
         run = free_run(each.model, dataset)
-        error = np.where(np.isfinite(run.y), residual - run.y, residual)[found.estimation_samples :]
-        total = float(np.sum(residual[found.estimation_samples :] ** 2))
+        is_judged = is_known & (np.arange(record.samples) >= found.estimation_samples)
+        error = np.where(np.isfinite(run.y), residual - run.y, residual)[is_judged]
+        total = float(np.sum(residual[is_judged] ** 2))
         fraction = 1.0 - float(np.sum(error**2)) / total if total else 0.0
         # Models are in the order of their validation error: a later one has to explain clearly more.
         if fraction > explained + MIN_IMPROVEMENT:

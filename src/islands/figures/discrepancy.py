@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.context import Signal
-from islands.discrepancy.interfaces.segments import map_segments
+from islands.discrepancy.interfaces.segments import fill_gaps, map_segments
 from islands.figures.diverging_lines import break_line
 from islands.figures.downsampling import VERTICES, downsample
 from islands.figures.style import (
@@ -214,10 +214,11 @@ def _draw_over_time_panels(
 
 
 def _draw_cells(axes: Axes, signal: Signal, diagnosis: Diagnosis) -> None:
-    middle, cell, count = _sort_into_cells(signal)
+    is_known = ~np.isnan(diagnosis.record.y)
+    middle, cell, count = _sort_into_cells(signal[is_known])
     for name, colour, residual in _residuals(diagnosis):
-        mean = np.bincount(cell, weights=residual) / count
-        spread = np.sqrt(np.maximum(np.bincount(cell, weights=residual**2) / count - mean**2, 0.0))
+        mean, square = (np.bincount(cell, weights=residual[is_known] ** p) / count for p in (1, 2))
+        spread = np.sqrt(np.maximum(square - mean**2, 0.0))
         axes.fill_between(middle, mean - spread, mean + spread, color=colour, alpha=0.15, lw=0)
         axes.plot(middle, mean, color=colour, lw=1.2, label=name)
     axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
@@ -226,7 +227,7 @@ def _draw_cells(axes: Axes, signal: Signal, diagnosis: Diagnosis) -> None:
 def _draw_directions(axes: Axes, u: Signal, rate: Signal, diagnosis: Diagnosis) -> None:
     """Draw the mean while the input rises and while it falls; a difference indicates hysteresis."""
     for way, rises, line in (("rising", True, "-"), ("falling", False, (0, (3, 1.5)))):
-        chosen = (rate > 0.0) == rises
+        chosen = ((rate > 0.0) == rises) & ~np.isnan(diagnosis.record.y)
         if not chosen.any():
             continue
         middle, cell, count = _sort_into_cells(u[chosen])
@@ -251,17 +252,16 @@ def _sort_into_cells(signal: Signal) -> tuple[Signal, NDArray[np.int64], NDArray
 
 
 def _draw_spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
-    """Draw amplitude spectral densities of the residuals.
+    """Draw Welch's amplitude spectral densities of the residuals, whose gaps are interpolated.
 
-    They are Welch's, with windows of a quarter of the longest recording; shorter recordings are left out.
+    Windows are a quarter of the longest recording; shorter recordings are left out.
     """
     record = diagnosis.record
     window = max(16, max(record.segments) // _WINDOWS)
     bounds = [(begin, end) for begin, end in record.bounds if end - begin >= window] or record.bounds
     for _, colour, residual in _residuals(diagnosis):
-        found = [
-            scipy.signal.welch(residual[slice(*each)], 1.0 / record.dt, nperseg=window) for each in bounds
-        ]
+        parts = [fill_gaps(residual)[slice(*each)] for each in bounds]
+        found = [scipy.signal.welch(part, 1.0 / record.dt, nperseg=window) for part in parts]
         frequency = found[0][0]
         density = np.average(
             [each for _, each in found], axis=0, weights=[end - begin for begin, end in bounds]
@@ -281,14 +281,14 @@ def _draw_spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
 
 def _draw_autocorrelation(axes: Axes, diagnosis: Diagnosis) -> None:
     for name, colour, residual in _residuals(diagnosis):
-        centred = residual - residual.mean()
+        centred = np.nan_to_num(residual - np.nanmean(residual))
         parts = [centred[begin:end] for begin, end in diagnosis.record.bounds]
         lags = np.arange(1, min(_LAGS, max(diagnosis.record.segments) - 1) + 1)
         correlation = [
             sum(float(part[lag:] @ part[:-lag]) for part in parts) / float(centred @ centred) for lag in lags
         ]
         axes.plot(lags, correlation, color=colour, lw=1.2, label=name)
-    bound = 1.96 / np.sqrt(diagnosis.record.samples)
+    bound = 1.96 / np.sqrt(np.count_nonzero(~np.isnan(diagnosis.record.y)))
     axes.axhspan(-bound, bound, color=SHADE, zorder=0.5)
     axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
     axes.set(xlabel="lag (samples)", ylabel="autocorrelation")

@@ -25,7 +25,8 @@ def fit_initial_states(fit: CalibrationResult, target: Target, first_sample: int
     target : Target
         Target of the fit; the states are fitted to the unweighted output of their recordings.
     """
-    simulation, bounds = fit.simulation, find_bounds(target.segments, target.y.size)
+    simulation = fit.simulation
+    bounds = find_bounds(simulation.context.segments, target.y.size)
     recordings = [index for index, (first, _) in enumerate(bounds) if index and first >= first_sample]
     is_state = np.isin(simulation.recordings, recordings)
     if not is_state.any():
@@ -33,6 +34,7 @@ def fit_initial_states(fit: CalibrationResult, target: Target, first_sample: int
     is_fitted = np.zeros(target.y.size, dtype=bool)
     for index in recordings:
         is_fitted[slice(*bounds[index])] = True
+    is_fitted &= ~np.isnan(target.y)
     of_states = replace(target, noise=None, estimation_part=is_fitted, prior_std={})
     values = calibrate(simulation, of_states, fit.values, is_fixed=~is_state).values
     return evaluate_fit(simulation, target, values)

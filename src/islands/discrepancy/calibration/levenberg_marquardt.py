@@ -31,9 +31,9 @@ class Target:
     Attributes
     ----------
     y : ndarray, shape (samples,)
-        The measured output.
+        The measured output; NaN if it is missing.
     estimation_part : ndarray of bool, shape (samples,)
-        Samples used for estimation.
+        Samples used for estimation; none of them is missing.
     noise : NoiseModel or None
         Noise model that whitens residuals; None to leave them unweighted.
     prior_std : mapping
@@ -43,7 +43,7 @@ class Target:
         Effective sample size of the estimation part if the residual is model error; None if it is noise,
         white or coloured.
     segments : tuple of int
-        Lengths of the recordings in samples; empty for a single one.
+        Lengths in samples of the recordings, cut at the gaps of the output; empty for a single recording.
     """
 
     y: Signal
@@ -55,7 +55,7 @@ class Target:
 
     @property
     def fitted_segments(self) -> tuple[int, ...]:
-        """Number of samples of every recording that are used for estimation, without zeros."""
+        """Number of samples of every segment that are used for estimation, without zeros."""
         counts = (
             int(np.count_nonzero(self.estimation_part[first:last]))
             for first, last in find_bounds(self.segments, self.y.size)
@@ -132,7 +132,7 @@ def calibrate(
     cost = _compute_cost(residual, inverse_std * (values - nominal))
     damping = 1e-3
     # Residuals at the level of rounding cannot be fitted: the record may be an output of the simulation.
-    rounding = residual.size * (np.finfo(float).eps * float(np.max(np.abs(target.y)))) ** 2
+    rounding = residual.size * (np.finfo(float).eps * float(np.nanmax(np.abs(target.y)))) ** 2
     for _ in range(max_iterations if values.size and np.isfinite(cost) else 0):
         if float(residual @ residual) <= rounding:
             break

@@ -68,6 +68,8 @@ def fit_ar_noise(residual: Signal, max_order: int = MAX_ORDER, segments: Sequenc
         return NoiseModel(np.zeros(0), float("inf"), n)
     # All orders use the same equations, so that the inner products of all lags are computed once.
     bounds = [(first, last) for first, last in find_bounds(segments, n) if last - first > max_order]
+    if not bounds:  # gaps leave no equation
+        return white_noise(float(np.mean(residual**2)), n)
     later = np.concatenate([residual[first + max_order : last] for first, last in bounds])
     lagged = np.column_stack(
         [

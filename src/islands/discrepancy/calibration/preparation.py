@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from islands.data.dataset import Dataset
+from islands.discrepancy.calibration.levenberg_marquardt import Target
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.effects.scale import wrong_parameter
 from islands.discrepancy.interfaces.effect import Effect, SimulationContext, Site
-from islands.discrepancy.interfaces.segments import is_resting
+from islands.discrepancy.interfaces.segments import is_resting, split_at_gaps
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -129,7 +130,7 @@ def count_fitted_samples(record: Dataset) -> int:
     Raises
     ------
     RecordError
-        The record or one of its recordings is too short, or has gaps or a constant output.
+        The record or one of its recordings is too short, or has too few outputs or a constant one.
     """
     if record.samples < MIN_SAMPLES:
         raise RecordError(
@@ -141,12 +142,29 @@ def count_fitted_samples(record: Dataset) -> int:
             f"recording {1 + record.segments.index(shortest)} has {shortest} samples, and a diagnosis of "
             f"several recordings needs at least {MIN_RECORDING_SAMPLES} of each: leave it out"
         )
-    if np.isnan(record.y).any():
-        raise RecordError("the measured output has gaps: repair them, or select rows without any")
     fitted = estimation_part(record).samples
-    if np.ptp(record.y[:fitted]) == 0.0:
+    is_known = ~np.isnan(record.y)
+    if (known := int(is_known.sum())) < MIN_SAMPLES:
+        raise RecordError(
+            f"the output has {known} values in {record.samples} samples, and a diagnosis needs at least "
+            f"{MIN_SAMPLES}: repair its gaps, or give a longer record"
+        )
+    for first, last in (*record.bounds, (0, fitted), (fitted, record.samples)):
+        if (known := int(is_known[first:last].sum())) < MIN_RECORDING_SAMPLES:
+            raise RecordError(
+                f"the output has {known} values from sample {first} to sample {last - 1}, and a diagnosis "
+                f"needs at least {MIN_RECORDING_SAMPLES}: repair its gaps, or select other rows"
+            )
+    if np.ptp(record.y[:fitted][is_known[:fitted]]) == 0.0:
         raise RecordError(f"column {record.output_name} is constant: a diagnosis needs an output that varies")
     return fitted
+
+
+def make_target(record: Dataset, fitted: int, prior_std: Mapping[str, float]) -> Target:
+    """Return the target of a calibration; missing outputs are not part of it."""
+    is_known = ~np.isnan(record.y)
+    is_fitted = is_known & (np.arange(record.samples) < fitted)
+    return Target(record.y, is_fitted, None, prior_std, segments=split_at_gaps(is_known, record.segments))
 
 
 def make_context(record: Dataset, simulator: Simulator, fitted: int) -> SimulationContext:
@@ -186,6 +204,6 @@ def make_context(record: Dataset, simulator: Simulator, fitted: int) -> Simulati
         )
     peak = peak_amplitude(nominal)
     if is_resting(nominal[:fitted]):  # it may rest at zero, while the measured output creeps
-        peak = max(float(np.max(np.abs(nominal))), peak_amplitude(record.y))
+        peak = max(float(np.max(np.abs(nominal))), peak_amplitude(record.y[~np.isnan(record.y)]))
     scaled = replace(context, output_peak=peak)
     return replace(scaled, force_coordinate=simulator.make_force_coordinate(scaled, nominal))

@@ -55,6 +55,7 @@ def find_closed_loop(
         Number of samples used for estimation.
     """
     u, residual = fit.simulation.context.u[:fitted], (y - fit.output)[:fitted]
+    residual = np.where(np.isnan(residual), np.nanmean(residual), residual)
     # Feedback within a sample and a simulation that responds at once are alike.
     first = 1 if acts_at_once(fit) else 0
     feedback = measure_feedback(u, residual, first)

@@ -14,7 +14,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     prior_precision,
 )
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
-from islands.discrepancy.calibration.preparation import make_context
+from islands.discrepancy.calibration.preparation import make_context, make_target
 from islands.discrepancy.gross_errors.channel_corrections import correct_swapped_channels
 from islands.discrepancy.gross_errors.correction import Correction
 from islands.discrepancy.gross_errors.gross_error import GrossError
@@ -91,7 +91,7 @@ def find_gross_errors(
     prior_std : mapping
         Relative standard deviations of the simulator's parameters about their nominal values.
     """
-    target = Target(record.y, np.arange(record.samples) < fitted, None, prior_std, segments=record.segments)
+    target = make_target(record, fitted, prior_std)
     error_before, free_error, nominal = DIVERGED, DIVERGED, np.full(record.samples, np.nan)
     if base is not None:
         error_before = relative_error(limit_to_tolerances(base, target), target)
@@ -102,7 +102,7 @@ def find_gross_errors(
     found = []
     for check in CHECKS:
         for simulation, start, corrected, correction in _select(
-            check(record, nominal, fitted), simulator, target, nominal
+            check(record, nominal, fitted), simulator, target, nominal, fitted
         ):
             fit = limit_to_tolerances(calibrate(simulation, corrected, start), corrected)
             error = relative_error(fit, corrected)
@@ -187,7 +187,7 @@ def _explain_negative_parameters(
 
 
 def _select(
-    corrections: Iterable[Correction], simulator: Simulator, target: Target, nominal: Signal
+    corrections: Iterable[Correction], simulator: Simulator, target: Target, nominal: Signal, fitted: int
 ) -> Sequence[tuple[ExtendedSimulator, Signal, Target, Correction]]:
     """Return the best corrections that change something, each with its simulation, start and target.
 
@@ -195,11 +195,13 @@ def _select(
     """
     rated = []
     for correction in corrections:
-        made = _prepare(correction, simulator, target)
+        made = _prepare(correction, simulator, target, fitted)
         if made is None:
             continue
         simulation, start, corrected = made
-        if np.array_equal(corrected.y, target.y) and np.array_equal(simulation.simulate(start), nominal):
+        if np.array_equal(corrected.y, target.y, equal_nan=True) and np.array_equal(
+            simulation.simulate(start), nominal
+        ):
             continue
         is_fixed = np.array([not parameter.initial for parameter in simulation.parameters], dtype=bool)
         fit = (
@@ -215,10 +217,9 @@ def _select(
 
 
 def _prepare(
-    correction: Correction, simulator: Simulator, target: Target
+    correction: Correction, simulator: Simulator, target: Target, fitted: int
 ) -> tuple[ExtendedSimulator, Signal, Target] | None:
     """Return simulation, starting point and target of a correction; None if the simulation diverges."""
-    fitted = int(np.count_nonzero(target.estimation_part))
     record = correction.record
     try:
         context = make_context(record, simulator, fitted)
@@ -229,8 +230,9 @@ def _prepare(
     is_state = np.array([parameter.initial for parameter in simulation.parameters], dtype=bool)
     start = np.where(is_state, correction.scale, 1.0) * simulation.nominal
     is_used = np.arange(record.samples) < fitted - max(correction.shift, 0)
-    part = target.estimation_part & correction.is_known & is_used
-    return simulation, start, replace(target, y=record.y, estimation_part=part)
+    made = make_target(record, fitted, target.prior_std)
+    part = made.estimation_part & correction.is_known & is_used
+    return simulation, start, replace(made, estimation_part=part)
 
 
 def _compute_free_error(base: CalibrationResult, target: Target) -> float:

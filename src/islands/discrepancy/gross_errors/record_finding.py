@@ -4,6 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.interfaces.segments import find_runs
+
 #: Family of gross errors in the list of causes.
 FAMILY = "gross"
 
@@ -52,3 +57,22 @@ class RecordFinding:
             },
             "errors": None if self.errors is None else {"before": self.errors[0], "after": self.errors[1]},
         }
+
+
+def describe_gaps(record: Dataset) -> tuple[RecordFinding, ...]:
+    """Return a finding if outputs are missing; otherwise nothing."""
+    is_missing = np.isnan(record.y)
+    if not is_missing.any():
+        return ()
+    gaps = find_runs(is_missing, record.segments)
+    count, longest = int(is_missing.sum()), max(last - first for first, last in gaps)
+    share = count / record.samples
+    return (
+        RecordFinding(
+            "missing-output",
+            f"{count} of {record.samples} outputs are missing ({100 * share:.2g} %), in {len(gaps)} gaps of "
+            f"at most {longest * record.dt:.4g} s. They do not count.",
+            "No step is necessary; --gaps interpolate would add values that were not measured.",
+            {"share": (share, ""), "longest": (longest * record.dt, "s")},
+        ),
+    )

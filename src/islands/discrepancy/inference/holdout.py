@@ -75,9 +75,10 @@ def measure_gain(
     floor : float
         RMSE of noise alone.
     """
-    y = record.y[holdout]
+    is_known = ~np.isnan(record.y[holdout])
+    y = record.y[holdout][is_known]
     output_range = float(np.ptp(y)) or 1.0
-    errors = [np.array(y - simulated[holdout]) for simulated in (before, after)]
+    errors = [np.array(y - simulated[holdout][is_known]) for simulated in (before, after)]
     squares = [_sum_by_block(each**2, BLOCKS) for each in errors]
     drawn = rng.integers(0, BLOCKS, (BOOTSTRAP_SAMPLES, BLOCKS))
     reductions = 100 * (1 - np.sqrt(squares[1][drawn].sum(axis=1) / squares[0][drawn].sum(axis=1)))
@@ -93,6 +94,11 @@ def measure_gain(
         100 * (1 - rmse[1] / rmse[0]),
         (float(low), float(high)),
     )
+
+
+def compute_rmse(residual: Signal) -> float:
+    """Return the RMS of a residual; missing samples, NaN, do not count."""
+    return float(np.sqrt(np.mean(residual[~np.isnan(residual)] ** 2)))
 
 
 def cross_validate_gain(
@@ -117,7 +123,7 @@ def cross_validate_gain(
     """
     block = np.arange(target.y.size) * BLOCKS // fitted
     is_kept = block == 0
-    for first, last in find_bounds(target.segments, fitted)[1:]:
+    for first, last in find_bounds(after.simulation.context.segments, fitted)[1:]:
         is_kept[first : first + min(-(-fitted // BLOCKS), (last - first) // 2)] = True
     numbers = np.unique(block[:fitted][~is_kept[:fitted]])
     fold = rng.permutation(np.arange(1, numbers.size + 1)) % FOLDS
@@ -129,9 +135,8 @@ def cross_validate_gain(
         old = before if keep_values else calibrate(before.simulation, training, before.values)
         new = calibrate(after.simulation, training, after.values)
         squares = [after.noise.whiten(target.y - fit.output, target.segments) ** 2 for fit in (old, new)]
-        gains += [
-            float(np.sum((squares[0] - squares[1])[(block == number) & is_left_out])) for number in left_out
-        ]
+        decrease, is_judged = squares[0] - squares[1], is_left_out & target.estimation_part
+        gains += [float(np.sum(decrease[(block == number) & is_judged])) for number in left_out]
     weight = after.noise.effective_samples / np.count_nonzero(target.estimation_part)
     return _bound_gain(weight * np.array(gains) / after.noise.variance, rng)
 

@@ -53,13 +53,14 @@ def explainable_variance(
     Parameters
     ----------
     residual, u, simulated : ndarray, shape (samples,)
-        Signals over the same samples, without gaps.
+        Signals over the same samples; missing residuals are NaN and do not count.
     rng : Generator
         Draws the random features.
     segments : sequence of int
         Lengths of the recordings in samples.
     """
-    raw = _make_features(u, simulated, segments)
+    is_known = ~np.isnan(residual)
+    raw, residual = _make_features(u, simulated, segments)[is_known], residual[is_known]
     raw = (raw - raw.mean(axis=0)) / (raw.std(axis=0) + 1e-12)
     left, singular_values, _ = np.linalg.svd(raw, full_matrices=False)
     axes = left[:, singular_values > 1e-6 * singular_values[0]] * np.sqrt(len(raw))
@@ -138,12 +139,15 @@ def noise_variance_from_periods(u: Signal, y: Signal, segments: Sequence[int] = 
     Parameters
     ----------
     u, y : ndarray, shape (samples,)
+        Missing outputs are NaN.
     segments : sequence of int
         Lengths of the recordings in samples.
     """
     found = [_subtract_periods(u[first:last], y[first:last]) for first, last in find_bounds(segments, y.size)]
     differences = [each.ravel() for each in found if each is not None]
-    return float(np.mean(np.concatenate(differences) ** 2)) / 2.0 if differences else None
+    squares = np.concatenate(differences) ** 2 if differences else np.zeros(0)
+    squares = squares[~np.isnan(squares)]
+    return float(np.mean(squares)) / 2.0 if squares.size else None
 
 
 def _subtract_periods(u: Signal, y: Signal) -> Signal | None:
@@ -153,4 +157,8 @@ def _subtract_periods(u: Signal, y: Signal) -> Signal | None:
         return None
     periods = y[y.size % period :].reshape(-1, period)[1:]
     differences = np.diff(periods, axis=0)
+    differences = differences[~np.isnan(differences).all(axis=1)]
+    is_gap = np.isnan(differences)
+    if is_gap.any():
+        return np.array(differences - np.nanmean(differences, axis=1, keepdims=True))
     return np.array(differences - differences.mean(axis=1, keepdims=True))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from islands.discrepancy.calibration.noise_model import fit_ar_noise
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
-from islands.discrepancy.interfaces.segments import map_segments
+from islands.discrepancy.interfaces.segments import count_runs, map_segments
 
 #: Number of random circular shifts that give the null distribution of a map.
 SHIFTS = 200
@@ -29,17 +29,20 @@ def find_residual_structure(
     Parameters
     ----------
     residual, simulated : ndarray, shape (samples,)
-        Signals over the estimation part.
+        Signals over the estimation part; missing residuals are NaN and do not count.
     """
+    segments, is_known = context.segments, ~np.isnan(residual)
+    maps = _make_maps(context.u[: residual.size], simulated, context.dt, segments)
+    residual, runs = residual[is_known], count_runs(is_known, segments)
     n = residual.size
-    segments = context.segments
-    whitened = fit_ar_noise(residual, segments=segments).whiten(residual, segments)
+    whitened = fit_ar_noise(residual, segments=runs).whiten(residual, runs)
     whitened = whitened - whitened.mean()
     if not whitened.any():
         return {}
     shifts = rng.integers(n // 20, n - n // 20, SHIFTS)
     distances = {}
-    for name, cells in _make_maps(context.u[:n], simulated, context.dt, segments).items():
+    for name, all_cells in maps.items():
+        cells = all_cells[is_known]
         if cells.min() == cells.max():  # a signal at rest
             continue
         null = np.log([_explained_squares(np.roll(whitened, shift), cells) for shift in shifts])

@@ -17,6 +17,7 @@ from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.starts_calibrator import StartsCalibrator
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.discrepancy.interfaces.segments import fill_gaps
 from islands.discrepancy.simulators.extended import ExtendedSimulator, invalid_effect_error
 
 #: Maximum number of starting points per effect that are calibrated.
@@ -186,7 +187,7 @@ def _find_starts(
     lower, upper = simulation.bounds
     without_effect = transfer_parameters(base.values, base.simulation, simulation)
     starts = []
-    for point in _get_starting_points(effect, simulation, target.y - base.output):
+    for point in _get_starting_points(effect, simulation, fill_gaps(target.y - base.output)):
         values = without_effect.copy()
         values[part] = simulation.expand(effect, point)
         response = projection(simulation.simulate(values) - base.output)

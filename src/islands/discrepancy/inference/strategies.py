@@ -145,7 +145,7 @@ def assess_evidence(outcome: SearchOutcome, fitted: int, rng: np.random.Generato
     residual = target.y[:fitted] - output
     explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
     structure = find_residual_structure(residual, output, context, rng)
-    mean_square = float(np.mean(residual**2))
+    mean_square = float(np.mean(residual[target.estimation_part[:fitted]] ** 2))
     measured_floor = noise_variance_from_periods(context.u[:fitted], target.y[:fitted], context.segments)
     floor = max(mean_square - explainable, 0.0) if measured_floor is None else measured_floor
     has_remainder = bool(structure) or explainable > MIN_REMAINDER_FRACTION * mean_square

@@ -31,6 +31,44 @@ def find_bounds(segments: Sequence[int], samples: int) -> tuple[tuple[int, int],
     return tuple(bounds)
 
 
+def find_runs(is_known: NDArray[np.bool_], segments: Sequence[int]) -> tuple[tuple[int, int], ...]:
+    """Return the first sample of every run of known samples in a segment, and the one after its last."""
+    runs = []
+    for first, last in find_bounds(segments, is_known.size):
+        edges = np.flatnonzero(np.diff(is_known[first:last].astype(np.int8), prepend=0, append=0))
+        runs += [(first + int(begin), first + int(end)) for begin, end in edges.reshape(-1, 2)]
+    return tuple(runs)
+
+
+def count_runs(is_known: NDArray[np.bool_], segments: Sequence[int]) -> tuple[int, ...]:
+    """Return the lengths of the runs of known samples; the segments themselves if no sample is missing."""
+    if is_known.all():
+        return tuple(segments)
+    return tuple(last - first for first, last in find_runs(is_known, segments))
+
+
+def split_at_gaps(is_known: NDArray[np.bool_], segments: Sequence[int]) -> tuple[int, ...]:
+    """Return the lengths of segments that are cut where known samples begin or end.
+
+    An equation of a noise model reaches across neither the gap nor its ends.
+    """
+    if is_known.all():
+        return tuple(segments)
+    runs = find_runs(is_known, segments)
+    ends = {end for run in runs for end in run}
+    ends |= {last for _, last in find_bounds(segments, is_known.size)}
+    return tuple(np.diff([0, *sorted(ends - {0})]).tolist())
+
+
+def fill_gaps(signal: Signal) -> Signal:
+    """Return a signal whose missing samples are interpolated linearly; the ends are held."""
+    is_known = ~np.isnan(signal)
+    if is_known.all() or not is_known.any():
+        return signal
+    places = np.arange(signal.size)
+    return np.interp(places, places[is_known], signal[is_known])
+
+
 def map_segments(function: Callable[[Signal], Signal], signal: Signal, segments: Sequence[int]) -> Signal:
     """Apply a function to every segment of a signal, and concatenate the results.
 

@@ -3,6 +3,7 @@
 import json
 import runpy
 from collections.abc import Mapping
+from dataclasses import replace
 from pkgutil import resolve_name
 from typing import Any
 
@@ -16,6 +17,7 @@ from islands.discrepancy.calibration.preparation import estimation_part, make_co
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.context import ForceCoordinate, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect
+from islands.discrepancy.interfaces.segments import fill_gaps
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
@@ -72,6 +74,8 @@ def make_simulator(
         The record is not suitable for the simulator.
     """
     spec = parse_spec(spec) if isinstance(spec, str) else spec
+    # Estimates and initial values need a complete output; the calibration leaves missing samples out.
+    record = replace(record, y=fill_gaps(record.y))
     if isinstance(spec, ExtendedSpec):
         return _make_saved_extension(spec, record, columns or {})
     entry = SIMULATORS[spec.kind]
@@ -122,9 +126,11 @@ def simulate_spec(
         values[initial] += scales * steps
         return alone.simulate(np.clip(values, *alone.bounds))
 
-    size = float(np.std(record.y)) or 1.0
+    is_known = ~np.isnan(record.y)
+    measured = record.y[is_known]
+    size = float(np.std(measured)) or 1.0
     best = scipy.optimize.least_squares(
-        lambda steps: np.nan_to_num((simulate(steps) - record.y) / size, nan=1e6),
+        lambda steps: np.nan_to_num((simulate(steps)[is_known] - measured) / size, nan=1e6),
         np.zeros(len(initial)),
         method="lm",
         diff_step=1e-4,
@@ -243,7 +249,7 @@ def make_model_simulator(model: Model, name: str, record: Dataset) -> Simulator:
     """
     if model.theta is None:
         raise ModelError(f"{name} has no parameters: estimate them first")
-    simulator = NarxSimulator(model, name, record.y)
+    simulator = NarxSimulator(model, name, fill_gaps(record.y))
     # Further columns of the record are channels, which the model does not read.
     match_record(model, record.first_inputs(1), name, advance=False)
     return simulator
@@ -262,11 +268,13 @@ def _check_parameters(entry: SimulatorEntry, given: Mapping[str, float]) -> None
 
 
 def _check_estimable(record: Dataset) -> None:
-    """Raise `RecordError` if a record is too short for an estimate, or has gaps."""
+    """Raise `RecordError` if a record is too short for an estimate, or has no output."""
     if record.samples < MIN_SAMPLES:
         raise RecordError(
             f"the record has {record.samples} samples, and an estimate of the parameters requires "
             f"{MIN_SAMPLES} at least: give a longer one"
         )
-    if np.isnan(record.y).any():
-        raise RecordError("the measured output has gaps: repair them, or select rows without any")
+    if np.isnan(record.y).any():  # the gaps of an output that has values are filled
+        raise RecordError(
+            "the output has no values, and an estimate of the parameters requires them: give them"
+        )

@@ -44,8 +44,9 @@ SPOILT: dict[str, Callable[[Dataset], Dataset]] = {
     "one sample too few": lambda record: record[:199],
     "a constant output": lambda record: with_y(record, lambda y: y.fill(2.0)),
     "a zero output": lambda record: with_y(record, lambda y: y.fill(0.0)),
-    "a gap": lambda record: with_y(record, lambda y: y.__setitem__(slice(100, 110), np.nan)),
-    "a gap at its beginning": lambda record: with_y(record, lambda y: y.__setitem__(0, np.nan)),
+    "few outputs": lambda record: with_y(record, lambda y: y.__setitem__(slice(50, 460), np.nan)),
+    "no output at the end": lambda record: with_y(record, lambda y: y.__setitem__(slice(460, 600), np.nan)),
+    "no output": lambda record: with_y(record, lambda y: y.fill(np.nan)),
 }
 
 
