@@ -187,13 +187,13 @@ def test_parts_without_states_are_computed_once() -> None:
     document = {
         "name": "s",
         "input": "F",
-        "equations": "dx/dt = exp(a)*sin(F) - exp(a)*(x*b) - x*b\nunused = sqrt(x)",
+        "equations": "dx/dt = exp(a)*sin(F) - exp(a)*(x*b) - x*b + a*b\nunused = sqrt(x)",
         "output": "2*x*b + sin(F)",
         "parameters": {"a": 1.0, "b": 2.0},
     }
     ends = generate_program(make_system(document)).instructions.ends
-    # exp; sin, product; x*b, difference with product, difference; 2*x, sum with product.
-    assert np.diff(ends, prepend=0).tolist() == [1, 2, 3, 2]
+    # exp, a*b; sin, product; x*b, difference with product, difference, sum; 2*x, sum with product.
+    assert np.diff(ends, prepend=0).tolist() == [2, 2, 4, 2]
 
 
 def test_a_delay_of_a_linear_signal_is_exact_between_samples() -> None:
