@@ -177,6 +177,36 @@ def test_a_clipped_tank_loses_its_overflow_like_the_built_in_one() -> None:
     assert ours.max() == 4.0
 
 
+def test_a_limit_of_a_state_holds_in_both_directions() -> None:
+    ours = example("second-order")
+    values = np.array([0.5, 4.0, 200.0, 0.0, 0.0])
+    limited = ours.simulate(values, {"state-clip:x": 0.05})
+    assert (limited.min(), limited.max()) == (-0.05, 0.05)
+    assert np.ptp(ours.simulate(values)) > 0.2
+
+
+def test_effects_enter_where_the_file_says() -> None:
+    """A state that is the integral of another state has no balance; the shaft has its own unit of force."""
+    motor = example("dc-motor")
+    names = {each.name for each in motor.simulator.state_effects}
+    assert names == {
+        f"{effect}:{state}" for effect in ("input-offset", "state-clip") for state in ("i", "omega")
+    }
+    coordinate = motor.context.force_coordinate
+    assert (coordinate.unit, coordinate.force_unit) == ("rad", "N m")
+    assert 0.0 < coordinate.force < 0.05 * motor.context.input_peak
+
+
+def test_a_recording_that_diverges_fails_its_point_only() -> None:
+    record = islands.join((make_record("second-order"), make_record("second-order")))
+    both = extend(make_simulator(path_of("second-order"), record), record)
+    points = np.tile(both.nominal, (2, 1))
+    points[1, [each.name for each in both.parameters].index("initial x (recording 2)")] = 1e9
+    found = both.simulate_batch(points)
+    assert np.isnan(found).all(axis=1).tolist() == [False, True]
+    assert np.array_equal(found[0], both.simulate(points[0]))
+
+
 def test_the_piezo_agrees_with_the_built_in_one() -> None:
     ours, theirs = example("bouc-wen-piezo"), built_in("bouc-wen-piezo")
     difference = ours.simulate(ours.nominal) - theirs.simulate(theirs.nominal)
@@ -210,6 +240,8 @@ def test_tolerances_are_those_of_the_file() -> None:
     expected = {"R": 0.05, "L": 0.1, "K": 0.03, "J": 0.05}
     assert get_tolerances(ResampledSimulator(simulator)) == expected
     assert get_tolerances(built_in("bouc-wen-piezo").simulator) == {}
+    with pytest.raises(SettingsError, match="the tolerance of R is a fraction"):  # given ones take precedence
+        islands.diagnose(make_record("dc-motor"), simulator, tolerance={"R": 2.0})
 
 
 def test_the_example_of_the_guide_is_the_motor() -> None:
