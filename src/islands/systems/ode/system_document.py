@@ -29,6 +29,9 @@ MAX_STATES = 40
 #: Largest number of integration steps per sample.
 MAX_STEPS = 256
 
+#: Largest number of variables.
+MAX_VARIABLES = 200
+
 #: Largest number of parameters.
 MAX_PARAMETERS = 100
 
@@ -124,6 +127,7 @@ def _make_force(document: Mapping[str, Any]) -> OdeForce | None:
 def _check_sizes(system: OdeSystem) -> None:
     for count, most, what in (
         (len(system.states), MAX_STATES, "states"),
+        (len(system.variables), MAX_VARIABLES, "variables"),
         (len(system.parameters), MAX_PARAMETERS, "parameters"),
     ):
         if count > most:

@@ -108,6 +108,7 @@ def test_other_values_keep_everything_else() -> None:
         ({"channels": ["F", "T"]}, "'F' is defined 2 times"),
         ({"channels": ["T"], "input": "G"}, "unknown name 'F'"),
         ({"equations": "".join(f"dx{i}/dt = F\n" for i in range(41))}, "41 states, and 40 is the most"),
+        ({"equations": "".join(f"a{i} = a{i + 1}\n" for i in range(999))}, "999 variables, and 200"),
     ],
 )
 def test_a_mistake_in_a_document_is_reported(fields: dict[str, Any], message: str) -> None:
