@@ -59,7 +59,7 @@ def draw_over_time(diagnosis: Diagnosis) -> Figure:
     sections, because the loops of the complete record cannot be distinguished.
     """
     record = diagnosis.record
-    section = representative_window(record, record.y - diagnosis.base.output)
+    section = representative_window(record, fill_gaps(record.y - diagnosis.base.output))
     if section is None:
         figure = blank(4.6, "Measured and simulated output")
         axes = figure.subplots(2, 1, height_ratios=(2, 1.3))

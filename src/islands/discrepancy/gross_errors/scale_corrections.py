@@ -48,7 +48,7 @@ def correct_output_unit(record: Dataset) -> Iterator[Correction]:
             "output-unit",
             replace(record, y=record.y / factor),
             f"The output {name} seems to be in another unit than that of the simulation: {words}",
-            f"Divide column {name} by {factor:.6g}, or give the parameters of the simulation in its unit.",
+            _advise(name, factor),
             {"factor": (factor, "")},
             scale=1.0 / factor,
         )
@@ -64,7 +64,7 @@ def correct_input_unit(record: Dataset) -> Iterator[Correction]:
             "input-unit",
             replace(record, u=u),
             f"The input {name} seems to be in another unit than that of the simulation: {words}",
-            f"Divide column {name} by {factor:.6g}, or give the parameters of the simulation in its unit.",
+            _advise(name, factor),
             {"factor": (factor, "")},
         )
 
@@ -75,6 +75,14 @@ def _list_factors(name: str) -> Iterator[tuple[float, str]]:
         for factor in (size, 1.0 / size):
             many = f"{factor:.6g} times" if factor > 1.0 else f"1/{size:.6g} of"
             yield factor, f"{name} is {many} the value that the simulation expects, as between {example}."
+
+
+def _advise(name: str, factor: float) -> str:
+    """Return the advice to correct a signal that was multiplied by a factor."""
+    change = f"Divide column {name} by {factor:.6g}"
+    if factor < 1.0:
+        change = f"Multiply column {name} by {1.0 / factor:.6g}"
+    return f"{change}, or give the parameters of the simulation in its unit."
 
 
 def correct_sign(record: Dataset) -> Iterator[Correction]:

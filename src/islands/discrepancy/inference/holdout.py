@@ -79,8 +79,9 @@ def measure_gain(
     y = record.y[holdout][is_known]
     output_range = float(np.ptp(y)) or 1.0
     errors = [np.array(y - simulated[holdout][is_known]) for simulated in (before, after)]
-    squares = [_sum_by_block(each**2, BLOCKS) for each in errors]
-    drawn = rng.integers(0, BLOCKS, (BOOTSTRAP_SAMPLES, BLOCKS))
+    blocks = min(BLOCKS, y.size)
+    squares = [_sum_by_block(each**2, blocks) for each in errors]
+    drawn = rng.integers(0, blocks, (BOOTSTRAP_SAMPLES, blocks))
     reductions = 100 * (1 - np.sqrt(squares[1][drawn].sum(axis=1) / squares[0][drawn].sum(axis=1)))
     low, high = np.quantile(reductions, [0.025, 0.975])
     rmse = [float(np.sqrt(np.mean(each**2))) for each in errors]
