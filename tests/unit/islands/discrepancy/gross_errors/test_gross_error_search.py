@@ -141,10 +141,12 @@ def test_free_parameters_absorb_a_unit_but_not_the_sign() -> None:
     assert flipped.best.values[0] == pytest.approx(0.5, rel=0.05)
 
 
+@pytest.mark.ci
 def test_short_delay_is_an_effect_and_no_gross_error() -> None:
     assert run(move(RECORD, 5)).verdict != Verdict.GROSS_ERROR
 
 
+@pytest.mark.ci
 def test_corrected_simulation_is_shown_in_the_unit_of_the_record() -> None:
     found = run(replace(RECORD, y=1e3 * RECORD.y))
     residual = found.record.y - found.best.output
