@@ -19,7 +19,7 @@ def percentages(scores: dict[str, Any]) -> dict[str, float]:
 
 def test_invalid_trials_are_rejected() -> None:
     assert "cannot inject gravity" in fail("trials", "--effects", "gravity")
-    assert "take white or ar" in fail("trials", "--noise", "pink")
+    assert "unknown noise 'purple'" in fail("trials", "--noise", "purple")
     assert "unknown core 'gravity'" in fail("trials", "--core", "gravity")
     assert "2 effects at once" in fail("trials", "--effects", "offset", "--pairs", 1)
 

@@ -15,6 +15,7 @@ from islands.errors import SettingsError, lookup
 from islands.figures.confusion import draw_confusion
 from islands.figures.style import save
 from islands.performance.trials.cases import CASES, SimulatedCase
+from islands.performance.trials.injection.noise import NOISES
 from islands.performance.trials.scoring import (
     Proportion,
     ReliabilityBin,
@@ -32,9 +33,6 @@ BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
 #: Band of effects that are injected together.
 COMBINED_BAND = BANDS[1]
 
-#: Pole of coloured noise.
-POLE = 0.9
-
 
 def trials(
     cores: Annotated[
@@ -49,7 +47,9 @@ def trials(
         ),
     ] = None,
     count: Annotated[int, typer.Option("--count", min=1, help="Trials of each effect.")] = 3,
-    noise: Annotated[str, typer.Option("--noise", help="white or ar.")] = "white",
+    noise: Annotated[
+        str, typer.Option("--noise", help=f"Kind of the measurement noise: {', '.join(NOISES)}.")
+    ] = "white",
     clean: Annotated[int, typer.Option("--clean", min=0, help="Records without an effect.")] = 20,
     pairs: Annotated[int, typer.Option("--pairs", min=0, help="Records with two effects.")] = 0,
     triples: Annotated[int, typer.Option("--triples", min=0, help="Records with three effects.")] = 0,
@@ -78,9 +78,7 @@ def trials(
 ) -> None:
     """Inject effects into simulated records, diagnose them, and count how often they are found and named."""
     cases = {name: lookup(CASES, name, "core") for name in cores or [next(iter(CASES))]}
-    if noise not in ("white", "ar"):
-        raise SettingsError(f"--noise {noise}: take white or ar")
-    pole = POLE if noise == "ar" else 0.0
+    lookup(NOISES, noise, "noise")
     planned: list[Trial] = []
     for core, simulated in cases.items():
         names, rng = _select_effects(effects, simulated), np.random.default_rng(seed)
@@ -89,7 +87,7 @@ def trials(
             injected: Sequence[str], turn: int, band: tuple[float, float] | None = None, core: str = core
         ) -> Trial:
             other_form = variant and band is not None
-            return Trial(tuple(injected), seed + turn, pole, band, other_form, seconds, core, oracle=True)
+            return Trial(tuple(injected), seed + turn, noise, band, other_form, seconds, core, oracle=True)
 
         planned += [trial((name,), turn, BANDS[turn % len(BANDS)]) for name in names for turn in range(count)]
         planned += [trial((), turn) for turn in range(clean)]

@@ -146,6 +146,14 @@ CASES: Mapping[str, SimulatedCase] = MappingProxyType(
         "second-order": SimulatedCase(
             OSCILLATOR, _with_estimated_parameters("second-order"), EXACT, {}, free=True
         ),
+        "linear": SimulatedCase(
+            OSCILLATOR,
+            _with_estimated_parameters("linear:2"),
+            EXACT,
+            {},
+            free=True,
+            without=frozenset(("offset", "gain-step", "ageing")),
+        ),
         "cascaded-tanks": SimulatedCase(
             TANKS, _with_estimated_parameters("cascaded-tanks"), EXACT, {}, free=True
         ),

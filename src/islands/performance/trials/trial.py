@@ -32,8 +32,8 @@ class Trial:
     effects : tuple of str
         Names of the injected faults; empty for a clean record.
     seed : int
-    pole : float
-        Pole of the first-order noise model; 0 is white noise.
+    noise : str
+        Kind of the measurement noise.
     band : tuple of float or None
         Bounds of the misfit of each fault, in standard deviations of the noise.
     variant : bool
@@ -48,7 +48,7 @@ class Trial:
 
     effects: tuple[str, ...]
     seed: int
-    pole: float = 0.0
+    noise: str = "white"
     band: tuple[float, float] | None = None
     variant: bool = False
     seconds: float | None = None
@@ -136,7 +136,7 @@ def run_trial(trial: Trial) -> TrialOutcome:
         trial.effects,
         np.random.default_rng([trial.seed, *map(ord, "".join(trial.effects))]),
         trial.seconds,
-        trial.pole,
+        trial.noise,
         trial.band,
         trial.variant,
         simulated.system,

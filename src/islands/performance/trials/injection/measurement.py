@@ -1,7 +1,7 @@
 """Simulated measurements of a plant with injected faults: decimated and with noise."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -9,6 +9,7 @@ import scipy
 from islands.data.dataset import Dataset
 from islands.performance.trials.injection.excitation import Excitation, Signal
 from islands.performance.trials.injection.faults import Fault, Inject, alter_parameter
+from islands.performance.trials.injection.noise import FED_BACK, NOISES
 from islands.performance.trials.injection.piezo import PIEZO
 from islands.performance.trials.injection.plant import Plant, simulate_plant
 from islands.performance.trials.injection.rig import Rig
@@ -38,6 +39,12 @@ _MAX_DRAWS = 5
 
 #: Largest number of records that are drawn.
 _MAX_RECORDS = 10
+
+#: Static gain of a closed loop.
+_LOOP_GAIN = 0.7
+
+#: Iterations of the closed loop.
+_LOOP_ITERATIONS = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +76,7 @@ def inject(
     names: Sequence[str],
     rng: np.random.Generator,
     seconds: float | None = None,
-    pole: float = 0.0,
+    noise: str = "white",
     band: tuple[float, float] | None = None,
     variant: bool = False,
     system: Rig = PIEZO,
@@ -85,8 +92,8 @@ def inject(
     rng : Generator
     seconds : float, optional
         Length of the record; the default of the system if not given.
-    pole : float
-        Pole of the first-order noise model at the sampling rate of the record; 0 is white noise.
+    noise : str
+        Kind of the measurement noise, an entry of `NOISES`.
     band : tuple of float, optional
         Bounds of the misfit of each fault alone, in standard deviations of the noise.
     variant : bool
@@ -123,10 +130,12 @@ def inject(
     else:
         raise ValueError(f"{' and '.join(names)} cannot be injected with a misfit within {band} sigma")
     y = observer.clean if faulty is plant else observer.simulate(faulty)
-    noise = observer.sigma * _draw_noise(rng, y.size, pole)
+    errors = observer.sigma * NOISES[noise](rng, y)
+    fed_back = _close_loop(system, faulty, drive, errors) if noise in FED_BACK else drive
+    measured = y if fed_back is drive else simulate_plant(faulty, fed_back)[:: system.decimation]
     record = Dataset(
-        u=np.column_stack([drive.u, drive.temperature, drive.neighbour])[:: system.decimation],
-        y=y + noise,
+        u=np.column_stack([fed_back.u, drive.temperature, drive.neighbour])[:: system.decimation],
+        y=measured + errors,
         dt=system.decimation / drive.rate,
         input_names=(system.input[0], "T_K", system.neighbour[0]),
         input_units=(system.input[1], "K", system.neighbour[1]),
@@ -256,7 +265,20 @@ def _find_strength(
     return None
 
 
-def _draw_noise(rng: np.random.Generator, count: int, pole: float) -> Signal:
-    white = rng.standard_normal(count + 1000)
-    coloured: Signal = scipy.signal.lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], white)
-    return coloured[1000:]
+def _close_loop(system: Rig, plant: Plant, drive: Excitation, errors: Signal) -> Excitation:
+    """Return the excitation of a plant under feedback of the deviation from its output without noise.
+
+    The controller filters the noisy samples and acts one sample later. A loop gain below 1 makes the
+    fixed-point iteration over the whole record converge.
+    """
+    dt = system.decimation / drive.rate
+    decay = np.exp(-dt / system.controller_lag)
+    gain = _LOOP_GAIN * drive.peak_input / drive.peak_output
+    times = drive.time[:: system.decimation]
+    reference = simulate_plant(plant, drive)[:: system.decimation]
+    closed = drive
+    for _ in range(_LOOP_ITERATIONS):
+        deviation = simulate_plant(plant, closed)[:: system.decimation] + errors - reference
+        action = scipy.signal.lfilter([0.0, gain * (1.0 - decay)], [1.0, -decay], -deviation)
+        closed = replace(drive, u=drive.u + np.interp(drive.time, times, action))
+    return closed

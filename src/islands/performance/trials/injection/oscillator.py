@@ -112,6 +112,7 @@ OSCILLATOR = Rig(
     excitation=_draw_excitation,
     seconds=20.0,
     decimation=10,
+    controller_lag=0.2,
     noise=0.003,
     input=("F_N", "N"),
     output=("x_mm", "mm"),

@@ -115,6 +115,7 @@ PIEZO = Rig(
     excitation=_draw_excitation,
     seconds=60.0,
     decimation=10,
+    controller_lag=0.1,
     noise=0.003,
     input=("u_V", "V"),
     output=("y_um", "um"),

@@ -29,6 +29,8 @@ class Rig:
         Default length of a record.
     decimation : int
         Number of plant samples per recorded sample.
+    controller_lag : float
+        Time constant in seconds of the low-pass filter of the controller of records in closed loop.
     noise : float
         Standard deviation of the measurement noise relative to the typical largest output.
     input, output : tuple of str
@@ -46,6 +48,7 @@ class Rig:
     excitation: Callable[[np.random.Generator, float], Excitation]
     seconds: float
     decimation: int
+    controller_lag: float
     noise: float
     input: tuple[str, str]
     output: tuple[str, str]

@@ -173,6 +173,7 @@ TANKS = Rig(
     excitation=_draw_excitation,
     seconds=4096.0,
     decimation=10,
+    controller_lag=20.0,
     noise=0.003,
     input=("u_V", "V"),
     output=("y_V", "V"),
