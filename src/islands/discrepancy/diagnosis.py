@@ -203,12 +203,12 @@ def diagnose(
     else:
         outcome = search_with_ar_noise(base, screened, target, effects, progress, parallel_map)
     progress("analysing the residual", 0.9)
-    outcome = assess_evidence(outcome, fitted, rng)
+    outcome = assess_evidence(outcome, fitted, effects, rng)
     if outcome.verdict == Verdict.UNKNOWN or (
         outcome.verdict == Verdict.NOTHING and outcome.hypothesis.fit.noise.order
     ):
         model_error = search_with_model_error(base, target, effects, progress, parallel_map)
-        second = assess_evidence(model_error, fitted, rng)
+        second = assess_evidence(model_error, fitted, effects, rng)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome
     found = _make_diagnosis(record, outcome, base, effects, fitted, rng, progress, parallel_map)
     closed_loop = find_closed_loop(found.best, record.y, fitted, record.input_names[0])

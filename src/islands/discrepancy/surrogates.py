@@ -5,10 +5,9 @@ from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
-import scipy
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.noise_model import NoiseModel, fit_ar_noise
+from islands.discrepancy.calibration.noise_model import NoiseModel, fit_noise
 from islands.discrepancy.calibration.preparation import select_effects
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.inference.screening import transfer_parameters
@@ -119,9 +118,8 @@ class Surrogates:
         warm_up = self.record.samples
         # The stream differs from that of the diagnosis with the same seed.
         rng = np.random.default_rng([seed, 1])
-        poles = np.concatenate([[1.0], -self.noise.coefficients])
         parts = [
-            scipy.signal.lfilter([1.0], poles, rng.standard_normal(warm_up + length))[warm_up:]
+            self.noise.colour(rng.standard_normal(warm_up + length))[warm_up:]
             for length in self.record.segments
         ]
         noise: Signal = np.sqrt(self.noise.variance) * np.concatenate(parts)
@@ -158,7 +156,7 @@ def make_surrogates(diagnosis: Diagnosis, simulator: Simulator, tolerance: Mappi
         tolerance,
         simulation,
         transfer_parameters(best.values, best.simulation, simulation),
-        _limit_poles(fit_ar_noise(residual, segments=runs), diagnosis.record.samples),
+        fit_noise(residual, segments=runs).limit_poles(diagnosis.record.samples / _MIN_TIME_CONSTANTS),
         float(np.sqrt(np.mean(residual**2))),
         diagnosis.estimation_samples,
     )
@@ -226,18 +224,3 @@ def injection_strengths(
         injections.append(injection)
         low = high
     return tuple(injections)
-
-
-def _limit_poles(noise: NoiseModel, samples: int) -> NoiseModel:
-    """Limit the time constants of a noise model to a fraction of the record.
-
-    A model that was fitted to a drift may have a pole on or outside the unit circle.
-    """
-    if noise.order == 0:
-        return noise
-    largest_pole = float(np.max(np.abs(np.roots(np.concatenate([[1.0], -noise.coefficients])))))
-    limit = 1.0 - _MIN_TIME_CONSTANTS / samples
-    if largest_pole <= limit:
-        return noise
-    factors = (limit / largest_pole) ** np.arange(1, noise.order + 1)
-    return replace(noise, coefficients=noise.coefficients * factors)

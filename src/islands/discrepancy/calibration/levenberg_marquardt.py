@@ -6,7 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.discrepancy.calibration.noise_model import NoiseModel, fit_ar_noise, white_noise
+from islands.discrepancy.calibration.noise_model import (
+    NoiseModel,
+    fit_noise,
+    fit_whitening,
+    white_noise,
+)
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.segments import find_bounds
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -61,6 +66,16 @@ class Target:
             for first, last in find_bounds(self.segments, self.y.size)
         )
         return tuple(count for count in counts if count)
+
+    @property
+    def prior_weight(self) -> float:
+        """Weight of a squared prior deviation relative to a squared residual of unit variance.
+
+        A residual of which neighbouring samples are alike has less information than it has samples.
+        """
+        if self.effective_samples is None:
+            return 1.0
+        return float(np.count_nonzero(self.estimation_part)) / self.effective_samples
 
     def select(self, signal: Signal) -> Signal:
         """Return the whitened signal over the estimation part."""
@@ -125,6 +140,7 @@ def calibrate(
     """
     lower, upper = simulation.bounds
     inverse_std, nominal = prior_precision(simulation, target.prior_std)
+    inverse_std = inverse_std * target.prior_weight**0.5
     scales = simulation.scales
     values = np.clip(start, lower, upper)
     output = simulation.simulate(values)
@@ -169,11 +185,17 @@ def evaluate_fit(simulation: ExtendedSimulator, target: Target, values: Signal) 
     penalty = float(np.sum((inverse_std * (values - nominal)) ** 2))
     mean_square = float(np.mean(residual**2))
     noise = (
-        fit_ar_noise(residual, segments=target.fitted_segments)
+        fit_noise(residual, segments=target.fitted_segments)
         if target.effective_samples is None
         else white_noise(mean_square, target.effective_samples)
     )
     return CalibrationResult(simulation, values, output, mean_square, noise, penalty)
+
+
+def whiten_target(target: Target, fit: CalibrationResult) -> Target:
+    """Return a target that whitens residuals with a noise model of the residual of a fit."""
+    residual = (target.y - fit.output)[target.estimation_part]
+    return replace(target, noise=fit_whitening(residual, target.fitted_segments))
 
 
 def estimate_covariance(fit: CalibrationResult, target: Target) -> NDArray[np.float64]:

@@ -1,7 +1,8 @@
-"""Autoregressive noise model, with its order selected by BIC."""
+"""Noise model: fractionally integrated autoregressive noise, with its orders selected by BIC."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -10,30 +11,46 @@ from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.segments import find_bounds, map_segments
 
 #: Maximum order of the autoregression.
-MAX_ORDER = 3
+MAX_ORDER = 16
+
+#: Maximum order of the autoregression that whitens residuals in a calibration.
+WHITENING_ORDER = 3
+
+#: Orders of the fractional difference that are tried. Noise with a spectrum of 1/f has the order 0.5.
+DIFFERENCE_ORDERS = (0.25, 0.5, 0.75)
+
+#: Least order of the autoregression without a difference for which differences are tried. Noise with long
+#: memory needs several time constants, and first-order noise includes the random walk.
+MIN_LONG_MEMORY_ORDER = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NoiseModel:
-    """An autoregression ``r(k) = a1 r(k-1) + ... + e(k)``.
+    """Fractionally integrated autoregression: ``d(k) = a1 d(k-1) + ... + e(k)``, ``d = (1 - q^-1)^D r``.
+
+    The spectrum of the residual r falls with the power 2 D of the frequency, down to the lowest one (Granger
+    and Joyeux, 1980).
 
     Attributes
     ----------
-    coefficients : ndarray, shape (order,)
+    coefficients : ndarray, shape (order of the autoregression,)
     variance : float
         Variance of the innovations ``e``.
     effective_samples : float
         Effective sample size of the residual.
+    difference_order : float
+        Order D of the fractional difference; 0 for noise without long memory.
     """
 
     coefficients: Signal
     variance: float
     effective_samples: float
+    difference_order: float = 0.0
 
     @property
     def order(self) -> int:
-        """Order of the autoregression; 0 for white noise."""
-        return int(self.coefficients.size)
+        """Number of values that describe the colour of the noise; 0 for white noise."""
+        return int(self.coefficients.size) + (self.difference_order != 0.0)
 
     @property
     def minus_twice_log_likelihood(self) -> float:
@@ -42,16 +59,51 @@ class NoiseModel:
             np.log(self.effective_samples)
         )
 
+    @property
+    def largest_pole(self) -> float:
+        """Largest magnitude of the poles of the autoregression; 0 without one."""
+        poles = np.roots(self._polynomial)
+        return float(np.max(np.abs(poles), initial=0.0))
+
+    @property
+    def _polynomial(self) -> Signal:
+        return np.concatenate([[1.0], -self.coefficients])
+
     def whiten(self, signal: Signal, segments: Sequence[int] = ()) -> Signal:
         """Filter a signal with the inverse of the noise model; the filter starts at rest in every segment."""
         if self.order == 0:
             return signal
-        inverse = np.concatenate([[1.0], -self.coefficients])
-        return map_segments(lambda part: scipy.signal.lfilter(inverse, [1.0], part), signal, segments)
+
+        def whiten_segment(part: Signal) -> Signal:
+            part = take_fractional_difference(part, self.difference_order)
+            return scipy.signal.lfilter(self._polynomial, [1.0], part)
+
+        return map_segments(whiten_segment, signal, segments)
+
+    def colour(self, innovations: Signal) -> Signal:
+        """Filter innovations with the noise model, which starts at rest; the inverse of `whiten`."""
+        filtered = scipy.signal.lfilter([1.0], self._polynomial, innovations)
+        return take_fractional_difference(filtered, -self.difference_order)
+
+    def limit_poles(self, time_constant: float) -> "NoiseModel":
+        """Return the model with time constants of at most ``time_constant`` samples.
+
+        A model that was fitted to a drift may have a pole on or outside the unit circle.
+        """
+        largest_pole, limit = self.largest_pole, 1.0 - 1.0 / time_constant
+        if largest_pole <= limit:
+            return self
+        factors = (limit / largest_pole) ** np.arange(1, self.coefficients.size + 1)
+        return replace(self, coefficients=self.coefficients * factors)
 
 
-def fit_ar_noise(residual: Signal, max_order: int = MAX_ORDER, segments: Sequence[int] = ()) -> NoiseModel:
-    """Fit an autoregression by least squares and select its order by BIC.
+def fit_noise(
+    residual: Signal,
+    max_order: int = MAX_ORDER,
+    segments: Sequence[int] = (),
+    difference_orders: Sequence[float] = DIFFERENCE_ORDERS,
+) -> NoiseModel:
+    """Fit a noise model by least squares and select its orders by BIC.
 
     Parameters
     ----------
@@ -61,19 +113,49 @@ def fit_ar_noise(residual: Signal, max_order: int = MAX_ORDER, segments: Sequenc
         Maximum order of the autoregression.
     segments : sequence of int
         Lengths of the recordings in samples; no equation reaches from one into the next.
+    difference_orders : sequence of float
+        Orders of the fractional difference that are tried.
     """
+    if np.isnan(residual).any():  # the simulation has diverged
+        return NoiseModel(np.zeros(0), float("inf"), residual.size)
+    best = _fit_autoregression(residual, 0.0, max_order, segments)
+    if best.order >= MIN_LONG_MEMORY_ORDER:
+        for difference_order in difference_orders:
+            candidate = _fit_autoregression(residual, difference_order, max_order, segments)
+            if candidate.minus_twice_log_likelihood < best.minus_twice_log_likelihood:
+                best = candidate
+    return best
+
+
+def fit_whitening(residual: Signal, segments: Sequence[int] = ()) -> NoiseModel:
+    """Fit the noise model that whitens residuals in a calibration: an autoregression of low order.
+
+    The model of `fit_noise` decides between hypotheses. As a filter it can reduce the response to a jump to a
+    few samples, and then a calibration does not find its instant.
+    """
+    return fit_noise(residual, WHITENING_ORDER, segments, ())
+
+
+def _fit_autoregression(
+    residual: Signal, difference_order: float, max_order: int, segments: Sequence[int]
+) -> NoiseModel:
+    """Fit an autoregression to a fractional difference of the residual."""
     best: NoiseModel | None = None
     n = residual.size
-    if np.isnan(residual).any():  # the simulation has diverged
-        return NoiseModel(np.zeros(0), float("inf"), n)
+    difference = map_segments(
+        lambda part: take_fractional_difference(part, difference_order), residual, segments
+    )
     # All orders use the same equations, so that the inner products of all lags are computed once.
+    lengths = [last - first for first, last in find_bounds(segments, n)]
+    if sum(max(length - max_order, 0) for length in lengths) < n // 2:  # gaps leave short segments
+        max_order = min(max_order, WHITENING_ORDER)
     bounds = [(first, last) for first, last in find_bounds(segments, n) if last - first > max_order]
     if not bounds:  # gaps leave no equation
         return white_noise(float(np.mean(residual**2)), n)
-    later = np.concatenate([residual[first + max_order : last] for first, last in bounds])
+    later = np.concatenate([difference[first + max_order : last] for first, last in bounds])
     lagged = np.column_stack(
         [
-            np.concatenate([residual[first + max_order - lag : last - lag] for first, last in bounds])
+            np.concatenate([difference[first + max_order - lag : last - lag] for first, last in bounds])
             for lag in range(1, max_order + 1)
         ]
     )
@@ -85,11 +167,25 @@ def fit_ar_noise(residual: Signal, max_order: int = MAX_ORDER, segments: Sequenc
             coefficients = np.asarray(np.linalg.lstsq(gram[:order, :order], moment[:order], rcond=None)[0])
             remaining = energy - float(coefficients @ moment[:order])
         variance = max(remaining / later.size, np.finfo(float).tiny)
-        candidate = NoiseModel(coefficients, variance, n)
+        candidate = NoiseModel(coefficients, variance, n, difference_order)
         if best is None or candidate.minus_twice_log_likelihood < best.minus_twice_log_likelihood:
             best = candidate
     assert best is not None
     return best
+
+
+def take_fractional_difference(signal: Signal, order: float) -> Signal:
+    """Return ``(1 - q^-1)^order`` times a signal that is zero before its first sample."""
+    if order == 0.0:
+        return signal
+    return np.array(scipy.signal.fftconvolve(signal, _make_weights(order, signal.size))[: signal.size])
+
+
+@lru_cache(maxsize=16)
+def _make_weights(order: float, count: int) -> Signal:
+    """Return the impulse response of the fractional difference (Hosking, 1981, equation 2)."""
+    lags = np.arange(1, count)
+    return np.concatenate([[1.0], np.cumprod((lags - 1 - order) / lags)])
 
 
 def white_noise(mean_square: float, samples: float) -> NoiseModel:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.channel_names import simplify_unit
-from islands.discrepancy.calibration.noise_model import fit_ar_noise
+from islands.discrepancy.calibration.noise_model import fit_noise
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 from islands.discrepancy.interfaces.segments import find_bounds, is_resting
 
@@ -147,7 +147,7 @@ def _whiten(residual: Signal, context: SimulationContext) -> tuple[Signal, NDArr
     The filter starts at rest, so that these samples are not innovations. Those of a single recording are too
     few to matter.
     """
-    noise = fit_ar_noise(residual, segments=context.segments)
+    noise = fit_noise(residual, segments=context.segments)
     is_innovation = np.ones(residual.size, dtype=bool)
     for first, _ in find_bounds(context.segments, residual.size)[1:]:
         is_innovation[first : first + noise.order] = False
@@ -226,13 +226,19 @@ HETEROSCEDASTIC_NOISE = NoiseDetector(
 
 
 def _detect_coloured_noise(_y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
-    noise = fit_ar_noise(residual, segments=context.segments)
+    noise = fit_noise(residual, segments=context.segments)
     if noise.order == 0:
         return None
     white = residual.size * float(np.log(np.mean(residual**2)))
     score_gain = white - noise.minus_twice_log_likelihood
-    pole = float(np.max(np.abs(np.roots(np.concatenate([[1.0], -noise.coefficients])))))
-    return NoiseFinding({"pole": (pole, ""), "order": (float(noise.order), "")}, score_gain)
+    return NoiseFinding(
+        {
+            "pole": (noise.largest_pole, ""),
+            "order": (float(noise.coefficients.size), ""),
+            "difference order": (noise.difference_order, ""),
+        },
+        score_gain,
+    )
 
 
 COLOURED_NOISE = NoiseDetector(

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
+from islands.discrepancy.inference.noise_surrogates import Randomisation, draw_surrogates
 from islands.discrepancy.interfaces.effect import Signal
-from islands.discrepancy.interfaces.segments import find_bounds
+from islands.discrepancy.interfaces.segments import find_bounds, take_backward_differences
 from islands.systems.hysteresis_operators import play_from
 
 #: Lags of the features, in samples.
@@ -30,6 +31,12 @@ FOLDS = 6
 #: Ridge parameters.
 RIDGES = (1e-4, 1e-2, 1.0)
 
+#: Fraction of the residual's mean square that regression does not predict by chance in white noise.
+MIN_FRACTION = 0.05
+
+#: Number of surrogates that a prediction of coloured noise is compared with.
+SURROGATES = 39
+
 #: Minimum length of a period, in samples.
 MIN_PERIOD = 16
 
@@ -48,7 +55,8 @@ def explainable_variance(
 
     The features are lags, rates, low-pass filters, plays and random cosines of the input and the simulated
     output. Features do not reach across the boundary of two recordings; folds, which are contiguous
-    blocks, may contain one.
+    blocks, may contain one. If a surrogate of the residual is predicted as well, by chance, the result is
+    zero.
 
     Parameters
     ----------
@@ -61,28 +69,58 @@ def explainable_variance(
     """
     is_known = ~np.isnan(residual)
     raw, residual = _make_features(u, simulated, segments)[is_known], residual[is_known]
+    designs = _make_designs(raw, rng)
+    explained = float(_predict_mean_square(designs, residual[:, None])[0])
+    if explained <= MIN_FRACTION * float(np.mean(residual**2)):
+        return explained
+    runs = count_runs(is_known, segments)
+    surrogates = draw_surrogates(residual, runs, Randomisation.PHASES, SURROGATES, rng.spawn(1)[0])
+    by_chance = _predict_mean_square(designs, np.column_stack(list(surrogates)))
+    return explained if explained > float(np.max(by_chance)) else 0.0
+
+
+def _make_designs(raw: Signal, rng: np.random.Generator) -> list[Signal]:
+    """Return the features of all samples, once for each frequency scale of the random cosines."""
     raw = (raw - raw.mean(axis=0)) / (raw.std(axis=0) + 1e-12)
     left, singular_values, _ = np.linalg.svd(raw, full_matrices=False)
     axes = left[:, singular_values > 1e-6 * singular_values[0]] * np.sqrt(len(raw))
-    fold = np.arange(residual.size) * FOLDS // residual.size
-    total = float(residual @ residual)
-    best = total
+    designs = []
     for scale in FREQUENCY_SCALES:
         frequencies = (
             rng.standard_normal((axes.shape[1], RANDOM_FEATURES)) * 2 * scale / np.sqrt(axes.shape[1])
         )
         cosines = np.cos(axes @ frequencies + rng.uniform(0.0, 2 * np.pi, RANDOM_FEATURES))
-        design = np.column_stack([np.ones(len(axes)), axes, cosines])
+        designs.append(np.column_stack([np.ones(len(axes)), axes, cosines]))
+    return designs
+
+
+def _predict_mean_square(designs: Sequence[Signal], residuals: Signal) -> Signal:
+    """Return the part of each residual's mean square that the best of all regressions predicts.
+
+    Parameters
+    ----------
+    designs : sequence of ndarray, each of shape (samples, features)
+    residuals : ndarray, shape (samples, residuals)
+
+    Returns
+    -------
+    ndarray, shape (residuals,)
+    """
+    samples = len(residuals)
+    fold = np.arange(samples) * FOLDS // samples
+    total = np.sum(residuals**2, axis=0)
+    best = total
+    for design in designs:
         grams = [design[fold == each].T @ design[fold == each] for each in range(FOLDS)]
-        moments = [design[fold == each].T @ residual[fold == each] for each in range(FOLDS)]
+        moments = [design[fold == each].T @ residuals[fold == each] for each in range(FOLDS)]
         for ridge in RIDGES:
-            squared_error = 0.0
+            squared_error = np.zeros(total.size)
             for each in range(FOLDS):
-                gram = sum(grams) - grams[each] + ridge * residual.size * np.eye(design.shape[1])
+                gram = sum(grams) - grams[each] + ridge * samples * np.eye(design.shape[1])
                 weights = scipy.linalg.solve(gram, sum(moments) - moments[each], assume_a="pos")
-                squared_error += float(np.sum((residual - design @ weights)[fold == each] ** 2))
-            best = min(best, squared_error)
-    return (total - best) / residual.size
+                squared_error += np.sum((residuals - design @ weights)[fold == each] ** 2, axis=0)
+            best = np.minimum(best, squared_error)
+    return (total - best) / samples
 
 
 def _make_features(u: Signal, simulated: Signal, segments: Sequence[int]) -> Signal:
@@ -92,7 +130,7 @@ def _make_features(u: Signal, simulated: Signal, segments: Sequence[int]) -> Sig
 
 def _make_features_of_signal(signal: Signal, segments: Sequence[int]) -> Signal:
     parts = [signal[first:last] for first, last in find_bounds(segments, signal.size)]
-    rates = [np.gradient(part) for part in parts]
+    rates = [take_backward_differences(part) for part in parts]
     rate_scale = 0.1 * float(np.std(np.concatenate(rates))) + 1e-12
     widths = [width * float(np.std(signal)) for width in PLAY_WIDTHS]
     return np.concatenate(

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.discrepancy.calibration.noise_model import fit_ar_noise
+from islands.discrepancy.calibration.noise_model import fit_noise
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
-from islands.discrepancy.interfaces.segments import count_runs, map_segments
+from islands.discrepancy.interfaces.segments import count_runs, map_segments, take_backward_differences
 
 #: Number of random circular shifts that give the null distribution of a map.
 SHIFTS = 200
@@ -35,7 +35,7 @@ def find_residual_structure(
     maps = _make_maps(context.u[: residual.size], simulated, context.dt, segments)
     residual, runs = residual[is_known], count_runs(is_known, segments)
     n = residual.size
-    whitened = fit_ar_noise(residual, segments=runs).whiten(residual, runs)
+    whitened = fit_noise(residual, segments=runs).whiten(residual, runs)
     whitened = whitened - whitened.mean()
     if not whitened.any():
         return {}
@@ -62,8 +62,8 @@ def _explained_squares(signal: Signal, cells: NDArray[np.int64]) -> float:
 
 def _make_maps(u: Signal, y: Signal, dt: float, segments: Sequence[int]) -> Mapping[str, NDArray[np.int64]]:
     """Return the cell index of every sample, by name of the map."""
-    rate = map_segments(lambda part: np.gradient(part, dt), u, segments)
-    acceleration = map_segments(lambda part: np.gradient(part, dt), rate, segments)
+    rate = map_segments(take_backward_differences, u, segments) / dt
+    acceleration = map_segments(take_backward_differences, rate, segments) / dt
     direction = (rate > 0.0).astype(np.int64)
     return {
         "input": _assign_cells(u, 24),

@@ -71,7 +71,7 @@ def screen_effects(
     parallel_map : ParallelMap
         Calibrates the extended simulations.
     """
-    projection = _Projection(base, target)
+    projection = Projection(base, target)
     candidates = []
     for effect in effects:
         simulation = base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
@@ -111,7 +111,7 @@ def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSim
     return transferred
 
 
-class _Projection:
+class Projection:
     """Projection of responses onto the orthogonal complement of those that the base's parameters reproduce.
 
     The parameters act through their linearised, whitened responses. The prior of each parameter is one more
@@ -123,6 +123,7 @@ class _Projection:
         self._target, self._values = target, values.size
         self._sigma = float(np.std(target.residual(base.output))) or 1.0
         inverse_std, nominal = prior_precision(simulation, target.prior_std)
+        inverse_std = inverse_std * target.prior_weight**0.5
         columns = []
         for index, scale in enumerate(simulation.scales):
             shifted = values.copy()
@@ -144,6 +145,7 @@ class _Projection:
         return self._samples * float(np.log(float(self.residual @ self.residual) / max(remaining, 1e-300)))
 
     def __call__(self, response: Signal) -> Signal:
+        """Project a response, shape (samples,), followed by a zero for the prior of each parameter."""
         return self._project(self._stack(response, np.zeros(self._values)))
 
     def _project(self, stacked: Signal) -> Signal:
@@ -153,7 +155,7 @@ class _Projection:
         return np.concatenate([self._target.select(response) / self._sigma, prior])
 
 
-def _get_starting_points(
+def get_starting_points(
     effect: Effect, simulation: ExtendedSimulator, residual: Signal
 ) -> Sequence[tuple[float, ...]]:
     """Return the starting points of an effect after checking them."""
@@ -174,7 +176,7 @@ def _find_starts(
     simulation: ExtendedSimulator,
     effect: Effect,
     target: Target,
-    projection: _Projection,
+    projection: Projection,
 ) -> list[tuple[float, Signal]]:
     """Return the starting points that explain most, each with its strength scaled if that explains more.
 
@@ -187,7 +189,7 @@ def _find_starts(
     lower, upper = simulation.bounds
     without_effect = transfer_parameters(base.values, base.simulation, simulation)
     starts = []
-    for point in _get_starting_points(effect, simulation, fill_gaps(target.y - base.output)):
+    for point in get_starting_points(effect, simulation, fill_gaps(target.y - base.output)):
         values = without_effect.copy()
         values[part] = simulation.expand(effect, point)
         response = projection(simulation.simulate(values) - base.output)

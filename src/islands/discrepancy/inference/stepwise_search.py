@@ -6,7 +6,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, whiten_target
 from islands.discrepancy.effects import model_form
 from islands.discrepancy.inference.hypothesis import (
     Alternatives,
@@ -103,7 +103,7 @@ def _refit_with_ar_noise(beam: list[Hypothesis], target: Target) -> tuple[list[H
     """Refit hypotheses, whitened by the noise model of the best one, until its cost stops decreasing."""
     for _ in range(MAX_REFITS if beam and target.effective_samples is None else 0):
         before = beam[0].cost
-        target = replace(target, noise=beam[0].fit.noise)
+        target = whiten_target(target, beam[0].fit)
         beam = sorted((refit(each, target) for each in beam), key=attrgetter("rank"))
         if beam[0].cost > before - SCORE_TIE:
             break

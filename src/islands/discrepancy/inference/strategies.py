@@ -15,19 +15,26 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     Target,
     calibrate,
     evaluate_fit,
+    whiten_target,
 )
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
+from islands.discrepancy.inference.chance_gain import ForwardSelection
 from islands.discrepancy.inference.hypothesis import Hypothesis
-from islands.discrepancy.inference.noise_floor import explainable_variance, noise_variance_from_periods
+from islands.discrepancy.inference.noise_floor import (
+    MIN_FRACTION,
+    explainable_variance,
+    noise_variance_from_periods,
+)
 from islands.discrepancy.inference.residual_structure import find_residual_structure
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.starts_calibrator import make_task_key
-from islands.discrepancy.inference.stepwise_search import MIN_GAIN, stepwise_search
+from islands.discrepancy.inference.stepwise_search import MAX_EFFECTS, MIN_GAIN, stepwise_search
 from islands.discrepancy.inference.verdict import (
     Verdict,
     choose_reference_fit,
     classify,
     explained_fraction,
+    remove_chance_effects,
     validate_out_of_sample,
 )
 from islands.discrepancy.interfaces.effect import Effect
@@ -38,8 +45,9 @@ from islands.evolution.progress import ProgressCallback
 #: explains as much of noise.
 MIN_SINGLE_FRACTION = 0.1
 
-#: Fraction of the residual's mean square that a flexible reference model does not explain by chance.
-MIN_REMAINDER_FRACTION = 0.05
+
+#: Probability that a residual without a cause is searched for model error.
+CHANCE_PROBABILITY = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,11 +98,11 @@ def search_with_ar_noise(
     base, screened : CalibrationResult, sequence of ScreenedEffect
         The simulation without effects, and the effects screened on it by ordinary least squares.
     """
-    noise = best_single(base, screened).noise
-    if noise.order:
+    best = best_single(base, screened)
+    if best.noise.order:
         # Ordinary least squares would fit the coloured noise as well.
         progress("the noise is coloured: repeating with whitened residuals", 0.1)
-        target = replace(target, noise=noise)
+        target = whiten_target(target, best)
         base = calibrate(base.simulation, target, base.values)
         screened = screen_effects(base, target, effects, parallel_map)
     hypothesis, target = stepwise_search(base, screened, target, effects, progress, parallel_map)
@@ -122,6 +130,8 @@ def search_with_model_error(
             target, effective_samples=estimate_effective_samples(residual, target.fitted_segments)
         )
         base = evaluate_fit(base.simulation, target, base.values)
+        if not hypothesis.effects and not _may_have_causes(base, target, effects):
+            break
         screened = screen_effects(base, target, effects, parallel_map)
         if not any(explained_fraction(base, each.fit, 0.0) > MIN_SINGLE_FRACTION for each in screened):
             break
@@ -131,16 +141,21 @@ def search_with_model_error(
     return _make_outcome(base, screened, target, hypothesis)
 
 
-def assess_evidence(outcome: SearchOutcome, fitted: int, rng: np.random.Generator) -> SearchOutcome:
+def assess_evidence(
+    outcome: SearchOutcome, fitted: int, effects: Sequence[Effect], rng: np.random.Generator
+) -> SearchOutcome:
     """Remove effects that fail cross-validation, analyse the residual, and classify the outcome.
 
     Parameters
     ----------
     fitted : int
         Number of samples used for estimation.
+    effects : sequence of Effect
+        Effects that were searched for.
     """
     base, target = outcome.base, outcome.target
-    hypothesis = validate_out_of_sample(outcome.hypothesis, base, target, fitted, rng)
+    hypothesis = remove_chance_effects(outcome.hypothesis, base, target, effects)
+    hypothesis = validate_out_of_sample(hypothesis, base, target, fitted, rng)
     context, output = hypothesis.fit.simulation.context, hypothesis.fit.output[:fitted]
     residual = target.y[:fitted] - output
     explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
@@ -148,7 +163,7 @@ def assess_evidence(outcome: SearchOutcome, fitted: int, rng: np.random.Generato
     mean_square = float(np.mean(residual[target.estimation_part[:fitted]] ** 2))
     measured_floor = noise_variance_from_periods(context.u[:fitted], target.y[:fitted], context.segments)
     floor = max(mean_square - explainable, 0.0) if measured_floor is None else measured_floor
-    has_remainder = bool(structure) or explainable > MIN_REMAINDER_FRACTION * mean_square
+    has_remainder = bool(structure) or explainable > MIN_FRACTION * mean_square
     # Under model error the noise floor is unknown: the fraction refers to the whole misfit.
     explained = explained_fraction(
         choose_reference_fit(hypothesis, base, target),
@@ -166,6 +181,12 @@ def assess_evidence(outcome: SearchOutcome, fitted: int, rng: np.random.Generato
         residual_structure=structure,
         verdict=verdict,
     )
+
+
+def _may_have_causes(base: CalibrationResult, target: Target, effects: Sequence[Effect]) -> bool:
+    """Return whether linear responses to the effects explain more of the residual than of noise."""
+    selection = ForwardSelection(base, target, effects, MAX_EFFECTS + 1)
+    return selection.compute_gain() > selection.compute_chance_gain(CHANCE_PROBABILITY)
 
 
 def best_single(base: CalibrationResult, screened: Sequence[ScreenedEffect]) -> CalibrationResult:

@@ -12,6 +12,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     estimate_covariance,
     evaluate_fit,
 )
+from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain
 from islands.discrepancy.inference.confounders import Confounder, find_confounder
 from islands.discrepancy.inference.holdout import cross_validate_gain
 from islands.discrepancy.inference.hypothesis import (
@@ -20,7 +21,7 @@ from islands.discrepancy.inference.hypothesis import (
     find_alternatives,
     without_effect,
 )
-from islands.discrepancy.inference.screening import ScreenedEffect
+from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
@@ -96,6 +97,32 @@ class Finding:
     parameters: Mapping[str, Value]
     score: float
     explained_fraction: float | None
+
+
+def remove_chance_effects(
+    hypothesis: Hypothesis, base: CalibrationResult, target: Target, effects: Sequence[Effect]
+) -> Hypothesis:
+    """Remove the effects with gains that the record's noise reaches by chance, the least important first.
+
+    Under model error, causes may mask each other: all of them are kept, or none.
+
+    Parameters
+    ----------
+    base : CalibrationResult
+        The simulation without effects.
+    effects : sequence of Effect
+        Effects that were searched for.
+    """
+    if target.effective_samples is not None and len(hypothesis.effects) > 1:
+        gain = base.score - hypothesis.fit.score
+        selection = ForwardSelection(base, target, effects, len(hypothesis.effects))
+        return hypothesis if gain > selection.compute_chance_gain() else Hypothesis(base, base.score, ())
+    for effect in hypothesis.effects[::-1]:
+        without = without_effect(hypothesis, effect, target)
+        gain = without.cost - hypothesis.cost + bic_penalty(effect, hypothesis.fit)
+        if gain <= compute_chance_gain(hypothesis.fit, without.fit, effect, target, len(effects)):
+            hypothesis = without
+    return hypothesis
 
 
 def validate_out_of_sample(

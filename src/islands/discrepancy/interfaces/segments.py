@@ -85,3 +85,12 @@ def map_segments(function: Callable[[Signal], Signal], signal: Signal, segments:
     if len(bounds) <= 1:
         return function(signal)
     return np.concatenate([function(signal[first:last]) for first, last in bounds])
+
+
+def take_backward_differences(signal: Signal) -> Signal:
+    """Return the differences of a signal to its previous sample, shape (samples,); the first one is zero.
+
+    Central differences contain the next sample. In closed loop, that of the input depends on the current
+    residual.
+    """
+    return np.diff(signal, prepend=signal[:1])

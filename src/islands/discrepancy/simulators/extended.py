@@ -232,7 +232,7 @@ class ExtendedSimulator:
         """Return the run of the simulator, with all effects but the output maps."""
         x, forces = self.context.u, list(further)
         parameters = dict(effect_parameters)
-        simulator_values = values[: len(self.simulator.parameters)].copy()
+        simulator_values = values[self.simulator_slice].copy()
         for effect, part in zip(self.effects, self._slices[1:], strict=True):
             match effect.site:
                 case Site.INPUT:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.noise_model import fit_ar_noise
+from islands.discrepancy.calibration.noise_model import fit_noise
 from islands.discrepancy.detectability import (
     NOTHING,
     UNKNOWN,
@@ -90,7 +90,7 @@ def make_injections(surrogates: Surrogates, effect: Effect, seed: int = 0) -> tu
 
 @pytest.mark.ci
 def test_surrogate_is_the_simulation_plus_noise_of_the_record() -> None:
-    faulty = inject([], np.random.default_rng(5), 6.0, 0.8, perturbed=False)
+    faulty = inject([], np.random.default_rng(5), 6.0, "ar", perturbed=False)
     simulator = RecordedOutput("theirs", faulty.nominal)
     found = diagnose(faulty.record, simulator)
     surrogates = make_surrogates(found, simulator, {})
@@ -98,7 +98,7 @@ def test_surrogate_is_the_simulation_plus_noise_of_the_record() -> None:
     assert all(np.array_equal(each.u, found.record.u) for each in drawn)
     noise = [each.y - surrogates.simulate() for each in drawn]
     assert np.std(noise) == pytest.approx(surrogates.sigma, rel=0.15)
-    assert np.mean([fit_ar_noise(each).coefficients[0] for each in noise]) == pytest.approx(
+    assert np.mean([fit_noise(each).coefficients[0] for each in noise]) == pytest.approx(
         found.best.noise.coefficients[0], abs=0.1
     )
 
@@ -289,8 +289,7 @@ def test_noise_model_fitted_to_a_drift_is_stable(diagnosis: Diagnosis) -> None:
     drift = drift[: diagnosis.record.samples]
     record = replace(diagnosis.record, y=diagnosis.best.output + drift)
     assert (
-        np.abs(np.roots([1.0, *-fit_ar_noise(drift[: diagnosis.estimation_samples]).coefficients])).max()
-        > 1.0
+        np.abs(np.roots([1.0, *-fit_noise(drift[: diagnosis.estimation_samples]).coefficients])).max() > 1.0
     )
     surrogates = make_surrogates(replace(diagnosis, record=record), SIMULATOR, TOLERANCE)
     assert np.abs(np.roots([1.0, *-surrogates.noise.coefficients])).max() < 1.0

@@ -7,7 +7,7 @@ import scipy
 from islands.discrepancy.calibration.noise_model import (
     NoiseModel,
     estimate_effective_samples,
-    fit_ar_noise,
+    fit_noise,
 )
 
 
@@ -16,7 +16,7 @@ def test_order_and_coefficients_of_an_autoregression_are_recovered(poles: tuple[
     coefficients = -np.poly(poles)[1:] if poles else np.zeros(0)
     white = np.random.default_rng(1).standard_normal(20_000)
     residual = scipy.signal.lfilter([1.0], np.concatenate([[1.0], -coefficients]), white)
-    noise = fit_ar_noise(residual)
+    noise = fit_noise(residual)
     assert noise.order == len(poles)
     assert noise.coefficients == pytest.approx(coefficients, abs=0.03)
     assert noise.variance == pytest.approx(1.0, rel=0.03)
@@ -25,7 +25,7 @@ def test_order_and_coefficients_of_an_autoregression_are_recovered(poles: tuple[
 
 def test_whitening_does_not_change_white_noise() -> None:
     white = np.random.default_rng(2).standard_normal(1000)
-    assert np.array_equal(fit_ar_noise(white).whiten(white), white)
+    assert np.array_equal(fit_noise(white).whiten(white), white)
 
 
 #: Lengths of recordings whose residuals have different means, so that a boundary is a large step.
@@ -50,7 +50,7 @@ def test_whitening_of_a_recording_does_not_depend_on_the_others() -> None:
 def test_noise_does_not_depend_on_the_order_of_recordings() -> None:
     parts = draw_recordings()
     forward, backward = np.concatenate(parts), np.concatenate(parts[::-1])
-    one, other = fit_ar_noise(forward, segments=LENGTHS), fit_ar_noise(backward, segments=LENGTHS[::-1])
+    one, other = fit_noise(forward, segments=LENGTHS), fit_noise(backward, segments=LENGTHS[::-1])
     assert other.coefficients == pytest.approx(one.coefficients, rel=1e-9)
     assert other.variance == pytest.approx(one.variance, rel=1e-9)
     assert estimate_effective_samples(forward, LENGTHS) == pytest.approx(
@@ -63,7 +63,7 @@ def test_autoregression_is_the_least_squares_fit_within_the_recordings() -> None
     equations = np.concatenate(
         [np.column_stack([part[2:-1], part[1:-2], part[:-3], part[3:]]) for part in parts]
     )
-    noise = fit_ar_noise(np.concatenate(parts), segments=LENGTHS)
+    noise = fit_noise(np.concatenate(parts), 3, LENGTHS)
     expected = np.linalg.lstsq(equations[:, : noise.order], equations[:, 3], rcond=None)[0]
     assert noise.order > 0
     assert noise.coefficients == pytest.approx(expected, rel=1e-9)

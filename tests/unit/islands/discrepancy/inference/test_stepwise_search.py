@@ -14,6 +14,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     Target,
     calibrate,
     evaluate_fit,
+    whiten_target,
 )
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
 from islands.discrepancy.effects import CATALOGUE
@@ -161,9 +162,9 @@ def test_noise_model_is_white_once_both_causes_are_found() -> None:
     base, target = calibrate_to(recorded(u, u + 0.02 * u**2 + 0.3 * (time > 8.0) + noise), core)
     effects = select_some(select_effects(core, base.simulation.context, {}))
     screened = screen_effects(base, target, effects)
-    noise_model = screened[0].fit.noise
-    assert noise_model.order > 0
-    target = replace(target, noise=noise_model)
+    target = whiten_target(target, screened[0].fit)
+    assert target.noise is not None
+    assert target.noise.order > 0
     base = calibrate(base.simulation, target, base.values)
     found, target = stepwise_search(
         base, screen_effects(base, target, effects), target, effects, ignore_progress

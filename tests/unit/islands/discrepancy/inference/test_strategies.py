@@ -59,7 +59,7 @@ def assessed(request):
     base = calibrate(simulation, target, simulation.nominal)
     effects = [*core.state_effects, *(CATALOGUE[name] for name in request.param)]
     outcome = search_with_model_error(base, target, effects, ignore_progress, map)
-    return record, fitted, outcome, assess_evidence(outcome, fitted, np.random.default_rng(0))
+    return record, fitted, outcome, assess_evidence(outcome, fitted, effects, np.random.default_rng(0))
 
 
 @pytest.mark.ci

@@ -1,0 +1,204 @@
+"""Gain of an effect by chance, from surrogates of the record's own noise.
+
+The gain in minus twice the log-likelihood has a chi-squared distribution only if the noise model is right. A
+changing variance, heavy tails and colour that the noise model does not whiten make larger gains common.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from islands.discrepancy.calibration.levenberg_marquardt import (
+    DIFFERENCE_STEP,
+    CalibrationResult,
+    Target,
+)
+from islands.discrepancy.effects import catalogue_order
+from islands.discrepancy.inference.noise_surrogates import Randomisation, draw_surrogates
+from islands.discrepancy.inference.screening import Projection, get_starting_points, transfer_parameters
+from islands.discrepancy.interfaces.effect import Effect, Signal
+from islands.discrepancy.interfaces.segments import fill_gaps
+
+#: Number of surrogates of each kind.
+SURROGATES = 300
+
+#: Probability that the best of all effects exceeds its threshold by chance.
+FALSE_ALARM_PROBABILITY = 0.01
+
+#: Fraction of the largest gains from which the tail of their distribution is extrapolated.
+TAIL_FRACTION = 0.1
+
+#: Singular values of responses below this fraction of the largest one are linear dependences.
+RANK_TOLERANCE = 1e-6
+
+#: Seed of the surrogates. It is fixed, so that the same fit has the same threshold in every search.
+SEED = 20
+
+
+def compute_chance_gain(
+    fit: CalibrationResult, without: CalibrationResult, effect: Effect, target: Target, effect_count: int
+) -> float:
+    """Return the gain of one effect that noise exceeds with a probability of `FALSE_ALARM_PROBABILITY`.
+
+    This is the probability for all effects together (Bonferroni). Responses to the effect are linear, at its
+    fitted values and at its starting points; calibration absorbs its part of them.
+
+    Parameters
+    ----------
+    fit, without : CalibrationResult
+        The simulation with the effect and without it.
+    effect_count : int
+        Number of effects that are searched for.
+
+    Returns
+    -------
+    float
+        Gain in minus twice the log-likelihood, without a penalty on the values of the effect.
+    """
+    if target.effective_samples is None:
+        target = replace(target, noise=fit.noise)
+    projection = Projection(without, target)
+    start = fit.simulation.nominal
+    changes = []
+    for index in range(*fit.simulation.get_slice(effect).indices(start.size)):
+        shifted = fit.values.copy()
+        shifted[index] += DIFFERENCE_STEP * fit.simulation.scales[index]
+        changes.append(fit.simulation.simulate(shifted) - fit.output)
+    responses = [changes, *([each] for each in _simulate_starting_points(without, effect, target))]
+    bases = [basis for each in responses if (basis := _orthonormalise(each, projection)).size]
+
+    def compute_gains(residuals: Signal) -> Signal:
+        remaining = [residuals - basis @ (basis.T @ residuals) for basis in bases]
+        gains: Signal = np.max(
+            [_compute_gain(residuals, each, target, without) for each in remaining], axis=0
+        )
+        return gains
+
+    # A noise model that was fitted without a true effect contains it as colour, and so would the surrogates.
+    # Without a noise model, the whole residual competes with the effect.
+    noise = fit if target.effective_samples is None else without
+    probability = FALSE_ALARM_PROBABILITY / effect_count
+    return _find_threshold(noise, target, projection, compute_gains, probability) if bases else 0.0
+
+
+class ForwardSelection:
+    """Forward selection among the linear responses to all effects, and the gain that it reaches by chance.
+
+    Orthogonal matching pursuit (Pati et al., 1993) selects among the responses at all starting points.
+
+    Parameters
+    ----------
+    base : CalibrationResult
+        The simulation without effects. Surrogates of its residual have no cause.
+    target : Target
+    effects : sequence of Effect
+    steps : int
+        Number of responses to select.
+    """
+
+    def __init__(
+        self, base: CalibrationResult, target: Target, effects: Sequence[Effect], steps: int
+    ) -> None:
+        self._base, self._target, self._steps = base, target, steps
+        self._projection = Projection(base, target)
+        responses = [
+            response for effect in effects for response in _simulate_starting_points(base, effect, target)
+        ]
+        bases = [_orthonormalise([each], self._projection) for each in responses]
+        unit = [basis for basis in bases if basis.size]
+        self._dictionary = np.column_stack(unit) if unit else np.empty((self._projection.residual.size, 0))
+        self._gram = self._dictionary.T @ self._dictionary
+
+    def compute_gain(self) -> float:
+        """Return the gain of the selected responses."""
+        return float(self._compute_gains(self._projection.residual[:, None])[0])
+
+    def compute_chance_gain(self, probability: float = FALSE_ALARM_PROBABILITY) -> float:
+        """Return the gain that is exceeded with a probability if the residual is noise."""
+        return _find_threshold(self._base, self._target, self._projection, self._compute_gains, probability)
+
+    def _compute_gains(self, residuals: Signal) -> Signal:
+        products = self._dictionary.T @ residuals
+        weights = np.column_stack([_pursue(self._gram, each, self._steps) for each in products.T])
+        remaining = residuals - self._dictionary @ weights
+        return _compute_gain(residuals, remaining, self._target, self._base)
+
+
+def _find_threshold(
+    noise: CalibrationResult,
+    target: Target,
+    projection: Projection,
+    compute_gains: Callable[[Signal], Signal],
+    probability: float,
+) -> float:
+    """Return the gain that is exceeded with a probability in surrogates of the residual of ``noise``."""
+    part = target.estimation_part
+    residual = (target.y - noise.output)[part]
+    rng = np.random.default_rng(SEED)
+    thresholds = []
+    for randomisation in Randomisation:
+        drawn = draw_surrogates(residual, target.fitted_segments, randomisation, SURROGATES, rng)
+        residuals = np.column_stack([projection(_insert(each, part)) for each in drawn])
+        thresholds.append(_extrapolate_quantile(compute_gains(residuals), probability))
+    return max(thresholds)
+
+
+def _insert(signal: Signal, part: Signal) -> Signal:
+    """Return a signal over the whole record, given its values in the estimation part."""
+    whole = np.zeros(part.size)
+    whole[part] = signal
+    return whole
+
+
+def _simulate_starting_points(base: CalibrationResult, effect: Effect, target: Target) -> list[Signal]:
+    """Return the responses to an effect at its starting points that are finite."""
+    simulation = base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
+    start = transfer_parameters(base.values, base.simulation, simulation)
+    responses = []
+    for point in get_starting_points(effect, simulation, fill_gaps(target.y - base.output)):
+        values = start.copy()
+        values[simulation.get_slice(effect)] = simulation.expand(effect, point)
+        responses.append(simulation.simulate(values) - base.output)
+    return [response for response in responses if np.isfinite(response).all()]
+
+
+def _orthonormalise(responses: Sequence[Signal], projection: Projection) -> Signal:
+    """Return an orthonormal basis of the part of responses that calibration does not absorb."""
+    projected = [projection(response) for response in responses if np.isfinite(response).all()]
+    unit = [response / size for response in projected if (size := float(np.linalg.norm(response)))]
+    return scipy.linalg.orth(np.column_stack(unit), rcond=RANK_TOLERANCE) if unit else np.empty((0, 0))
+
+
+def _pursue(gram: Signal, products: Signal, steps: int) -> Signal:
+    """Return the weights of orthogonal matching pursuit, given inner products of unit vectors."""
+    weights = np.zeros(products.size)
+    selected: list[int] = []
+    correlations = products
+    for _ in range(min(steps, products.size)):
+        selected.append(int(np.argmax(np.abs(correlations))))
+        found = np.linalg.lstsq(gram[np.ix_(selected, selected)], products[selected], rcond=RANK_TOLERANCE)[0]
+        correlations = products - gram[:, selected] @ found
+        weights[:] = 0.0
+        weights[selected] = found
+    return weights
+
+
+def _compute_gain(residuals: Signal, remaining: Signal, target: Target, without: CalibrationResult) -> Signal:
+    """Return the gain in each of several residuals, given what remains of them, shape (surrogates,)."""
+    # The rows after those of the samples are deviations of the parameters from their priors.
+    samples = int(np.count_nonzero(target.estimation_part))
+    before, after = (np.sum(each[:samples] ** 2, axis=0) for each in (residuals, remaining))
+    prior_before, prior_after = (
+        np.sum(each[samples:] ** 2, axis=0) / target.prior_weight for each in (residuals, remaining)
+    )
+    gains: Signal = without.noise.effective_samples * np.log(before / after) + prior_before - prior_after
+    return gains
+
+
+def _extrapolate_quantile(gains: Signal, probability: float) -> float:
+    """Return the value that is exceeded with a small probability, from an exponential tail."""
+    start = float(np.quantile(gains, 1.0 - TAIL_FRACTION))
+    mean_excess = float(np.mean(gains[gains > start] - start))
+    return start + mean_excess * float(np.log(TAIL_FRACTION / probability))

@@ -1,0 +1,78 @@
+"""Surrogates of a residual: signals with the noise properties of a residual and without the effect in it."""
+
+from collections.abc import Callable, Iterator, Sequence
+from enum import Enum, auto
+
+import numpy as np
+
+from islands.discrepancy.calibration.noise_model import fit_noise
+from islands.discrepancy.interfaces.effect import Signal
+from islands.discrepancy.interfaces.segments import find_bounds
+
+
+class Randomisation(Enum):
+    """Property of the innovations that is drawn; a surrogate keeps all others.
+
+    With random signs, every innovation keeps its size, so that a changing variance and outliers stay where
+    they are (wild bootstrap; Wu, 1986). With random phases, the innovations keep the part of their spectrum
+    that the noise model does not whiten (Theiler et al., 1992).
+    """
+
+    SIGNS = auto()
+    PHASES = auto()
+
+
+def draw_surrogates(
+    residual: Signal,
+    segments: Sequence[int],
+    randomisation: Randomisation,
+    count: int,
+    rng: np.random.Generator,
+) -> Iterator[Signal]:
+    """Draw surrogates of a residual.
+
+    The innovations of its noise model are randomised and filtered with the model again. The first ones of
+    every recording are kept, so that a surrogate begins with the level of the residual: that of a random walk
+    has no distribution.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (samples,)
+        Residual without gaps.
+    segments : sequence of int
+        Lengths of the recordings in samples.
+
+    Yields
+    ------
+    ndarray, shape (samples,)
+    """
+    noise = fit_noise(residual, segments=segments)
+    innovations = noise.whiten(residual, segments)
+    innovations = innovations - innovations.mean()
+    stable = noise.limit_poles(residual.size)
+    bounds = find_bounds(segments, residual.size)
+    randomise = _RANDOMISE[randomisation]
+    for _ in range(count):
+        drawn = randomise(innovations, rng)
+        for first, _last in bounds:
+            kept = slice(first, first + noise.order)
+            drawn[kept] = innovations[kept]
+        yield np.concatenate([stable.colour(drawn[first:last]) for first, last in bounds])
+
+
+def _randomise_signs(innovations: Signal, rng: np.random.Generator) -> Signal:
+    return innovations * rng.choice([-1.0, 1.0], innovations.size)
+
+
+def _randomise_phases(innovations: Signal, rng: np.random.Generator) -> Signal:
+    # Half of a period twice as long: the sum of a whole period would be that of the innovations.
+    count = 2 * innovations.size
+    spectrum = np.fft.rfft(np.concatenate([innovations, innovations[::-1]]))
+    spectrum *= np.exp(2j * np.pi * rng.random(spectrum.size))
+    return np.fft.irfft(spectrum, count)[: innovations.size]
+
+
+_RANDOMISE: dict[Randomisation, Callable[[Signal, np.random.Generator], Signal]] = {
+    Randomisation.SIGNS: _randomise_signs,
+    Randomisation.PHASES: _randomise_phases,
+}
