@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from islands.discrepancy.calibration.levenberg_marquardt import (
     DIFFERENCE_STEP,
@@ -145,7 +146,7 @@ def _find_threshold(
     return max(thresholds)
 
 
-def _insert(signal: Signal, part: Signal) -> Signal:
+def _insert(signal: Signal, part: NDArray[np.bool_]) -> Signal:
     """Return a signal over the whole record, given its values in the estimation part."""
     whole = np.zeros(part.size)
     whole[part] = signal
@@ -200,5 +201,5 @@ def _compute_gain(residuals: Signal, remaining: Signal, target: Target, without:
 def _extrapolate_quantile(gains: Signal, probability: float) -> float:
     """Return the value that is exceeded with a small probability, from an exponential tail."""
     start = float(np.quantile(gains, 1.0 - TAIL_FRACTION))
-    mean_excess = float(np.mean(gains[gains > start] - start))
+    mean_excess = float(np.mean(gains[gains >= start] - start))
     return start + mean_excess * float(np.log(TAIL_FRACTION / probability))

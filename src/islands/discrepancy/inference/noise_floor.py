@@ -7,7 +7,7 @@ import scipy
 
 from islands.discrepancy.inference.noise_surrogates import Randomisation, draw_surrogates
 from islands.discrepancy.interfaces.effect import Signal
-from islands.discrepancy.interfaces.segments import find_bounds, take_backward_differences
+from islands.discrepancy.interfaces.segments import count_runs, find_bounds, take_backward_differences
 from islands.systems.hysteresis_operators import play_from
 
 #: Lags of the features, in samples.

@@ -48,15 +48,15 @@ def draw_surrogates(
     """
     noise = fit_noise(residual, segments=segments)
     innovations = noise.whiten(residual, segments)
-    innovations = innovations - innovations.mean()
     stable = noise.limit_poles(residual.size)
     bounds = find_bounds(segments, residual.size)
+    is_kept = np.zeros(residual.size, dtype=bool)
+    for first, _ in bounds:
+        is_kept[first : first + noise.order] = True
+    centred = np.where(is_kept, 0.0, innovations - innovations[~is_kept].mean())
     randomise = _RANDOMISE[randomisation]
     for _ in range(count):
-        drawn = randomise(innovations, rng)
-        for first, _last in bounds:
-            kept = slice(first, first + noise.order)
-            drawn[kept] = innovations[kept]
+        drawn = np.where(is_kept, innovations, randomise(centred, rng))
         yield np.concatenate([stable.colour(drawn[first:last]) for first, last in bounds])
 
 

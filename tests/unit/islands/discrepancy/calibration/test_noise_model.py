@@ -1,4 +1,4 @@
-"""Autoregressive noise model: order, coefficients and whitening, also of several recordings."""
+"""Noise model: orders, coefficients and whitening, also of several recordings."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,9 @@ from islands.discrepancy.calibration.noise_model import (
     NoiseModel,
     estimate_effective_samples,
     fit_noise,
+    take_fractional_difference,
 )
+from islands.performance.trials.injection.noise import NOISES
 
 
 @pytest.mark.parametrize("poles", [(), (0.9,), (0.6, 0.3), (0.95, -0.4)])
@@ -67,3 +69,27 @@ def test_autoregression_is_the_least_squares_fit_within_the_recordings() -> None
     expected = np.linalg.lstsq(equations[:, : noise.order], equations[:, 3], rcond=None)[0]
     assert noise.order > 0
     assert noise.coefficients == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("difference_order", [0.0, 0.25, 0.5])
+def test_innovations_are_recovered_from_coloured_noise(difference_order: float) -> None:
+    noise = NoiseModel(np.array([0.5, 0.2]), 1.0, 500.0, difference_order)
+    innovations = np.random.default_rng(4).standard_normal(500)
+    assert noise.whiten(noise.colour(innovations)) == pytest.approx(innovations, abs=1e-9)
+
+
+def test_difference_of_order_one_is_the_difference_of_neighbours() -> None:
+    signal = np.random.default_rng(5).standard_normal(50)
+    assert take_fractional_difference(signal, 1.0) == pytest.approx(np.diff(signal, prepend=0.0), abs=1e-12)
+    half = take_fractional_difference(signal, 0.5)
+    assert take_fractional_difference(half, 0.5) == pytest.approx(np.diff(signal, prepend=0.0), abs=1e-12)
+
+
+def test_long_memory_is_recognised_by_its_spectrum() -> None:
+    """Noise with a spectrum of 1/f has order 0.5; an autoregression has no fractional difference."""
+    pink = NOISES["pink"](np.random.default_rng(6), np.ones(3000))
+    found = fit_noise(pink)
+    assert found.difference_order == 0.5
+    power = np.abs(np.fft.rfft(found.whiten(pink))) ** 2
+    assert np.mean(power[1:20]) < 3.0 * np.mean(power)
+    assert fit_noise(NOISES["ar"](np.random.default_rng(6), np.ones(3000))).difference_order == 0.0

@@ -8,6 +8,7 @@ import scipy
 
 from islands.performance.trials.injection import force_faults, measurement
 from islands.performance.trials.injection.measurement import GAIN_FAULTS, FaultyRecord, inject
+from islands.performance.trials.injection.noise import NOISES
 from islands.performance.trials.injection.oscillator import OSCILLATOR, OUTPUT, SPEED, Oscillator
 from islands.performance.trials.injection.piezo import PIEZO, Piezo
 from islands.performance.trials.injection.plant import Force, simulate_plant
@@ -166,3 +167,24 @@ def test_a_record_in_which_a_fault_is_invisible_is_redrawn(monkeypatch: pytest.M
     monkeypatch.setattr(measurement, "_MAX_RECORDS", 1)
     with pytest.raises(ValueError, match="cannot be injected"):
         saturated_record()
+
+
+@pytest.mark.parametrize("kind", NOISES)
+def test_noise_has_unit_size_and_its_colour(kind: str) -> None:
+    clean = 20.0 * np.sin(np.arange(4000) / 30)
+    noise = NOISES[kind](np.random.default_rng(1), clean)
+    assert np.sqrt(np.mean(noise**2)) == pytest.approx(1.0, rel=0.25)
+    power = np.abs(np.fft.rfft(noise)) ** 2
+    slow = np.mean(power[1:40]) / np.mean(power[-400:])
+    is_white = kind in ("white", "multiplicative", "heavy-tailed", "non-stationary", "closed-loop")
+    assert (0.4 < slow < 2.5) if is_white else slow > 5.0
+
+
+def test_controller_carries_noise_to_later_inputs() -> None:
+    opened, closed = (faulty_record("piezo", seed=3, noise=noise) for noise in ("white", "closed-loop"))
+    action = closed.record.u[:, 0] - opened.record.u[:, 0]
+    errors = opened.record.y - faulty_record("piezo", seed=3, noise="white").nominal
+    assert np.std(action) > 0.0
+    # The controller acts against the errors that it has read, not against those to come.
+    assert np.corrcoef(action[1:], errors[:-1])[0, 1] < -0.05
+    assert action[0] == 0.0

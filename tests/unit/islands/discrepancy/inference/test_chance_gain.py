@@ -1,0 +1,76 @@
+"""Thresholds of gains: noise seldom reaches them, effects exceed them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate
+from islands.discrepancy.calibration.noise_model import estimate_effective_samples
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
+from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain
+from islands.discrepancy.inference.screening import bic_penalty, screen_effects
+from islands.discrepancy.interfaces.effect import Effect
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.recorded_output import RecordedOutput
+from islands.performance.trials.injection.noise import NOISES
+from support.simulated_records import recorded, wave
+
+EFFECTS = [CATALOGUE[name] for name in ("linear-drift", "jump", "exponential-creep", "even-nonlinearity")]
+
+
+def calibrated(noise: np.ndarray, has_model_error: bool = False):
+    u = wave(noise.size)
+    record = recorded(u, u + noise)
+    fitted = count_fitted_samples(record)
+    simulator = RecordedOutput("theirs", u)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
+    target = Target(record.y, np.arange(record.samples) < fitted, None, {})
+    if has_model_error:
+        residual = target.residual(u)
+        target = replace(target, effective_samples=estimate_effective_samples(residual))
+    return calibrate(simulation, target, simulation.nominal), target
+
+
+def measure_gain(noise: np.ndarray, effect: Effect) -> tuple[float, float]:
+    """Return the gain of an effect, and the gain that it reaches by chance."""
+    base, target = calibrated(noise)
+    fit = screen_effects(base, target, [effect])[0].fit
+    return base.score - fit.score, compute_chance_gain(fit, base, effect, target, len(EFFECTS))
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("kind", ["white", "slow-ar", "pink", "multiplicative", "heavy-tailed", "brown"])
+def test_noise_does_not_reach_its_own_threshold(kind: str) -> None:
+    for seed in range(2):
+        noise = NOISES[kind](np.random.default_rng(seed), wave(800))
+        for effect in EFFECTS:
+            gain, chance = measure_gain(noise, effect)
+            base, _ = calibrated(noise)
+            assert gain < max(chance, 6.0 + bic_penalty(effect, base)), (effect.name, seed)
+
+
+def test_effect_exceeds_the_threshold_of_its_noise() -> None:
+    noise = NOISES["pink"](np.random.default_rng(1), wave(800)) + 0.1 * wave(800) ** 2
+    gain, chance = measure_gain(noise, CATALOGUE["even-nonlinearity"])
+    assert gain > 2 * chance
+
+
+def test_changing_variance_increases_the_threshold() -> None:
+    """A response that is large only where the noise is large gains more by chance."""
+    rng = np.random.default_rng(2)
+    constant = rng.standard_normal(800)
+    changing = constant * wave(800) ** 2
+    effect = CATALOGUE["even-nonlinearity"]
+    assert measure_gain(changing, effect)[1] > measure_gain(constant, effect)[1]
+
+
+def test_forward_selection_separates_two_effects_from_slow_noise() -> None:
+    time = np.arange(800) / 800
+    slow = NOISES["slow-ar"](np.random.default_rng(3), wave(800))
+    effects = 4.0 * (time > 0.4) + wave(800) ** 2
+    for noise, is_found in ((slow, False), (0.5 * slow + effects, True)):
+        base, target = calibrated(noise, has_model_error=True)
+        selection = ForwardSelection(base, target, EFFECTS, 2)
+        assert (selection.compute_gain() > selection.compute_chance_gain()) == is_found
