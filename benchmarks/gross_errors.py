@@ -1,12 +1,12 @@
 """Gross errors in simulated records: how often each is found, and false findings on other records.
 
     python benchmarks/gross_errors.py SYSTEM ... [--first SEED] [--count N]
-    python benchmarks/gross_errors.py SYSTEM ... --others [--pole POLE] [--band LOW HIGH]
+    python benchmarks/gross_errors.py SYSTEM ... --others [--noise KIND] [--band LOW HIGH]
 
 SYSTEM is piezo, second-order, tanks or linear (identified on the same record without the error). Parameters
 of the simulation are given, with the tolerances of the trials. With ``--others`` the records have no gross
-error, but all faults of the trials with a misfit of LOW to HIGH standard deviations of the noise, whose pole
-is POLE.
+error, but all faults of the trials with a misfit of LOW to HIGH standard deviations of the noise of a
+KIND of the trials.
 """
 
 import argparse
@@ -122,10 +122,12 @@ def make_given_simulator(name: str, record: Dataset, clean: Dataset) -> tuple[Si
     return make_simulator(PhysicalSpec(kind=kind, parameters=given), record), tolerance
 
 
-def draw(case: SimulatedCase, names: tuple[str, ...], seed: int, pole: float, band: object) -> Dataset:
+def draw(case: SimulatedCase, names: tuple[str, ...], seed: int, noise: str, band: object) -> Dataset:
     """Draw a record of a trial."""
     rng = np.random.default_rng([seed, *map(ord, "".join(names))])
-    return inject(names, rng, None, pole, band if names else None, False, case.system, True, case.free).record
+    return inject(
+        names, rng, None, noise, band if names else None, False, case.system, True, case.free
+    ).record
 
 
 def find(record: Dataset, simulator: Simulator, tolerance: Mapping[str, float]) -> tuple[list, list[str]]:
@@ -152,7 +154,7 @@ def count_found(name: str, seeds: range) -> None:
             continue
         first = among = 0
         for seed in seeds:
-            clean = draw(SYSTEMS[name], (), seed, 0.0, None)
+            clean = draw(SYSTEMS[name], (), seed, "white", None)
             record = spoil(clean)
             found, _ = find(record, *make_given_simulator(name, record, clean))
             right = [
@@ -172,20 +174,20 @@ def count_found(name: str, seeds: range) -> None:
         )
 
 
-def count_false(name: str, seeds: range, pole: float, band: tuple[float, float]) -> None:
+def count_false(name: str, seeds: range, noise: str, band: tuple[float, float]) -> None:
     """Print how many records without a gross error have a finding."""
     case, found, records = SYSTEMS[name], Counter(), 0
     for names in ((), *((fault,) for fault in (*case.system.known, *case.system.unknown))):
         for seed in seeds:
             try:
-                record = draw(case, names, seed, pole, band)
-                clean = draw(case, (), seed, pole, None)
+                record = draw(case, names, seed, noise, band)
+                clean = draw(case, (), seed, noise, None)
             except ValueError:  # no strength of this fault has such a misfit
                 continue
             errors, others = find(record, *make_given_simulator(name, record, clean))
             records += 1
             found.update((names, each) for each in (*(error.name for error in errors), *others))
-    print(f"{name:13} pole {pole}, misfit {band}: {records} records, found {dict(found)}", flush=True)
+    print(f"{name:13} {noise} noise, misfit {band}: {records} records, found {dict(found)}", flush=True)
 
 
 def main() -> None:
@@ -195,13 +197,13 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=7_000_000)
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--others", action="store_true")
-    parser.add_argument("--pole", type=float, default=0.0)
+    parser.add_argument("--noise", default="white", help="a kind of noise of the trials, such as ar")
     parser.add_argument("--band", type=float, nargs=2, default=(1.0, 4.0))
     asked = parser.parse_args()
     seeds = range(asked.first, asked.first + asked.count)
     for name in asked.systems:
         if asked.others:
-            count_false(name, seeds, asked.pole, tuple(asked.band))
+            count_false(name, seeds, asked.noise, tuple(asked.band))
         else:
             count_found(name, seeds)
 
