@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 
 from islands.discrepancy.effects import CATALOGUE
+from islands.performance.trials.injection.noise import NOISES
+from islands.performance.trials.trial import Trial, run_trial
 from support.command_line import fail, succeed
 from support.undrawn import undrawn_figures
 
@@ -126,3 +128,15 @@ def test_most_injected_effects_are_found(
     assert found["truth within the reported set"] >= within
     assert found["pairs exact"] >= pairs
     assert found["false names on clean records"] <= false_names
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("noise", NOISES)
+def test_effects_are_named_and_noise_is_not(noise: str) -> None:
+    """A random walk may be named a drift."""
+    clean, faulty = (
+        run_trial(Trial(effects, 910_300, noise, (1.0, 4.0), seconds=10.0, core="column"))
+        for effects in ((), ("even-nonlinearity",))
+    )
+    assert set(clean.named) <= ({"linear-drift", "jump"} if noise == "brown" else set())
+    assert faulty.named[:1] == ("even-nonlinearity",)
