@@ -1,4 +1,4 @@
-"""Detectors of sampling and noise artefacts: quantisation, held samples, outliers, coloured noise."""
+"""Detectors of sampling and noise artefacts: quantisation, held samples, outliers, variance, colour."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from islands.data.channel_names import simplify_unit
 from islands.discrepancy.calibration.noise_model import fit_noise
+from islands.discrepancy.calibration.variance_model import MAD, fit_variance_model
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
-from islands.discrepancy.interfaces.segments import find_bounds, is_resting
+from islands.discrepancy.interfaces.segments import find_bounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +62,6 @@ class NoiseDetector:
 
 #: Minimum number of samples per distinct output value at which the values count as quantisation levels.
 _MIN_SAMPLES_PER_LEVEL = 3.0
-
-#: Median absolute deviation of normal noise in standard deviations.
-_MAD = 0.6745
 
 #: Minimum quantisation step that matters, in standard deviations of the residual.
 _MIN_QUANTISATION_STEP = 0.5
@@ -154,21 +152,23 @@ def _whiten(residual: Signal, context: SimulationContext) -> tuple[Signal, NDArr
     return noise.whiten(residual, context.segments), is_innovation
 
 
-def _detect_outliers(_y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
+def _detect_outliers(y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
     whitened, is_innovation = _whiten(residual, context)
     whitened = whitened[is_innovation]
-    scale = float(np.median(np.abs(whitened - np.median(whitened)))) / _MAD
-    if scale == 0.0:
+    # Noise that is large at times is no series of outliers.
+    scale = fit_variance_model(whitened, y[is_innovation]).scale
+    standardised = whitened / scale
+    robust = float(np.median(np.abs(standardised - np.median(standardised)))) / MAD
+    if robust == 0.0:
         return None
-    distance = np.abs(whitened) / scale
-    count = int(np.count_nonzero(distance > _OUTLIER_DISTANCE))
+    is_outlier = np.abs(standardised) > _OUTLIER_DISTANCE * robust
+    count = int(np.count_nonzero(is_outlier))
     if count < _MIN_OUTLIERS:
         return None
-    inliers = whitened[distance <= _OUTLIER_DISTANCE]
     n = whitened.size
-    decrease = n * float(np.log(np.mean(whitened**2)) - np.log(np.mean(inliers**2)))
+    decrease = n * float(np.log(np.mean(standardised**2) / np.mean(standardised[~is_outlier] ** 2)))
     score_gain = decrease - 2 * count * float(np.log(n))
-    size = float(np.median(np.abs(whitened[distance > _OUTLIER_DISTANCE])))
+    size = float(np.median(np.abs(whitened[is_outlier])))
     return NoiseFinding({"share": (count / n, ""), "size": (size, context.output_unit)}, score_gain)
 
 
@@ -184,33 +184,15 @@ OUTLIERS = NoiseDetector(
 )
 
 
-#: Candidate strengths k, times the largest absolute output.
-_HETEROSCEDASTIC_STRENGTHS = np.concatenate([[0.0], np.geomspace(0.1, 30.0, 60)])
-
-
 def _detect_heteroscedastic_noise(
     y: Signal, residual: Signal, context: SimulationContext
 ) -> NoiseFinding | None:
     whitened, is_innovation = _whiten(residual, context)
-    if is_resting(y - residual):  # the noise cannot grow with an output that rests
+    found = fit_variance_model(whitened[is_innovation], y[is_innovation])
+    if found.strength_gain <= 0.0:
         return None
-    whitened, size = whitened[is_innovation], np.abs(y[is_innovation]) / np.max(np.abs(y))
-    n = whitened.size
-    # A few outliers at large outputs have the same effect, so that squares are clipped at four deviations.
-    scale = float(np.median(np.abs(whitened))) / _MAD
-    if scale == 0.0:  # most of the residual is exactly zero
-        return None
-    squares = np.minimum(whitened**2, (4 * scale * (1.0 + size)) ** 2)
-    costs = [
-        n * float(np.log(np.mean(squares / (1.0 + k * size) ** 2))) + 2 * float(np.sum(np.log1p(k * size)))
-        for k in _HETEROSCEDASTIC_STRENGTHS
-    ]
-    best = int(np.argmin(costs))
-    score_gain = costs[0] - costs[best] - float(np.log(n))
-    if score_gain <= 0.0:
-        return None
-    strength = float(_HETEROSCEDASTIC_STRENGTHS[best]) / float(np.max(np.abs(y)))
-    return NoiseFinding({"k": (strength, simplify_unit(f"1/{context.output_unit}"))}, score_gain)
+    strength = found.strength / float(np.max(np.abs(y[is_innovation])))
+    return NoiseFinding({"k": (strength, simplify_unit(f"1/{context.output_unit}"))}, found.strength_gain)
 
 
 HETEROSCEDASTIC_NOISE = NoiseDetector(
@@ -219,9 +201,30 @@ HETEROSCEDASTIC_NOISE = NoiseDetector(
     "data",
     _detect_heteroscedastic_noise,
     "Davidian and Carroll, Variance function estimation, 1987",
-    ("held-samples", "outliers"),
-    similar_to="outliers",
+    ("held-samples",),
+    similar_to="outliers, changing-noise",
     distinguished_by="the size of the residual over that of the output",
+)
+
+
+def _detect_changing_noise(y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
+    whitened, is_innovation = _whiten(residual, context)
+    found = fit_variance_model(whitened[is_innovation], y[is_innovation])
+    if found.levels_gain <= 0.0:
+        return None
+    ratio = float(np.max(found.levels) / np.min(found.levels))
+    return NoiseFinding({"ratio": (ratio, "")}, found.levels_gain)
+
+
+CHANGING_NOISE = NoiseDetector(
+    "changing-noise",
+    "Noise that is larger in some parts of the record than in others",
+    "data",
+    _detect_changing_noise,
+    "Priestley, Evolutionary spectra and non-stationary processes, 1965",
+    ("held-samples",),
+    similar_to="heteroscedastic-noise, outliers",
+    distinguished_by="the size of the residual over time; the ratio is that of the largest to the smallest",
 )
 
 
@@ -256,5 +259,12 @@ COLOURED_NOISE = NoiseDetector(
 #: Detectors by name, in the order in which they run.
 DETECTORS: Mapping[str, NoiseDetector] = {
     detector.name: detector
-    for detector in (QUANTISATION, HELD_SAMPLES, OUTLIERS, HETEROSCEDASTIC_NOISE, COLOURED_NOISE)
+    for detector in (
+        QUANTISATION,
+        HELD_SAMPLES,
+        OUTLIERS,
+        HETEROSCEDASTIC_NOISE,
+        CHANGING_NOISE,
+        COLOURED_NOISE,
+    )
 }

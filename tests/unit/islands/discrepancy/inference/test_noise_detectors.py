@@ -45,6 +45,10 @@ def scale_noise(rng: np.random.Generator, mean: np.ndarray, y: np.ndarray) -> np
     return mean + (y - mean) * (1 + 2 * np.abs(mean) / 45)
 
 
+def change_noise(rng: np.random.Generator, mean: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return mean + (y - mean) * np.geomspace(1.0, 4.0, SAMPLES)
+
+
 def colour_noise(rng: np.random.Generator, mean: np.ndarray, y: np.ndarray) -> np.ndarray:
     return mean + scipy.signal.lfilter([np.sqrt(1 - 0.8**2)], [1.0, -0.8], y - mean)
 
@@ -54,6 +58,7 @@ ARTEFACTS = {
     "held-samples": hold_samples,
     "outliers": add_outliers,
     "heteroscedastic-noise": scale_noise,
+    "changing-noise": change_noise,
     "coloured-noise": colour_noise,
 }
 
@@ -88,3 +93,10 @@ def test_detectors_report_nothing_on_a_clean_record(seed: int) -> None:
 
 def test_artefacts_cover_every_detector() -> None:
     assert ARTEFACTS.keys() == DETECTORS.keys()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_heavy_tails_are_outliers_and_no_changing_variance(seed: int) -> None:
+    mean, _ = make_clean_record(np.random.default_rng(seed))
+    noise = SIGMA * np.random.default_rng(seed).standard_t(3.0, SAMPLES)
+    assert detect_all(mean + noise, noise) == {"outliers"}
