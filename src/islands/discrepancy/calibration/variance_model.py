@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.discrepancy.interfaces.effect import Signal
 
@@ -75,7 +76,7 @@ def _fit_strength(innovations: Signal, size: Signal) -> tuple[float, float]:
     return (float(STRENGTHS[best]), gain) if gain > 0.0 else (0.0, 0.0)
 
 
-def _fit_levels(innovations: Signal, part: Signal) -> tuple[Signal, float]:
+def _fit_levels(innovations: Signal, part: NDArray[np.int64]) -> tuple[Signal, float]:
     constant = np.ones(PARTS)
     squares = np.empty(innovations.size)
     for index in range(PARTS):
