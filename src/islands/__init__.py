@@ -18,7 +18,7 @@ _PUBLIC = {
     "data.preprocessing": ("preprocess",),
     "data.split": ("Split", "split"),
     "discrepancy.detectability": ("self_test",),
-    "discrepancy.diagnosis": ("Diagnosis",),
+    "discrepancy.diagnosis_result": ("Diagnosis",),
     "discrepancy.effects": ("EFFECTS",),
     "discrepancy.interfaces.context": ("Parameter",),
     "discrepancy.interfaces.effect": ("Effect", "Site"),

@@ -6,7 +6,7 @@ from islands.data.preprocessing import preprocess as preprocess
 from islands.data.split import Split as Split
 from islands.data.split import split as split
 from islands.discrepancy.detectability import self_test as self_test
-from islands.discrepancy.diagnosis import Diagnosis as Diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis as Diagnosis
 from islands.discrepancy.effects import EFFECTS as EFFECTS
 from islands.discrepancy.interfaces.context import Parameter as Parameter
 from islands.discrepancy.interfaces.effect import Effect as Effect

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from islands.discrepancy.detectability import NOTHING, SelfTest, SurrogateOutcome, self_test
-from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.surrogates import SurrogateCase

@@ -7,7 +7,7 @@ import pytest
 from benchmarks.measured_discrepancies import CASES, DATA, errors
 
 import islands
-from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.inference.verdict import Finding
 
 pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]

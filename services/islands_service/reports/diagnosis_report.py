@@ -5,7 +5,7 @@ import io
 from typing import Any
 
 from islands.discrepancy.detectability import NOTHING, SelfTest
-from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Finding, Verdict
 from islands.discrepancy.surrogates import STRENGTHS
@@ -19,6 +19,7 @@ _VERDICTS = {
     Verdict.NAMED: "The simulation lacks known effects, which explain the discrepancy.",
     Verdict.REMAINDER: "The simulation lacks known effects, which explain most of the discrepancy.",
     Verdict.UNKNOWN: "The simulation is wrong, and no known effect explains the discrepancy.",
+    Verdict.DISCOVERED: "The equations lack terms, which were found. No known effect explains as much.",
     Verdict.GROSS_ERROR: "Record and simulation do not match as they are: correct the record first.",
 }
 
@@ -40,6 +41,11 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     lines = [_verdict(found)]
     lines += [f"  {_finding(finding)}" for finding in found.effects]
     lines += [f"Record: {each.text}" for each in found.record_findings]
+    if found.discovery is not None:
+        others, worse_by = " and ".join(found.discovery.nearest), found.discovery.worse_by
+        lines.append(f"Equations: {found.discovery.equations}")
+        if others:
+            lines.append(f"The nearest known effect, {others}, has a score that is worse by {worse_by:.0f}.")
     if found.verdict == Verdict.UNKNOWN:
         nearest = ", ".join(candidate.name for candidate in found.candidates[:3])
         dependence = ", ".join(found.residual_structure) or "its own past"

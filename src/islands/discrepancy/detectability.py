@@ -13,7 +13,8 @@ from math import inf
 import numpy as np
 from scipy.special import betaincinv
 
-from islands.discrepancy.diagnosis import Diagnosis, diagnose
+from islands.discrepancy.diagnosis import diagnose
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator

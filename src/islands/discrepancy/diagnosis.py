@@ -1,7 +1,7 @@
 """Diagnosis of a simulation on a record: discrepancies, their causes, and the gain of modelling them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
+    Target,
     calibrate,
     evaluate_fit,
 )
@@ -20,15 +21,19 @@ from islands.discrepancy.calibration.preparation import (
     select_effects,
     validate_prior,
 )
+from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
+from islands.discrepancy.discovery.discovery import Discovery, describe_terms, discover_terms
+from islands.discrepancy.discovery.term_search import TermSearchResult
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.findings import describe_gross_errors, describe_noise, list_record_findings
 from islands.discrepancy.gross_errors.channel_admission import admit_channels
 from islands.discrepancy.gross_errors.closed_loop import find_closed_loop
 from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.gross_errors.gross_error_search import explain_divergence, find_gross_errors
-from islands.discrepancy.gross_errors.record_finding import RecordFinding, describe_gaps
+from islands.discrepancy.gross_errors.record_finding import describe_gaps
 from islands.discrepancy.inference.experiment_design import suggest_experiment
-from islands.discrepancy.inference.holdout import HoldoutGain, compute_rmse, measure_gain
+from islands.discrepancy.inference.holdout import compute_rmse, measure_gain
+from islands.discrepancy.inference.residual_structure import find_residual_structure
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.strategies import (
     SearchOutcome,
@@ -57,75 +62,6 @@ MAX_ROUNDS = 3
 #: certainty of 97.5 %. It is not zero, since an effect that calibration absorbs changes the RMSE by almost
 #: nothing in either direction.
 MAX_HOLDOUT_LOSS_PERCENT = 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """A screened effect: the simulation extended by this effect alone.
-
-    Attributes
-    ----------
-    name : str
-    score : float
-        Score gain in minus twice the log-likelihood, less the BIC penalty.
-    explained_fraction : float
-        Fraction of the explainable misfit that the effect explains.
-    """
-
-    name: str
-    score: float
-    explained_fraction: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Diagnosis:
-    """Result of a diagnosis.
-
-    Attributes
-    ----------
-    verdict : Verdict
-    effects : tuple of Finding
-        The named causes, the most important first, then the properties of the noise; empty for "nothing" and
-        "unknown".
-    candidates : tuple of Candidate
-        All screened effects, the best first.
-    gain : HoldoutGain or None
-        Errors over the hold-out part; None if no effect was added to the simulation.
-    residual_structure : mapping of str to float
-        Maps in which the residual is not random, with their distance in standard deviations.
-    suggested_experiment : str
-        Experiment that discriminates between the named causes and their equivalents; empty if there is none.
-    record : Dataset
-        The record without the channels that were left out.
-    estimation_samples : int
-        Number of samples, from the first on, that are used for estimation; the rest is the hold-out part.
-    base, best : CalibrationResult
-        The simulation calibrated without the effects, and with them.
-    noise_floor : float
-        Expected lower bound on the RMSE of any simulation.
-    is_noise_floor_measured : bool
-        Whether the noise floor is measured from repeated periods; otherwise it is an upper bound from a
-        flexible reference model.
-    nominal_rmse : float
-        RMSE of the simulation at its nominal values over the hold-out part.
-    record_findings : tuple of RecordFinding
-        Channels that were left out, and other findings about the record.
-    """
-
-    verdict: Verdict
-    effects: tuple[Finding, ...]
-    candidates: tuple[Candidate, ...]
-    gain: HoldoutGain | None
-    residual_structure: Mapping[str, float]
-    suggested_experiment: str
-    record: Dataset
-    estimation_samples: int
-    base: CalibrationResult
-    best: CalibrationResult
-    noise_floor: float
-    is_noise_floor_measured: bool
-    nominal_rmse: float
-    record_findings: tuple[RecordFinding, ...] = ()
 
 
 def diagnose(
@@ -211,6 +147,11 @@ def diagnose(
         second = assess_evidence(model_error, fitted, effects, rng)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome
     found = _make_diagnosis(record, outcome, base, effects, fitted, rng, progress, parallel_map)
+    if outcome.verdict != Verdict.NOTHING or outcome.hypothesis.fit.noise.order:
+        progress("searching for missing terms", 0.95)
+        discovered = discover_terms(base, outcome.hypothesis, outcome.screened, target, fitted, rng)
+        if discovered is not None:
+            found = _extend_equations(found, *discovered, target, rng)
     closed_loop = find_closed_loop(found.best, record.y, fitted, record.input_names[0])
     return replace(found, record_findings=(*record_findings, *closed_loop))
 
@@ -235,6 +176,39 @@ def _make_gross_diagnosis(
         is_noise_floor_measured=False,
         nominal_rmse=compute_rmse((record.y - base.output)[fitted:]),
         record_findings=list_record_findings(errors),
+    )
+
+
+def _extend_equations(
+    found: Diagnosis,
+    search: TermSearchResult,
+    discovery: Discovery,
+    target: Target,
+    rng: np.random.Generator,
+) -> Diagnosis:
+    """Return the diagnosis with discovered terms in place of effects, if they gain on the hold-out part."""
+    record, fitted = found.record, found.estimation_samples
+    fit = fit_initial_states(search.fit, target, fitted)
+    holdout = slice(fitted, record.samples)
+    gain = measure_gain(record, found.base.output, fit.output, holdout, found.noise_floor, rng)
+    if gain.ci95[0] <= 0.0:
+        return found
+    residual, output = (record.y - fit.output)[:fitted], fit.output[:fitted]
+    context = fit.simulation.context
+    floor = min(found.noise_floor, float(np.sqrt(fit.mean_square)))
+    return replace(
+        found,
+        verdict=Verdict.DISCOVERED,
+        effects=(
+            *describe_terms(replace(search, fit=fit), discovery, found.base, target, floor**2),
+            *describe_noise(record.y[:fitted], residual, context),
+        ),
+        gain=replace(gain, noise_floor=replace(gain.noise_floor, rmse=floor)),
+        residual_structure=find_residual_structure(residual, output, context, rng),
+        suggested_experiment="",
+        best=fit,
+        noise_floor=floor,
+        discovery=discovery,
     )
 
 

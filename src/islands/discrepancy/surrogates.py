@@ -9,7 +9,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.noise_model import NoiseModel, fit_noise
 from islands.discrepancy.calibration.preparation import select_effects
-from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.inference.screening import transfer_parameters
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.segments import count_runs

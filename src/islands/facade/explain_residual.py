@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
 from islands.evolution.engine import Engine, Stop

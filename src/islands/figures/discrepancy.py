@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
-from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.segments import fill_gaps, map_segments

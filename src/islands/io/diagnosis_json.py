@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from islands.discrepancy.detectability import SelfTest
-from islands.discrepancy.diagnosis import Candidate, Diagnosis
+from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Finding
 from islands.io.result_folder import record_document
@@ -35,6 +35,7 @@ def diagnosis_document(
         "record": record_document(diagnosis.record),
         "simulation": diagnosis.base.simulation.simulator.name,
         "verdict": str(diagnosis.verdict),
+        "discovered": None if diagnosis.discovery is None else asdict(diagnosis.discovery),
         "effects": [_describe_finding(finding) for finding in diagnosis.effects],
         "gain": None if diagnosis.gain is None else asdict(diagnosis.gain),
         "decisive_experiment": diagnosis.suggested_experiment or None,

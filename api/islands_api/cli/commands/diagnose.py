@@ -10,8 +10,8 @@ import typer
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.detectability import SelfTest, self_test
-from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.diagnosis import diagnose as run_diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.parallel import ParallelMap

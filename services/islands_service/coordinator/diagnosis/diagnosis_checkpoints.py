@@ -7,7 +7,7 @@ from typing import Any, TextIO
 
 import structlog
 
-from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.inference.fit_journal import FitJournal, journal_from_document
 from islands.errors import ModelError
 from islands.evolution.search_state import SearchState

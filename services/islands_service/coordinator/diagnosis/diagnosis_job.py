@@ -5,7 +5,8 @@ from time import sleep
 
 import structlog
 
-from islands.discrepancy.diagnosis import Diagnosis, diagnose
+from islands.discrepancy.diagnosis import diagnose
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.evolution.engine import Engine

@@ -51,6 +51,7 @@ class Verdict(StrEnum):
     NAMED = "named"
     REMAINDER = "named with remainder"
     UNKNOWN = "unknown"
+    DISCOVERED = "discovered"
     GROSS_ERROR = "gross error"
 
 

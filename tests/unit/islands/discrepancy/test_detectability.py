@@ -17,7 +17,8 @@ from islands.discrepancy.detectability import (
     estimate_rate,
     self_test,
 )
-from islands.discrepancy.diagnosis import Candidate, Diagnosis, diagnose
+from islands.discrepancy.diagnosis import diagnose
+from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
 from islands.discrepancy.inference import noise_floor
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext
 from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator

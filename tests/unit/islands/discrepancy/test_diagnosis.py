@@ -7,7 +7,8 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.preparation import HOLDOUT_FRACTION, MIN_SAMPLES
-from islands.discrepancy.diagnosis import Diagnosis, diagnose
+from islands.discrepancy.diagnosis import diagnose
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator

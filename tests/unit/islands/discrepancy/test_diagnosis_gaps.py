@@ -7,7 +7,7 @@ import scipy
 import islands
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.preparation import make_target
-from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.noise_floor import noise_variance_from_periods
 from islands.discrepancy.interfaces.segments import count_runs, fill_gaps, find_runs, split_at_gaps

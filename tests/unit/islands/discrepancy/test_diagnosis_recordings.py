@@ -12,7 +12,7 @@ from islands.discrepancy.calibration.preparation import (
     count_fitted_samples,
     estimation_part,
 )
-from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.surrogates import make_surrogates

@@ -8,7 +8,8 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import Target
-from islands.discrepancy.diagnosis import Diagnosis, diagnose
+from islands.discrepancy.diagnosis import diagnose
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.gross_errors.gross_error_search import limit_to_tolerances
 from islands.discrepancy.inference.verdict import Verdict
 from islands.errors import RecordError

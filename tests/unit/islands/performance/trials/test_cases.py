@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
-from islands.discrepancy.diagnosis import Diagnosis, diagnose
+from islands.discrepancy.diagnosis import diagnose
+from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.performance.trials.cases import CASES, identify_actuator
 from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.injection.piezo import PIEZO

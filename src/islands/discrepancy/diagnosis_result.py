@@ -1,0 +1,83 @@
+"""Result of a diagnosis."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.discovery.discovery import Discovery
+from islands.discrepancy.gross_errors.record_finding import RecordFinding
+from islands.discrepancy.inference.holdout import HoldoutGain
+from islands.discrepancy.inference.verdict import Finding, Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A screened effect: the simulation extended by this effect alone.
+
+    Attributes
+    ----------
+    name : str
+    score : float
+        Score gain in minus twice the log-likelihood, less the BIC penalty.
+    explained_fraction : float
+        Fraction of the explainable misfit that the effect explains.
+    """
+
+    name: str
+    score: float
+    explained_fraction: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Diagnosis:
+    """Result of a diagnosis.
+
+    Attributes
+    ----------
+    verdict : Verdict
+    effects : tuple of Finding
+        The named causes, the most important first, then the properties of the noise; empty for "nothing" and
+        "unknown".
+    candidates : tuple of Candidate
+        All screened effects, the best first.
+    gain : HoldoutGain or None
+        Errors over the hold-out part; None if no effect was added to the simulation.
+    residual_structure : mapping of str to float
+        Maps in which the residual is not random, with their distance in standard deviations.
+    suggested_experiment : str
+        Experiment that discriminates between the named causes and their equivalents; empty if there is none.
+    record : Dataset
+        The record without the channels that were left out.
+    estimation_samples : int
+        Number of samples, from the first on, that are used for estimation; the rest is the hold-out part.
+    base, best : CalibrationResult
+        The simulation calibrated without the effects, and with them.
+    noise_floor : float
+        Expected lower bound on the RMSE of any simulation.
+    is_noise_floor_measured : bool
+        Whether the noise floor is measured from repeated periods; otherwise it is an upper bound from a
+        flexible reference model.
+    nominal_rmse : float
+        RMSE of the simulation at its nominal values over the hold-out part.
+    record_findings : tuple of RecordFinding
+        Channels that were left out, and other findings about the record.
+    discovery : Discovery or None
+        Equations with missing terms that were found; None unless the verdict is "discovered".
+    """
+
+    verdict: Verdict
+    effects: tuple[Finding, ...]
+    candidates: tuple[Candidate, ...]
+    gain: HoldoutGain | None
+    residual_structure: Mapping[str, float]
+    suggested_experiment: str
+    record: Dataset
+    estimation_samples: int
+    base: CalibrationResult
+    best: CalibrationResult
+    noise_floor: float
+    is_noise_floor_measured: bool
+    nominal_rmse: float
+    record_findings: tuple[RecordFinding, ...] = ()
+    discovery: Discovery | None = None

@@ -1,0 +1,152 @@
+"""Candidate terms of an equation: small expressions of states, input, the rate of the input, and time."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from islands.systems.ode.equation_parser import TIME, parse_expression
+from islands.systems.ode.ode_expression import (
+    OdeExpression,
+    Operation,
+    Symbol,
+    evaluate,
+    find_symbols,
+    render,
+)
+from islands.systems.ode.ode_system import OUTPUT, OdeParameter, OdeSystem
+
+#: Functions of one signal ``a``.
+UNARY = ("a", "a**2", "a**3", "a**5", "abs(a)", "abs(a)*a", "sign(a)", "max(a, 0)", "sqrt(abs(a))*sign(a)")
+
+#: Factors of products of two signals.
+FACTORS = ("a", "a**2", "abs(a)", "sign(a)")
+
+#: Functions with a scale that is fitted: a saturation.
+SATURATION = "tanh({signal}/{scale})"
+
+#: Nominal scale of a saturation, relative to the largest value of its signal.
+NOMINAL_SCALE = 0.3
+
+
+#: Nominal value and bound of a coefficient, relative to that of a term as large as the rest of its equation.
+NOMINAL, LIMIT = 1e-3, 1e4
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateTerm:
+    """A term that may be missing, without its coefficient.
+
+    Attributes
+    ----------
+    target : str
+        State to whose derivative the term is added, or ``output``.
+    text : str
+        Expression, with ``{scale}`` for a scale that is fitted.
+    size : float
+        Typical largest value of the expression.
+    scale : float or None
+        Nominal scale; None if the expression has none.
+    """
+
+    target: str
+    text: str
+    size: float
+    scale: float | None = None
+
+    @property
+    def value_count(self) -> int:
+        """Number of values that are fitted: the coefficient, and the scale if there is one."""
+        return 1 if self.scale is None else 2
+
+    def add_to(self, system: OdeSystem, suffix: str, target_size: float) -> tuple[OdeSystem, tuple[str, ...]]:
+        """Return a system with this term, and the names of the new parameters.
+
+        Parameters
+        ----------
+        suffix : str
+            End of the names of the new parameters, which are ``a`` and ``s`` with this suffix.
+        target_size : float
+            Largest absolute value of the right-hand side, for the bounds of the coefficient.
+        """
+        coefficient, scale = f"a{suffix}", f"s{suffix}"
+        unit = target_size / self.size
+        # The typical change of a parameter is relative to its nominal value, which is therefore not zero.
+        parameters = [
+            OdeParameter(coefficient, NOMINAL * unit, lower=-LIMIT * unit, upper=LIMIT * unit),
+        ]
+        if self.scale is not None:
+            parameters.append(OdeParameter(scale, self.scale))
+        text = self.text.format(scale=scale)
+        extended = system.with_term(self.target, f"{coefficient}*({text})", parameters)
+        return extended, tuple(each.name for each in parameters)
+
+
+def list_candidate_terms(
+    system: OdeSystem, sizes: Mapping[str, float], duration: float
+) -> tuple[CandidateTerm, ...]:
+    """Return the candidate terms of a system.
+
+    Equations that only define a rate, such as ``dx/dt = v``, get no terms: they are definitions.
+
+    Parameters
+    ----------
+    sizes : mapping
+        Largest absolute values of the states, of the input, and of its rate (``rate(u)``).
+    duration : float
+        Duration of the record in seconds.
+    """
+    signals = [*(name for name, _ in system.derivatives), system.input]
+    rate = f"rate({system.input})"
+    texts = list(dict.fromkeys(_list_texts(signals, rate)))
+    values = {**sizes, TIME: duration}
+    targets = [name for name, right in system.derivatives if not isinstance(right, Symbol)]
+    terms = []
+    for target in (*targets, OUTPUT):
+        own = system.output if target == OUTPUT else dict(system.derivatives)[target]
+        for text in texts:
+            expression = parse_expression(text)
+            if render(expression) == render(own):
+                continue
+            terms.append(CandidateTerm(target, text, _compute_size(expression, values)))
+        for signal in signals:
+            scale = NOMINAL_SCALE * sizes[signal]
+            terms.append(CandidateTerm(target, SATURATION.format(signal=signal, scale="{scale}"), 1.0, scale))
+    return tuple(terms)
+
+
+def _list_texts(signals: list[str], rate: str) -> Iterator[str]:
+    for signal in signals:
+        yield from (_insert(form, signal) for form in UNARY)
+    yield from (_insert(form, rate) for form in ("a", "abs(a)", "sign(a)"))
+    yield TIME
+    for signal in signals:
+        yield f"{TIME}*{signal}"
+        yield f"abs({rate})*{signal}"
+    for one, other in combinations(signals, 2):
+        for first in FACTORS:
+            for second in FACTORS:
+                yield f"{_insert(first, one)}*{_insert(second, other)}"
+    for three in combinations(signals, 3):
+        yield "*".join(three)
+
+
+def _insert(form: str, signal: str) -> str:
+    """Write a form with a signal in place of ``a``."""
+    return render(_substitute(parse_expression(form), parse_expression(signal)))
+
+
+def _substitute(expression: OdeExpression, replacement: OdeExpression) -> OdeExpression:
+    match expression:
+        case Symbol():
+            return replacement
+        case Operation(function, arguments):
+            return Operation(function, tuple(_substitute(each, replacement) for each in arguments))
+    return expression
+
+
+def _compute_size(expression: OdeExpression, values: Mapping[str, float]) -> float:
+    """Return the value of an expression at the largest values of its signals."""
+    found = abs(float(evaluate(expression, {**dict.fromkeys(find_symbols(expression), 1.0), **values})))
+    return found if np.isfinite(found) and found > 0.0 else 1.0

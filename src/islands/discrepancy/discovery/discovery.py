@@ -1,0 +1,121 @@
+"""Discovery of missing terms: equations with more terms that explain a record better than the catalogue."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from islands.discrepancy.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    Target,
+    estimate_covariance,
+    evaluate_fit,
+)
+from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
+from islands.discrepancy.inference.holdout import cross_validate_gain
+from islands.discrepancy.inference.hypothesis import Hypothesis
+from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
+from islands.discrepancy.inference.verdict import (
+    CONFIDENCE_TEMPERATURE,
+    EQUIVALENCE_MARGIN,
+    Finding,
+    Value,
+    explained_fraction,
+)
+
+#: Part of the gain of the terms by which they have to be better than effects. The catalogue has one form of
+#: each effect, and another one, such as a sign for a smoothed sign, is no other cause.
+MIN_RELATIVE_GAIN = 0.1
+
+#: Name and family of a discovered term in findings.
+MISSING_TERM, FAMILY = "missing-term", "discovered"
+
+
+@dataclass(frozen=True, slots=True)
+class Discovery:
+    """Equations with missing terms, and the nearest effects of the catalogue.
+
+    Attributes
+    ----------
+    equations : str
+        Extended equations, and the values of their new parameters.
+    nearest : tuple of str
+        Names of the effects that explain the record best.
+    worse_by : float
+        Difference between their score and that of the equations; at least the margin of equivalents.
+    """
+
+    equations: str
+    nearest: tuple[str, ...]
+    worse_by: float
+
+
+def discover_terms(
+    base: CalibrationResult,
+    hypothesis: Hypothesis,
+    screened: Sequence[ScreenedEffect],
+    target: Target,
+    fitted: int,
+    rng: np.random.Generator,
+) -> tuple[TermSearchResult, Discovery] | None:
+    """Search for missing terms that explain a record better than the effects of the catalogue.
+
+    Parameters
+    ----------
+    base : CalibrationResult
+        The simulation without effects, calibrated to unweighted residuals.
+    hypothesis : Hypothesis
+        The best effects, if there are any.
+    screened : sequence of ScreenedEffect
+        Single effects, the best first; the nearest one if the hypothesis has none.
+    target : Target
+        Target of ``base``.
+    fitted : int
+        Number of samples used for estimation.
+
+    Returns
+    -------
+    tuple or None
+        None if the simulator has no equations, if no term gains enough, also on blocks that are left out, or
+        if effects explain the record as well.
+    """
+    found = search_terms(base, target)
+    if found is None:
+        return None
+    effects = hypothesis.effects or tuple(each.effect for each in screened[:1])
+    fit = hypothesis.fit if hypothesis.effects or not screened else screened[0].fit
+    # The scores of a search with model error count other samples.
+    scored = evaluate_fit(fit.simulation, target, fit.values)
+    named_cost = scored.score + sum(bic_penalty(effect, base) for effect in effects)
+    margin = max(EQUIVALENCE_MARGIN, MIN_RELATIVE_GAIN * (base.score - found.cost))
+    if found.cost > named_cost - margin:
+        return None
+    if cross_validate_gain(base, False, found.fit, target, fitted, rng) <= 0.0:
+        return None
+    names = tuple(dict.fromkeys(effect.cause for effect in effects))
+    return found, Discovery(found.describe(), names, named_cost - found.cost)
+
+
+def describe_terms(
+    found: TermSearchResult, discovery: Discovery, base: CalibrationResult, target: Target, floor: float
+) -> tuple[Finding, ...]:
+    """Return a finding for each term.
+
+    Parameters
+    ----------
+    floor : float
+        Mean square of the noise.
+    """
+    fit = found.fit
+    deviations = np.sqrt(np.maximum(np.diag(estimate_covariance(fit, target)), 0.0))
+    places = {parameter.name: index for index, parameter in enumerate(fit.simulation.parameters)}
+    confidence = 1.0 / (1.0 + float(np.exp(-discovery.worse_by / (2 * CONFIDENCE_TEMPERATURE))))
+    findings = []
+    for each in found.terms:
+        values = {}
+        for name in each.parameters:
+            value, half = float(fit.values[places[name]]), 1.96 * float(deviations[places[name]])
+            values[name] = Value(value, "", (value - half, value + half))
+        share = explained_fraction(base, fit, floor)
+        findings.append(Finding(MISSING_TERM, FAMILY, confidence, (), values, each.gain, share))
+    return tuple(findings)

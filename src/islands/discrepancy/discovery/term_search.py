@@ -1,0 +1,242 @@
+"""Search for terms that the equations of a simulation lack.
+
+Each candidate term is simulated in its equation. Its response to a small coefficient, without the part that
+the other parameters reproduce, says how much of the residual it explains: forward selection by the error
+reduction ratio (Billings, Nonlinear System Identification, section 3), with responses instead of regressors.
+The most promising terms are then fitted with all parameters by the Levenberg-Marquardt method.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
+from islands.discrepancy.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    Target,
+    calibrate,
+    whiten_target,
+)
+from islands.discrepancy.discovery.candidate_terms import CandidateTerm, list_candidate_terms
+from islands.discrepancy.discovery.equation_simulator import find_equations, with_equations
+from islands.discrepancy.inference.screening import Projection
+from islands.discrepancy.inference.stepwise_search import MIN_GAIN
+from islands.discrepancy.interfaces.context import Signal
+from islands.discrepancy.simulators.coordinates import peak_amplitude
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.kernels.simd import VECTOR
+from islands.systems.ode.ode_expression import render
+from islands.systems.ode.ode_system import OUTPUT, OdeSystem
+
+#: Maximum number of terms.
+MAX_TERMS = 3
+
+#: Number of terms of each step that are fitted with all parameters.
+FITTED_TERMS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class DiscoveredTerm:
+    """A term that has been added to an equation.
+
+    Attributes
+    ----------
+    term : CandidateTerm
+    parameters : tuple of str
+        Names of its parameters in the equations: the coefficient, and the scale if there is one.
+    gain : float
+        Decrease of minus twice the log-likelihood when it was added, less the penalty.
+    penalty : float
+        BIC penalty of its values, and the logarithm of the number of terms that could gain by chance.
+    """
+
+    term: CandidateTerm
+    parameters: tuple[str, ...]
+    gain: float
+    penalty: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TermSearchResult:
+    """Equations with the terms that a search has added.
+
+    Attributes
+    ----------
+    fit : CalibrationResult
+    terms : tuple of DiscoveredTerm
+        In the order in which they were found.
+    """
+
+    fit: CalibrationResult
+    terms: tuple[DiscoveredTerm, ...]
+
+    @property
+    def cost(self) -> float:
+        """Score of the fit plus the penalties of its terms; less is better."""
+        return self.fit.score + sum(each.penalty for each in self.terms)
+
+    def describe(self) -> str:
+        """Return the extended equations and the values of their new parameters as one line."""
+        system = _get_system(self.fit)
+        right_sides = {**dict(system.derivatives), OUTPUT: system.output}
+        changed = dict.fromkeys(each.term.target for each in self.terms)
+        lines = [
+            f"{target if target == OUTPUT else f'd{target}/dt'} = {render(right_sides[target])}"
+            for target in changed
+        ]
+        new = [name for each in self.terms for name in each.parameters]
+        values = dict(
+            zip((each.name for each in self.fit.simulation.parameters), self.fit.values, strict=True)
+        )
+        return "; ".join([*lines, ", ".join(f"{name} = {values[name]:.4g}" for name in new)])
+
+
+def search_terms(base: CalibrationResult, target: Target) -> TermSearchResult | None:
+    """Add terms to the equations of a simulation as long as each gains more than any would by chance.
+
+    Parameters
+    ----------
+    base : CalibrationResult
+        The calibrated simulation.
+    target : Target
+
+    Returns
+    -------
+    TermSearchResult or None
+        None if the simulator has no equations, or if no term gains enough.
+    """
+    equations = find_equations(base.simulation.simulator)
+    if equations is None:
+        return None
+    context = base.simulation.context
+    system = equations.system
+    rate = peak_amplitude(context.take_differences(context.u)) / context.dt
+    sizes = {**equations.sizes, system.input: context.input_peak, f"rate({system.input})": rate}
+    candidates = list_candidate_terms(system, sizes, context.duration)
+    target_sizes = {OUTPUT: context.output_peak, **{name: sizes[f"d{name}/dt"] for name in equations.initial}}
+    found = TermSearchResult(base, ())
+    while len(found.terms) < MAX_TERMS:
+        target = whiten_target(target, found.fit)
+        found = _improve(found, calibrate(found.fit.simulation, target, found.fit.values))
+        best = _find_best_term(found, target, candidates, target_sizes)
+        if best is None or best.cost > found.cost - MIN_GAIN:
+            break
+        found = _eliminate_terms(_select_discretisation(best, target), system, target, target_sizes)
+    return found if found.terms else None
+
+
+def _improve(found: TermSearchResult, fit: CalibrationResult) -> TermSearchResult:
+    """Return the equations with another fit, if that is better."""
+    return replace(found, fit=fit) if fit.score < found.fit.score else found
+
+
+def _select_discretisation(found: TermSearchResult, target: Target) -> TermSearchResult:
+    """Select the intersample behaviour again, which the missing term may have hidden."""
+    simulator = select_intersample(found.fit, target)
+    if same_discretisation(simulator, found.fit.simulation.simulator):
+        return found
+    simulation = replace(found.fit.simulation, simulator=simulator)
+    return replace(found, fit=calibrate(simulation, target, found.fit.values))
+
+
+def _eliminate_terms(
+    found: TermSearchResult, system: OdeSystem, target: Target, target_sizes: Mapping[str, float]
+) -> TermSearchResult:
+    """Remove terms that later ones have made unnecessary; ``system`` has none of them."""
+    while len(found.terms) > 1:
+        smaller = []
+        for left_out in found.terms:
+            kept = tuple(each for each in found.terms if each is not left_out)
+            numbered = [(each.term, each.parameters[0].removeprefix("a")) for each in kept]
+            simulation, _, start = _add_terms(found.fit, system, numbered, target_sizes)
+            smaller.append(TermSearchResult(calibrate(simulation, target, start), kept))
+        best = min(smaller, key=lambda each: each.cost)
+        if best.cost > found.cost + MIN_GAIN:
+            break
+        found = best
+    return found
+
+
+def _find_best_term(
+    found: TermSearchResult,
+    target: Target,
+    candidates: Sequence[CandidateTerm],
+    target_sizes: Mapping[str, float],
+) -> TermSearchResult | None:
+    """Return the equations with the term that is best after a calibration of all parameters."""
+    fit, used = found.fit, {(each.term.target, each.term.text) for each in found.terms}
+    number = 1 + max((int(each.parameters[0].removeprefix("a")) for each in found.terms), default=0)
+    free = [each for each in candidates if (each.target, each.text) not in used]
+    log_n, log_choices = float(np.log(fit.noise.effective_samples)), 2.0 * float(np.log(len(candidates)))
+    results = []
+    for term in _rank_terms(fit, target, free, target_sizes)[:FITTED_TERMS]:
+        simulation, names, start = _add_terms(fit, _get_system(fit), [(term, str(number))], target_sizes)
+        extended = calibrate(simulation, target, start)
+        if not np.isfinite(extended.score):
+            continue
+        # Any of the candidates could gain by chance.
+        penalty = term.value_count * log_n + log_choices
+        added = DiscoveredTerm(term, names, fit.score - extended.score - penalty, penalty)
+        results.append(TermSearchResult(extended, (*found.terms, added)))
+    return min(results, key=lambda each: each.cost, default=None)
+
+
+def _rank_terms(
+    fit: CalibrationResult,
+    target: Target,
+    candidates: Sequence[CandidateTerm],
+    target_sizes: Mapping[str, float],
+) -> list[CandidateTerm]:
+    """Return the terms in the order of the part of the residual that their linear responses explain."""
+    projection = Projection(fit, target)
+    explained: list[float] = []
+    for first in range(0, len(candidates), VECTOR):
+        # As many terms as lanes are in the equations; each lane has the coefficient of one of them.
+        group = candidates[first : first + VECTOR]
+        numbered = [(term, f"_{index}") for index, term in enumerate(group)]
+        simulation, _, start = _add_terms(fit, _get_system(fit), numbered, target_sizes)
+        places = {parameter.name: index for index, parameter in enumerate(simulation.parameters)}
+        points = np.tile(start, (len(group), 1))
+        for index in range(len(group)):
+            points[index, places[f"a_{index}"]] = simulation.parameters[places[f"a_{index}"]].nominal
+        outputs = simulation.simulate_batch(points)
+        explained += [_explain(output - fit.output, projection) for output in outputs]
+    order = np.argsort(-np.array(explained), kind="stable")
+    return [candidates[index] for index in order if explained[index] > 0.0]
+
+
+def _explain(response: Signal, projection: Projection) -> float:
+    """Return the sum of squares of the residual that a response explains."""
+    if not np.isfinite(response).all():
+        return 0.0
+    projected = projection(response)
+    energy = float(projected @ projected)
+    return float(projected @ projection.residual) ** 2 / energy if energy > 0.0 else 0.0
+
+
+def _add_terms(
+    fit: CalibrationResult,
+    system: OdeSystem,
+    terms: Sequence[tuple[CandidateTerm, str]],
+    target_sizes: Mapping[str, float],
+) -> tuple[ExtendedSimulator, tuple[str, ...], Signal]:
+    """Return a simulation of a system with more terms, the names of their parameters, and its values.
+
+    Known parameters have the values of ``fit``; coefficients of new terms are zero.
+    """
+    names: tuple[str, ...] = ()
+    for term, suffix in terms:
+        system, added = term.add_to(system, suffix, target_sizes[term.target])
+        names = (*names, *added)
+    simulation = replace(fit.simulation, simulator=with_equations(fit.simulation.simulator, system))
+    values = {f"a{suffix}": 0.0 for _, suffix in terms}
+    values |= {each.name: v for each, v in zip(fit.simulation.parameters, fit.values, strict=True)}
+    start = [values.get(parameter.name, parameter.nominal) for parameter in simulation.parameters]
+    return simulation, names, np.array(start)
+
+
+def _get_system(fit: CalibrationResult) -> OdeSystem:
+    equations = find_equations(fit.simulation.simulator)
+    assert equations is not None
+    return equations.system

@@ -1,0 +1,159 @@
+"""Discovery: terms that equations lack are found, and named effects and noise are not replaced by terms."""
+
+import json
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset
+from islands.discrepancy.calibration.levenberg_marquardt import calibrate
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, make_target
+from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.discrepancy.discovery.candidate_terms import list_candidate_terms
+from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
+from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.io.diagnosis_json import diagnosis_document
+from islands.io.simulator_spec.document import extended_json
+from islands.io.simulator_spec.factory import make_simulator, simulate_spec
+from islands.io.simulator_spec.ode_spec import OdeSpec
+from islands_service.reports.diagnosis_report import diagnosis_report, summarise
+
+DT = 0.01
+
+#: Integration steps per sample; the simulation of the analysis uses fewer.
+STEPS = 10
+
+DOCUMENT = {
+    "name": "oscillator",
+    "input": "F",
+    "output": "x",
+    "equations": "dx/dt = v\ndv/dt = (F - c*v - k*x - force)/m\n",
+    "parameters": {"m": {"value": 1.05}, "c": {"value": 1.8}, "k": {"value": 105.0}},
+    "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}},
+    "force": {"coordinate": "x", "rate": "v"},
+}
+
+Law = Callable[[float, float, float], float]
+
+#: Forces that resist the motion, and the terms of dv/dt with their coefficients; m is 1.
+LAWS: dict[str, tuple[Law, str, float]] = {
+    "van der Pol": (lambda x, v, _u: 40.0 * x * x * v, "x**2*v", -40.0),
+    "product": (lambda x, v, _u: 6.0 * x * v, "x*v", -6.0),
+    "bilinear": (lambda x, _v, u: 0.5 * x * u, "x*F", -0.5),
+    "fifth power": (lambda x, _v, _u: 2000.0 * x**5, "x**5", -2000.0),
+}
+
+
+def simulate(law: Law, samples: int = 1200, seed: int = 1) -> Dataset:
+    """Simulate an oscillator with an additional force by the midpoint rule, with noise of one per cent."""
+    rng = np.random.default_rng(seed)
+    time = DT * np.arange(samples)
+    frequencies = rng.uniform(0.2, 3.0, 12)
+    u = 12.0 * np.sin(2 * np.pi * np.outer(time, frequencies) + rng.uniform(0, 6.3, 12)).sum(axis=1)
+    u *= np.minimum(1.0, time)
+    # The force at the middle of each step; it is linear between samples.
+    fine = np.interp(DT / STEPS * (0.5 + np.arange(samples * STEPS)), time, u)
+    x = v = 0.0
+    y = np.empty(samples * STEPS)
+    h = DT / STEPS
+    for k, force in enumerate(fine):
+        y[k] = x
+        middle_x = x + h / 2 * v
+        middle_v = v + h / 2 * (force - 2.0 * v - 100.0 * x - law(x, v, force))
+        x, v = (
+            x + h * middle_v,
+            v + h * (force - 2.0 * middle_v - 100.0 * middle_x - law(middle_x, middle_v, force)),
+        )
+    y = y[::STEPS]
+    noise = 0.01 * np.std(y) * rng.standard_normal(samples)
+    return Dataset(u, y + noise, DT, ("F_N",), output_name="x_m", input_units=("N",), output_unit="m")
+
+
+def search(law: Law) -> TermSearchResult | None:
+    record = simulate(law)
+    simulator = make_simulator(OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), record)
+    fitted = count_fitted_samples(record)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
+    target = make_target(record, fitted, {})
+    return search_terms(calibrate(simulation, target, simulation.nominal), target)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", LAWS)
+def test_missing_term_is_found_with_its_coefficient(name: str) -> None:
+    law, text, coefficient = LAWS[name]
+    found = search(law)
+    assert found is not None
+    assert [(each.term.target, each.term.text) for each in found.terms] == [("v", text)]
+    values = {
+        parameter.name: value
+        for parameter, value in zip(found.fit.simulation.parameters, found.fit.values, strict=True)
+    }
+    assert values[found.terms[0].parameters[0]] == pytest.approx(coefficient, rel=0.05)
+    assert text in found.describe()
+
+
+@pytest.mark.ci
+def test_saturation_is_found_with_its_scale() -> None:
+    found = search(lambda x, _v, _u: 20.0 * np.tanh(x / 0.1))
+    assert found is not None
+    assert [each.term.text for each in found.terms] == ["tanh(x/{scale})"]
+    scale = dict(zip((each.name for each in found.fit.simulation.parameters), found.fit.values, strict=True))
+    assert scale["s1"] == pytest.approx(0.1, rel=0.1)
+
+
+def test_no_term_is_added_to_right_equations() -> None:
+    assert search(lambda _x, _v, _u: 0.0) is None
+
+
+def test_definition_of_a_rate_gets_no_terms() -> None:
+    simulator = make_simulator(
+        OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), simulate(LAWS["product"][0])
+    )
+    sizes = {"x": 1.0, "v": 2.0, "F": 3.0, "rate(F)": 4.0}
+    terms = list_candidate_terms(simulator.system, sizes, 10.0)  # type: ignore[attr-defined]
+    assert {each.target for each in terms} == {"v", "output"}
+    assert len({(each.target, each.text) for each in terms}) == len(terms)
+    assert {each.size for each in terms if each.text == "x**2*v"} == {2.0}
+
+
+@cache
+def diagnose(name: str) -> Diagnosis:
+    law = LAWS[name][0] if name in LAWS else lambda _x, v, _u: 1.5 * np.sign(v)
+    return islands.diagnose(simulate(law), OdeSpec.model_validate({"kind": "ode", **DOCUMENT}))
+
+
+@pytest.mark.ci
+def test_discovered_equations_are_the_diagnosis_if_no_effect_explains_as_much() -> None:
+    found = diagnose("bilinear")
+    assert found.verdict == Verdict.DISCOVERED
+    assert found.discovery is not None
+    assert found.discovery.worse_by > 9.0
+    assert found.gain is not None
+    assert found.gain.ci95[0] > 0.0
+    (value,) = found.effects[0].parameters.values()
+    assert value.ci95 is not None
+    assert value.ci95[0] < -0.5 < value.ci95[1]
+    document = diagnosis_document(found)
+    assert document["discovered"]["equations"].startswith("dv/dt = ")
+    assert found.discovery.equations in summarise(found)
+    assert b"x*F" in diagnosis_report("record", found)
+
+
+@pytest.mark.ci
+def test_extended_equations_simulate_another_record() -> None:
+    found = diagnose("bilinear")
+    other = simulate(LAWS["bilinear"][0], seed=2)
+    simulated = simulate_spec(json.loads(extended_json(found.best, found.record)), other)
+    assert np.std(other.y - simulated) < 0.02 * np.std(other.y)
+
+
+@pytest.mark.ci
+def test_named_effect_wins_over_terms_that_explain_as_much() -> None:
+    found = diagnose("dry friction")
+    assert [each.name for each in found.effects][:1] == ["coulomb-friction"]
+    assert found.discovery is None
