@@ -74,9 +74,10 @@ def explainable_variance(
     if explained <= MIN_FRACTION * float(np.mean(residual**2)):
         return explained
     runs = count_runs(is_known, segments)
-    surrogates = draw_surrogates(residual, runs, Randomisation.PHASES, SURROGATES, rng.spawn(1)[0])
-    by_chance = _predict_mean_square(designs, np.column_stack(list(surrogates)))
-    return explained if explained > float(np.max(by_chance)) else 0.0
+    drawn = draw_surrogates(residual, runs, Randomisation.PHASES, SURROGATES, rng.spawn(1)[0])
+    surrogates = np.column_stack(list(drawn))
+    by_chance = _predict_mean_square(designs, surrogates) / np.mean(surrogates**2, axis=0)
+    return explained if explained > float(np.max(by_chance)) * float(np.mean(residual**2)) else 0.0
 
 
 def _make_designs(raw: Signal, rng: np.random.Generator) -> list[Signal]:

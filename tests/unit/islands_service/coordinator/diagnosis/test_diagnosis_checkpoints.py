@@ -77,6 +77,7 @@ def cheap_analysis() -> Iterator[None]:
     """Shorten all parts but the fits, and write a checkpoint after each fit and each epoch."""
     with pytest.MonkeyPatch.context() as patch, undrawn_figures():
         patch.setattr(noise_floor, "RANDOM_FEATURES", 20)
+        patch.setattr(noise_floor, "SURROGATES", 1)
         patch.setattr(explain_residual, "SEARCH", MappingProxyType({**explain_residual.SEARCH, **SEARCH}))
         patch.setattr(diagnosis_progress, "REPORT_EVERY", -1.0)
         patch.setattr(diagnosis_progress, "CHECKPOINT_SHARE", 1e9)
