@@ -190,12 +190,12 @@ def _extend_equations(
     record, fitted = found.record, found.estimation_samples
     fit = fit_initial_states(search.fit, target, fitted)
     holdout = slice(fitted, record.samples)
-    gain = measure_gain(record, found.base.output, fit.output, holdout, found.noise_floor, rng)
+    floor = min(found.noise_floor, float(np.sqrt(fit.mean_square)))
+    gain = measure_gain(record, found.base.output, fit.output, holdout, floor, rng)
     if gain.ci95[0] <= 0.0:
         return found
     residual, output = (record.y - fit.output)[:fitted], fit.output[:fitted]
     context = fit.simulation.context
-    floor = min(found.noise_floor, float(np.sqrt(fit.mean_square)))
     return replace(
         found,
         verdict=Verdict.DISCOVERED,
@@ -203,7 +203,7 @@ def _extend_equations(
             *describe_terms(replace(search, fit=fit), discovery, found.base, target, floor**2),
             *describe_noise(record.y[:fitted], residual, context),
         ),
-        gain=replace(gain, noise_floor=replace(gain.noise_floor, rmse=floor)),
+        gain=gain,
         residual_structure=find_residual_structure(residual, output, context, rng),
         suggested_experiment="",
         best=fit,
