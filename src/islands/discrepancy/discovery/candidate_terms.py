@@ -1,8 +1,8 @@
 """Candidate terms of an equation: small expressions of states, input, the rate of the input, and time."""
 
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -60,27 +60,36 @@ class CandidateTerm:
         """Number of values that are fitted: the coefficient, and the scale if there is one."""
         return 1 if self.scale is None else 2
 
-    def add_to(self, system: OdeSystem, suffix: str, target_size: float) -> tuple[OdeSystem, tuple[str, ...]]:
-        """Return a system with this term, and the names of the new parameters.
+    def name_parameters(self, number: int) -> tuple[str, ...]:
+        """Return the names of the coefficient, and of the scale if there is one, of a numbered term."""
+        return (f"a{number}", f"s{number}")[: self.value_count]
+
+    def add_to(self, system: OdeSystem, number: int, target_size: float) -> OdeSystem:
+        """Return a system with this term.
 
         Parameters
         ----------
-        suffix : str
-            End of the names of the new parameters, which are ``a`` and ``s`` with this suffix.
+        number : int
+            Number of the term in the names of its parameters.
         target_size : float
             Largest absolute value of the right-hand side, for the bounds of the coefficient.
         """
-        coefficient, scale = f"a{suffix}", f"s{suffix}"
+        coefficient, *scales = self.name_parameters(number)
         unit = target_size / self.size
         # The typical change of a parameter is relative to its nominal value, which is therefore not zero.
         parameters = [
             OdeParameter(coefficient, NOMINAL * unit, lower=-LIMIT * unit, upper=LIMIT * unit),
         ]
-        if self.scale is not None:
-            parameters.append(OdeParameter(scale, self.scale))
-        text = self.text.format(scale=scale)
-        extended = system.with_term(self.target, f"{coefficient}*({text})", parameters)
-        return extended, tuple(each.name for each in parameters)
+        parameters += [OdeParameter(name, self.scale) for name in scales if self.scale is not None]
+        text = self.text.format(scale="".join(scales))
+        return system.with_term(self.target, f"{coefficient}*({text})", parameters)
+
+
+def find_free_numbers(system: OdeSystem, count: int) -> list[int]:
+    """Return the smallest numbers of terms whose parameters have names that a system does not use."""
+    used = system.find_names()
+    free = (number for number in itertools.count(1) if not {f"a{number}", f"s{number}"} & used.keys())
+    return list(itertools.islice(free, count))
 
 
 def list_candidate_terms(
@@ -124,11 +133,11 @@ def _list_texts(signals: list[str], rate: str) -> Iterator[str]:
     for signal in signals:
         yield f"{TIME}*{signal}"
         yield f"abs({rate})*{signal}"
-    for one, other in combinations(signals, 2):
+    for one, other in itertools.combinations(signals, 2):
         for first in FACTORS:
             for second in FACTORS:
                 yield f"{_insert(first, one)}*{_insert(second, other)}"
-    for three in combinations(signals, 3):
+    for three in itertools.combinations(signals, 3):
         yield "*".join(three)
 
 

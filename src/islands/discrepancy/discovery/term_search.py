@@ -18,7 +18,11 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     calibrate,
     whiten_target,
 )
-from islands.discrepancy.discovery.candidate_terms import CandidateTerm, list_candidate_terms
+from islands.discrepancy.discovery.candidate_terms import (
+    CandidateTerm,
+    find_free_numbers,
+    list_candidate_terms,
+)
 from islands.discrepancy.discovery.equation_simulator import find_equations, with_equations
 from islands.discrepancy.inference.screening import Projection
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
@@ -43,8 +47,8 @@ class DiscoveredTerm:
     Attributes
     ----------
     term : CandidateTerm
-    parameters : tuple of str
-        Names of its parameters in the equations: the coefficient, and the scale if there is one.
+    number : int
+        Number of the term in the names of its parameters.
     gain : float
         Decrease of minus twice the log-likelihood when it was added, less the penalty.
     penalty : float
@@ -52,9 +56,14 @@ class DiscoveredTerm:
     """
 
     term: CandidateTerm
-    parameters: tuple[str, ...]
+    number: int
     gain: float
     penalty: float
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of its parameters in the equations: the coefficient, and the scale if there is one."""
+        return self.term.name_parameters(self.number)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,8 +157,8 @@ def _eliminate_terms(
         smaller = []
         for left_out in found.terms:
             kept = tuple(each for each in found.terms if each is not left_out)
-            numbered = [(each.term, each.parameters[0].removeprefix("a")) for each in kept]
-            simulation, _, start = _add_terms(found.fit, system, numbered, target_sizes)
+            numbered = [(each.term, each.number) for each in kept]
+            simulation, start = _add_terms(found.fit, system, numbered, target_sizes)
             smaller.append(TermSearchResult(calibrate(simulation, target, start), kept))
         best = min(smaller, key=lambda each: each.cost)
         if best.cost > found.cost + MIN_GAIN:
@@ -166,18 +175,18 @@ def _find_best_term(
 ) -> TermSearchResult | None:
     """Return the equations with the term that is best after a calibration of all parameters."""
     fit, used = found.fit, {(each.term.target, each.term.text) for each in found.terms}
-    number = 1 + max((int(each.parameters[0].removeprefix("a")) for each in found.terms), default=0)
+    (number,) = find_free_numbers(_get_system(fit), 1)
     free = [each for each in candidates if (each.target, each.text) not in used]
     log_n, log_choices = float(np.log(fit.noise.effective_samples)), 2.0 * float(np.log(len(candidates)))
     results = []
     for term in _rank_terms(fit, target, free, target_sizes)[:FITTED_TERMS]:
-        simulation, names, start = _add_terms(fit, _get_system(fit), [(term, str(number))], target_sizes)
+        simulation, start = _add_terms(fit, _get_system(fit), [(term, number)], target_sizes)
         extended = calibrate(simulation, target, start)
         if not np.isfinite(extended.score):
             continue
         # Any of the candidates could gain by chance.
         penalty = term.value_count * log_n + log_choices
-        added = DiscoveredTerm(term, names, fit.score - extended.score - penalty, penalty)
+        added = DiscoveredTerm(term, number, fit.score - extended.score - penalty, penalty)
         results.append(TermSearchResult(extended, (*found.terms, added)))
     return min(results, key=lambda each: each.cost, default=None)
 
@@ -194,12 +203,14 @@ def _rank_terms(
     for first in range(0, len(candidates), VECTOR):
         # As many terms as lanes are in the equations; each lane has the coefficient of one of them.
         group = candidates[first : first + VECTOR]
-        numbered = [(term, f"_{index}") for index, term in enumerate(group)]
-        simulation, _, start = _add_terms(fit, _get_system(fit), numbered, target_sizes)
+        numbers = find_free_numbers(_get_system(fit), len(group))
+        numbered = list(zip(group, numbers, strict=True))
+        simulation, start = _add_terms(fit, _get_system(fit), numbered, target_sizes)
         places = {parameter.name: index for index, parameter in enumerate(simulation.parameters)}
         points = np.tile(start, (len(group), 1))
-        for index in range(len(group)):
-            points[index, places[f"a_{index}"]] = simulation.parameters[places[f"a_{index}"]].nominal
+        for point, (term, number) in zip(points, numbered, strict=True):
+            place = places[term.name_parameters(number)[0]]
+            point[place] = simulation.parameters[place].nominal
         outputs = simulation.simulate_batch(points)
         explained += [_explain(output - fit.output, projection) for output in outputs]
     order = np.argsort(-np.array(explained), kind="stable")
@@ -218,22 +229,20 @@ def _explain(response: Signal, projection: Projection) -> float:
 def _add_terms(
     fit: CalibrationResult,
     system: OdeSystem,
-    terms: Sequence[tuple[CandidateTerm, str]],
+    terms: Sequence[tuple[CandidateTerm, int]],
     target_sizes: Mapping[str, float],
-) -> tuple[ExtendedSimulator, tuple[str, ...], Signal]:
-    """Return a simulation of a system with more terms, the names of their parameters, and its values.
+) -> tuple[ExtendedSimulator, Signal]:
+    """Return a simulation of a system with more, numbered terms, and its values.
 
     Known parameters have the values of ``fit``; coefficients of new terms are zero.
     """
-    names: tuple[str, ...] = ()
-    for term, suffix in terms:
-        system, added = term.add_to(system, suffix, target_sizes[term.target])
-        names = (*names, *added)
+    for term, number in terms:
+        system = term.add_to(system, number, target_sizes[term.target])
     simulation = replace(fit.simulation, simulator=with_equations(fit.simulation.simulator, system))
-    values = {f"a{suffix}": 0.0 for _, suffix in terms}
+    values = {term.name_parameters(number)[0]: 0.0 for term, number in terms}
     values |= {each.name: v for each, v in zip(fit.simulation.parameters, fit.values, strict=True)}
     start = [values.get(parameter.name, parameter.nominal) for parameter in simulation.parameters]
-    return simulation, names, np.array(start)
+    return simulation, np.array(start)
 
 
 def _get_system(fit: CalibrationResult) -> OdeSystem:

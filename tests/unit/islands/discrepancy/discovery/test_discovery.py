@@ -12,7 +12,7 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, make_target
 from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.discovery.candidate_terms import list_candidate_terms
+from islands.discrepancy.discovery.candidate_terms import find_free_numbers, list_candidate_terms
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -108,6 +108,18 @@ def test_saturation_is_found_with_its_scale() -> None:
 
 def test_no_term_is_added_to_right_equations() -> None:
     assert search(lambda _x, _v, _u: 0.0) is None
+
+
+def test_names_of_new_parameters_avoid_those_of_the_equations() -> None:
+    document = {
+        **DOCUMENT,
+        "equations": "dx/dt = v\ndv/dt = (F - c*v - a1*x - force)/s2\n",
+        "parameters": {"s2": {"value": 1.05}, "c": {"value": 1.8}, "a1": {"value": 105.0}},
+    }
+    simulator = make_simulator(
+        OdeSpec.model_validate({"kind": "ode", **document}), simulate(LAWS["product"][0])
+    )
+    assert find_free_numbers(simulator.system, 3) == [3, 4, 5]  # type: ignore[attr-defined]
 
 
 def test_definition_of_a_rate_gets_no_terms() -> None:
