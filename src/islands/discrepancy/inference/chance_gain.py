@@ -157,11 +157,12 @@ def _simulate_starting_points(base: CalibrationResult, effect: Effect, target: T
     """Return the responses to an effect at its starting points that are finite."""
     simulation = base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
     start = transfer_parameters(base.values, base.simulation, simulation)
-    responses = []
-    for point in get_starting_points(effect, simulation, fill_gaps(target.y - base.output)):
-        values = start.copy()
-        values[simulation.get_slice(effect)] = simulation.expand(effect, point)
-        responses.append(simulation.simulate(values) - base.output)
+    given = get_starting_points(effect, simulation, fill_gaps(target.y - base.output))
+    if not given:
+        return []
+    points = np.tile(start, (len(given), 1))
+    points[:, simulation.get_slice(effect)] = [simulation.expand(effect, point) for point in given]
+    responses = simulation.simulate_batch(points) - base.output
     return [response for response in responses if np.isfinite(response).all()]
 
 

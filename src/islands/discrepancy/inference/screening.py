@@ -125,12 +125,12 @@ class Projection:
         inverse_std, nominal = prior_precision(simulation, target.prior_std)
         inverse_std = inverse_std * target.prior_weight**0.5
         columns = []
-        for index, scale in enumerate(simulation.scales):
-            shifted = values.copy()
-            shifted[index] += DIFFERENCE_STEP * scale
+        points = values + DIFFERENCE_STEP * np.diag(simulation.scales)
+        shifted = simulation.simulate_batch(points) if values.size else points
+        for index, (scale, moved) in enumerate(zip(simulation.scales, shifted, strict=True)):
             prior = np.zeros(values.size)
             prior[index] = inverse_std[index] * scale
-            response = (simulation.simulate(shifted) - base.output) / DIFFERENCE_STEP
+            response = (moved - base.output) / DIFFERENCE_STEP
             # The estimation part does not depend on the initial states of recordings in the hold-out part; an
             # orthogonal basis of columns that are zero would contain arbitrary directions.
             if not simulation.is_copy[index] or response[target.estimation_part].any():
@@ -188,28 +188,37 @@ def _find_starts(
     part = simulation.get_slice(effect)
     lower, upper = simulation.bounds
     without_effect = transfer_parameters(base.values, base.simulation, simulation)
-    starts = []
-    for point in get_starting_points(effect, simulation, fill_gaps(target.y - base.output)):
-        values = without_effect.copy()
+    given = get_starting_points(effect, simulation, fill_gaps(target.y - base.output))
+    points = np.tile(without_effect, (len(given), 1))
+    for values, point in zip(points, given, strict=True):
         values[part] = simulation.expand(effect, point)
-        response = projection(simulation.simulate(values) - base.output)
-        with np.errstate(over="ignore", invalid="ignore"):  # a point that diverges is no start
-            size = float(response @ response)
-        if not np.isfinite(size) or size == 0.0:
-            continue
-        variants = [(_sum_squares(projection.residual - response), values)]
-        if effect.linear_parameters:
-            factor = np.clip(float(response @ projection.residual) / size, -MAX_SCALING, MAX_SCALING)
-            values = values.copy()
-            values[part.start : part.start + effect.linear_parameters] *= factor
-            values = np.clip(values, lower, upper)
-            response = projection(simulation.simulate(values) - base.output)
-            variants.append((_sum_squares(projection.residual - response), values))
-        remaining, values = min(variants, key=itemgetter(0))
-        if np.isfinite(remaining):
-            starts.append((remaining, values))
-    starts.sort(key=itemgetter(0))
-    return starts[:MAX_STARTS]
+    responses = _simulate_responses(simulation, points, base, projection)
+    with np.errstate(over="ignore", invalid="ignore"):  # a point that diverges is no start
+        sizes = np.array([float(response @ response) for response in responses])
+    usable = np.flatnonzero(np.isfinite(sizes) & (sizes > 0.0))
+    starts = [(_sum_squares(projection.residual - responses[index]), points[index]) for index in usable]
+    if effect.linear_parameters:
+        scaled = points[usable]
+        for values, index in zip(scaled, usable, strict=True):
+            factor = float(responses[index] @ projection.residual) / sizes[index]
+            values[part.start : part.start + effect.linear_parameters] *= np.clip(
+                factor, -MAX_SCALING, MAX_SCALING
+            )
+        scaled = np.clip(scaled, lower, upper)
+        others = _simulate_responses(simulation, scaled, base, projection)
+        starts = [
+            min(start, (_sum_squares(projection.residual - response), values), key=itemgetter(0))
+            for start, response, values in zip(starts, others, scaled, strict=True)
+        ]
+    return sorted((each for each in starts if np.isfinite(each[0])), key=itemgetter(0))[:MAX_STARTS]
+
+
+def _simulate_responses(
+    simulation: ExtendedSimulator, points: Signal, base: CalibrationResult, projection: Projection
+) -> list[Signal]:
+    """Return the projected changes of the output of the base at the given points, at once if possible."""
+    outputs = simulation.simulate_batch(points) if points.size else points
+    return [projection(output - base.output) for output in outputs]
 
 
 def _sum_squares(signal: Signal) -> float:
