@@ -10,7 +10,7 @@ from islands.kernels.simd import VECTOR, padded_size
 from islands.systems.mechanics import WIDTH, Elements
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol
-from islands.systems.ode.ode_kernel import LaneForces, integrate
+from islands.systems.ode.ode_kernel import LaneForces, LaneLimits, integrate
 from islands.systems.ode.ode_program import OdeProgram
 
 Signal = NDArray[np.float64]
@@ -27,8 +27,19 @@ class SampledSignal:
     middle: Signal
     end: Signal
 
+    @property
+    def is_held(self) -> bool:
+        """Whether the signal is constant within each step."""
+        return np.array_equal(self.start, self.middle) and np.array_equal(self.start, self.end)
+
     def differentiate(self, dt: float) -> "SampledSignal":
-        """Return the rate: the derivative of the parabola through the values of each step."""
+        """Return the rate: the derivative of the parabola through the values of each step.
+
+        A held signal would have impulses; its rate is that of a ramp to the next value within the step.
+        """
+        if self.is_held:
+            rate = np.append(np.diff(self.start), 0.0) / dt
+            return SampledSignal(rate, rate, rate)
         first, second = self.middle - self.start, self.end - self.middle
         return SampledSignal((3.0 * first - second) / dt, (first + second) / dt, (3.0 * second - first) / dt)
 
@@ -49,7 +60,7 @@ class SampledSignal:
         A held signal is averaged over the step, so that the result is continuous in the delay.
         """
         steps = np.arange(self.start.size, dtype=np.float64) - seconds / dt
-        if np.array_equal(self.start, self.middle) and np.array_equal(self.start, self.end):
+        if self.is_held:
             held = np.interp(steps, np.arange(self.start.size), self.start)
             return SampledSignal(held, held, held)
         fine = np.append(np.column_stack([self.start, self.middle]).reshape(-1), self.end[-1])
@@ -77,6 +88,9 @@ class LaneInput:
         Force laws with their values; None for none. Their signs are not used: forces resist.
     limits : mapping
         Lower and upper limits of states by name; other states have none.
+    spills : mapping
+        For a state with an upper limit, the state that receives a part of what the limit cuts off, and that
+        part. The receivers are the same in all lanes.
     """
 
     parameters: Mapping[str, float]
@@ -84,6 +98,7 @@ class LaneInput:
     signals: Mapping[str, SampledSignal]
     elements: Elements | None = None
     limits: Mapping[str, tuple[float, float]] | None = None
+    spills: Mapping[str, tuple[str, float]] | None = None
 
 
 def simulate_lanes(program: OdeProgram, dt: float, lanes: Sequence[LaneInput]) -> NDArray[np.float64]:
@@ -132,8 +147,8 @@ def _simulate_eight(program: OdeProgram, dt: float, lanes: Sequence[LaneInput]) 
     samples = len(next(iter(lanes[0].signals.values())).start)
     out = np.empty((samples, instructions.outputs.size, VECTOR))
     instructions = instructions._replace(signals=instructions.signals[order])
-    lower, upper = _pack_limits(program.states, full)
-    integrate(instructions, arena, shared, own, dt, lower, upper, _pack_elements(full), out)
+    limits = _pack_limits(program.states, full)
+    integrate(instructions, arena, shared, own, dt, limits, _pack_elements(full), len(lanes), out)
     return np.ascontiguousarray(out.transpose(2, 1, 0)[: len(lanes)])
 
 
@@ -187,12 +202,19 @@ def _make_signal(
     return made[key]
 
 
-def _pack_limits(states: Sequence[str], lanes: Sequence[LaneInput]) -> tuple[Signal, Signal]:
+def _pack_limits(states: Sequence[str], lanes: Sequence[LaneInput]) -> LaneLimits:
+    receivers, none = np.zeros(len(states), dtype=np.int64), np.empty(0)
     if not any(lane.limits for lane in lanes):
-        return np.empty(0), np.empty(0)
+        return LaneLimits(none, none, receivers, none)
     free = (-np.inf, np.inf)
     bounds = np.array([[(lane.limits or {}).get(name, free) for lane in lanes] for name in states])
-    return np.ascontiguousarray(bounds[..., 0].reshape(-1)), np.ascontiguousarray(bounds[..., 1].reshape(-1))
+    lower, upper = (np.ascontiguousarray(bounds[..., side].reshape(-1)) for side in range(2))
+    if not any(lane.spills for lane in lanes):
+        return LaneLimits(lower, upper, receivers, none)
+    for name, (receiver, _) in (lanes[0].spills or {}).items():
+        receivers[states.index(name)] = states.index(receiver)
+    caught = [[(lane.spills or {}).get(name, ("", 0.0))[1] for lane in lanes] for name in states]
+    return LaneLimits(lower, upper, receivers, np.array(caught).reshape(-1))
 
 
 def _pack_elements(lanes: Sequence[LaneInput]) -> LaneForces:

@@ -144,6 +144,16 @@ def find_symbols(expression: OdeExpression) -> Iterator[str]:
                 yield from find_symbols(argument)
 
 
+def substitute(expression: OdeExpression, replacements: Mapping[str, OdeExpression]) -> OdeExpression:
+    """Return an expression with names replaced by expressions."""
+    match expression:
+        case Symbol(name):
+            return replacements.get(name, expression)
+        case Operation(function, arguments):
+            return Operation(function, tuple(substitute(each, replacements) for each in arguments))
+    return expression
+
+
 def evaluate(expression: OdeExpression, values: Mapping[str, Any]) -> Any:
     """Evaluate an expression with NumPy.
 

@@ -24,7 +24,7 @@ from islands.kernels.simd_functions import (
 from islands.systems.mechanics import WIDTH, call_law
 
 # Instructions of `islands.kernels.interpreter` keep their numbers. All others are functions here and not
-# calls of addresses: they are compiled once and stored, while an address costs a compilation per process.
+# calls of addresses, which would be compiled once per process.
 
 DIVIDE = 10
 COPY = 11
@@ -37,9 +37,8 @@ LESS = 17
 LESS_EQUAL = 18
 #: Instruction ``target = second if first > 0 else third``.
 SELECT = 19
-#: Instruction ``target = first + second*third``, with both roundings.
+#: Instructions ``target = first + second*third`` and ``first - second*third``, with both roundings.
 ADD_PRODUCT = 20
-#: Instruction ``target = first - second*third``.
 SUBTRACT_PRODUCT = 21
 
 # Functions of the C library, lane by lane.
@@ -107,6 +106,23 @@ class LaneForces(NamedTuple):
     numbers: NDArray[np.float64]
 
 
+class LaneLimits(NamedTuple):
+    """Limits of the states in every lane; size 0 for none.
+
+    Attributes
+    ----------
+    lower, upper : ndarray, shape (states*8,)
+    receivers : ndarray of int64, shape (states,)
+        Index of the state that receives the part ``caught`` of what the upper limit of a state cuts off.
+    caught : ndarray, shape (states*8,)
+    """
+
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    receivers: NDArray[np.int64]
+    caught: NDArray[np.float64]
+
+
 @kernel(forceinline=True)
 def _execute(operation, base, target, first, second, third):
     """Execute an instruction on rows of an arena at the address ``base``."""
@@ -146,9 +162,9 @@ def _execute(operation, base, target, first, second, third):
 
 
 @kernel(forceinline=True)
-def _apply(operation, arena, target, first, second):
-    """Apply a function to every lane of rows."""
-    for lane in range(VECTOR):
+def _apply(operation, arena, target, first, second, lanes):
+    """Apply a function to the first ``lanes`` lanes of rows."""
+    for lane in range(lanes):
         x, b = arena[VECTOR * first + lane], arena[VECTOR * second + lane]
         if operation == POWER:
             y = x**b
@@ -170,10 +186,10 @@ def _apply(operation, arena, target, first, second):
 
 
 @kernel
-def _sum_forces(arena, laws, states, slopes, target, coordinate, rate):
+def _sum_forces(arena, laws, states, slopes, target, coordinate, rate, lanes):
     """Write the sum of the force laws, and the derivatives of their states."""
     own = states + slopes.size - laws.forces.size
-    for lane in range(VECTOR):
+    for lane in range(lanes):
         x, v, total = arena[VECTOR * coordinate + lane], arena[VECTOR * rate + lane], 0.0
         for e in range(laws.forces.size):
             numbers = laws.numbers.ctypes.data + 8 * WIDTH * (VECTOR * e + lane)
@@ -207,8 +223,11 @@ def _advance(stage, dt, slope, before, total, state):
 
 
 @kernel
-def _limit(arena, states, before, lower, upper):
-    """Limit the states at a sample; a NaN remains."""
+def _limit(arena, states, before, lower, upper, receivers, caught):
+    """Limit the states at a sample; a NaN remains. Receivers get a part of what upper limits cut off."""
+    for i in range(caught.size):
+        if before[i] > upper[i]:
+            before[VECTOR * receivers[i // VECTOR] + i % VECTOR] += caught[i] * (before[i] - upper[i])
     for i in range(lower.size):
         x = before[i]
         if x < lower[i]:
@@ -225,14 +244,13 @@ def _is_finite(before, lane):
 
 
 @kernel
-def integrate(instructions, arena, shared, own, dt, lower, upper, laws, out):
+def integrate(instructions, arena, shared, own, dt, limits, laws, lanes, out):
     """Integrate a system from the states in the arena; write the outputs.
 
     ``arena`` (rows*8,) contains constants, parameters and initial states. ``shared`` (samples, 3, signals)
     are signals that are equal in all lanes, at the start, in the middle and at the end of each step; ``own``
-    (samples, 3, signals, 8) those that are not. The signals of the instructions are the shared ones, then the
-    others. ``lower`` and ``upper`` (states*8,) limit the states; size 0 for no limits. ``out`` is
-    (samples, outputs, 8). All outputs of a lane that diverges are NaN.
+    (samples, 3, signals, 8) the others, which follow them. ``out`` is (samples, outputs, 8); only the first
+    ``lanes`` lanes are computed. All outputs of a lane that diverges are NaN.
     """
     code, ends, states = instructions.code, instructions.ends, instructions.states
     signals, slopes, outputs = instructions.signals, instructions.slopes, instructions.outputs
@@ -249,19 +267,19 @@ def integrate(instructions, arena, shared, own, dt, lower, upper, laws, out):
                 for s in range(shared.shape[2]):
                     write(base + _ROW * signals[s], broadcast(shared[k, moment, s], 1))
                 for s in range(own.shape[2]):
-                    for lane in range(VECTOR):
+                    for lane in range(lanes):
                         arena[VECTOR * signals[shared.shape[2] + s] + lane] = own[k, moment, s, lane]
             for i in range(0 if k == 0 and stage == 0 else begin, end):
                 operation = code[i, 0]
                 if operation < POWER:
                     _execute(operation, base, code[i, 1], code[i, 2], code[i, 3], code[i, 4])
                 elif operation < FORCES:
-                    _apply(operation, arena, code[i, 1], code[i, 2], code[i, 3])
+                    _apply(operation, arena, code[i, 1], code[i, 2], code[i, 3], lanes)
                 else:
-                    _sum_forces(arena, laws, states, slopes, code[i, 1], code[i, 2], code[i, 3])
+                    _sum_forces(arena, laws, states, slopes, code[i, 1], code[i, 2], code[i, 3], lanes)
             if stage == 0:
                 for output in range(outputs.size):
-                    for lane in range(VECTOR):
+                    for lane in range(lanes):
                         out[k, output, lane] = arena[VECTOR * outputs[output] + lane]
                 if k + 1 == out.shape[0]:
                     break
@@ -269,14 +287,14 @@ def integrate(instructions, arena, shared, own, dt, lower, upper, laws, out):
                 slope = read(base + _ROW * slopes[i], 1)
                 places = before.ctypes.data + _ROW * i, total.ctypes.data + _ROW * i
                 _advance(stage, dt, slope, *places, base + _ROW * (states + i))
-        if lower.size > 0:
-            _limit(arena, states, before, lower, upper)
+        if limits.lower.size > 0:
+            _limit(arena, states, before, limits.lower, limits.upper, limits.receivers, limits.caught)
         if k % _CHECK == 0:
             alive = False
-            for lane in range(VECTOR):
+            for lane in range(lanes):
                 alive |= _is_finite(before, lane)
             if not alive:
                 break
-    for lane in range(VECTOR):
+    for lane in range(lanes):
         if not _is_finite(before, lane):
             out[:, :, lane] = np.nan

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from math import inf
 
 from islands.errors import ModelError
 from islands.systems.ode.equation_parser import FORCE, TIME, check_name, parse_expression
@@ -14,7 +13,9 @@ from islands.systems.ode.ode_expression import (
     Symbol,
     find_symbols,
     render,
+    substitute,
 )
+from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeForce, OdeState
 
 #: Target of `OdeSystem.with_term` for a term that is added to the output.
 OUTPUT = "output"
@@ -36,6 +37,8 @@ class OdeParameter:
         Bounds of a calibration; by default a twentieth and twenty times the value.
     fixed : bool
         Whether the value is exact, so that it is not calibrated.
+    positive : bool
+        Whether only positive values are physically possible, as of a mass.
     """
 
     name: str
@@ -45,51 +48,7 @@ class OdeParameter:
     lower: float | None = None
     upper: float | None = None
     fixed: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class OdeState:
-    """A state: the solution of an equation ``dx/dt = ...``.
-
-    Attributes
-    ----------
-    name : str
-    unit : str
-    initial : float or None
-        Value at the first sample, nominal if it is estimated. None for the measured output if that is the
-        state itself, otherwise zero.
-    fixed : bool
-        Whether the initial value is exact, so that it is not estimated.
-    lower, upper : float
-        Limits, such as the stops of a cylinder: the state does not leave them.
-    """
-
-    name: str
-    unit: str = ""
-    initial: float | None = None
-    fixed: bool = False
-    lower: float = -inf
-    upper: float = inf
-
-
-@dataclass(frozen=True, slots=True)
-class OdeForce:
-    """Coordinate that force laws act on; the equations contain their sum as ``force``.
-
-    Attributes
-    ----------
-    coordinate, rate : str
-        Names of the states or variables that are the coordinate and its rate.
-    unit : str
-        Unit of a force; by default that of the input.
-    drive : expression
-        Signal whose peak is a typical force, by default the input.
-    """
-
-    coordinate: str
-    rate: str
-    unit: str
-    drive: OdeExpression
+    positive: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +77,14 @@ class OdeSystem:
         Units that the equations assume; empty if those of the record are taken.
     steps : int
         Integration steps per sample; 0 for as few as the record requires.
+    gain : str
+        Parameter that the effects ``gain-step`` and ``ageing`` multiply; empty for the input.
+    contains : tuple of str
+        Names of effects of the catalogue that the equations contain.
+    effects : tuple of OdeEffect
+        Effects in the equations; empty for an offset and a limit of each state.
+    is_built_in : bool
+        Whether these are the equations of the built-in simulator of this name.
     """
 
     name: str
@@ -133,6 +100,10 @@ class OdeSystem:
     input_unit: str = ""
     output_unit: str = ""
     steps: int = 0
+    gain: str = ""
+    contains: tuple[str, ...] = ()
+    effects: tuple[OdeEffect, ...] = ()
+    is_built_in: bool = False
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -165,8 +136,40 @@ class OdeSystem:
             check_name(parameter.name, place)
             if parameter.name in known:
                 raise ModelError(f"{place}: {parameter.name!r} has a meaning already: take another name")
-        extended = replace(self, parameters=(*self.parameters, *parameters))
+        extended = replace(self, parameters=(*self.parameters, *parameters), is_built_in=False)
         check_symbols(added, extended, place)
+        if target != OUTPUT and target not in {name for name, _ in (*self.derivatives, *self.variables)}:
+            raise ModelError(f"there is no equation of {target!r}: {_suggest(target, known)}")
+        extended = extended._add(target, added)
+        sort_variables(extended)
+        return extended
+
+    def with_effect(self, effect: OdeEffect) -> "OdeSystem":
+        """Return the system with the term of an effect, whose name is that of a new parameter."""
+        assert effect.term is not None
+        parameters = (*self.parameters, OdeParameter(effect.name, 0.0))
+        term = substitute(effect.term, {EFFECT_VALUE: Symbol(effect.name)})
+        return replace(self, parameters=parameters)._add(effect.equation, term)
+
+    def with_factor(self, parameter: str, factor: str) -> "OdeSystem":
+        """Return the system with a parameter multiplied by a signal, which is one more channel."""
+        product = Operation("mul", (Symbol(parameter), Symbol(factor)))
+
+        def multiply(
+            equations: Iterable[tuple[str, OdeExpression]],
+        ) -> tuple[tuple[str, OdeExpression], ...]:
+            return tuple((name, substitute(right, {parameter: product})) for name, right in equations)
+
+        return replace(
+            self,
+            channels=(*self.channels, factor),
+            derivatives=multiply(self.derivatives),
+            variables=multiply(self.variables),
+            output=substitute(self.output, {parameter: product}),
+        )
+
+    def _add(self, target: str, added: OdeExpression) -> "OdeSystem":
+        """Return the system with one more term in one equation, without checks."""
 
         def add(equations: Iterable[tuple[str, OdeExpression]]) -> tuple[tuple[str, OdeExpression], ...]:
             return tuple(
@@ -175,12 +178,8 @@ class OdeSystem:
             )
 
         if target == OUTPUT:
-            return replace(extended, output=Operation("add", (self.output, added)))
-        if target not in {name for name, _ in (*self.derivatives, *self.variables)}:
-            raise ModelError(f"there is no equation of {target!r}: {_suggest(target, known)}")
-        extended = replace(extended, derivatives=add(self.derivatives), variables=add(self.variables))
-        sort_variables(extended)
-        return extended
+            return replace(self, output=Operation("add", (self.output, added)))
+        return replace(self, derivatives=add(self.derivatives), variables=add(self.variables))
 
     def with_values(self, values: Mapping[str, float]) -> "OdeSystem":
         """Return the system with other nominal values of parameters; other names are ignored."""
@@ -195,7 +194,7 @@ class OdeSystem:
         """Return the meaning of each name in expressions."""
         return {
             TIME: "the time",
-            **({FORCE: "the sum of the forces"} if self.force else {}),
+            **({FORCE: "the sum of the forces"} if self.force and self.force.rate else {}),
             self.input: "the input",
             **dict.fromkeys(self.channels, "a channel"),
             **dict.fromkeys((name for name, _ in self.derivatives), "a state"),
@@ -213,7 +212,7 @@ def sort_variables(system: OdeSystem) -> tuple[str, ...]:
         Variables depend on each other in a cycle.
     """
     right_sides = dict(system.variables)
-    if system.force is not None:
+    if system.force is not None and system.force.rate:
         # The forces are computed from the coordinate and its rate.
         right_sides[FORCE] = Operation("add", (Symbol(system.force.coordinate), Symbol(system.force.rate)))
     ordered: dict[str, None] = {}
@@ -242,7 +241,7 @@ def check_symbols(expression: OdeExpression, system: OdeSystem, place: str) -> N
     """Raise `ModelError` if an expression has an unknown name, or a rate or delay of what is not measured."""
     known = system.find_names()
     for name in find_symbols(expression):
-        if name == FORCE and system.force is None:
+        if name == FORCE and name not in known:
             raise ModelError(f"{place}: force needs a table [force] with a coordinate and its rate")
         if name not in known:
             raise ModelError(f"{place}: unknown name {name!r}: {_suggest(name, known)}")

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import inf, isfinite
 from typing import Any
 
@@ -15,13 +16,12 @@ from islands.systems.ode.equation_parser import (
 from islands.systems.ode.ode_expression import Symbol, find_symbols, render
 from islands.systems.ode.ode_system import (
     OUTPUT,
-    OdeForce,
     OdeParameter,
-    OdeState,
     OdeSystem,
     check_symbols,
     sort_variables,
 )
+from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeForce, OdeState
 
 #: Largest number of states.
 MAX_STATES = 40
@@ -67,6 +67,9 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
         input_unit=document.get("input_unit", ""),
         output_unit=document.get("output_unit", ""),
         steps=document.get("steps", 0),
+        gain=document.get("gain", ""),
+        contains=tuple(document.get("contains", ())),
+        effects=tuple(_make_effect(name, entry) for name, entry in document.get("effects", {}).items()),
     )
     _check_sizes(system)
     _check_unique(system, equations)
@@ -75,10 +78,11 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
     check_symbols(system.output, system, f"output, {document['output']!r}")
     if system.force is not None:
         check_symbols(system.force.drive, system, "[force] drive")
-        for name in (system.force.coordinate, system.force.rate):
+        for name in filter(None, (system.force.coordinate, system.force.rate)):
             check_symbols(Symbol(name), system, "[force]")
     sort_variables(system)
     _check_used(system)
+    _check_effects(system)
     return system
 
 
@@ -119,9 +123,23 @@ def _make_force(document: Mapping[str, Any]) -> OdeForce | None:
     unit = entry.get("unit", "")
     if drive != document["input"] and not unit:
         raise ModelError("[force]: give the unit of a force, since its drive is not the input")
+    if bool(entry.get("rate")) == (entry["coordinate"] == document["input"]):
+        raise ModelError(
+            "[force]: give coordinate and rate, or the input as the coordinate and no rate, if forces are "
+            "added to the output"
+        )
     return OdeForce(
-        entry["coordinate"], entry["rate"], unit, parse_expression(drive, f"[force] drive, {drive!r}")
+        entry["coordinate"], entry.get("rate", ""), unit, parse_expression(drive, f"[force] drive, {drive!r}")
     )
+
+
+def _make_effect(name: str, entry: Mapping[str, Any]) -> OdeEffect:
+    place = f"[effects] {name}"
+    if bool(entry.get("equation")) != bool(entry.get("term")):
+        raise ModelError(f"{place}: give equation and term, or neither of them for a limit of a state")
+    if not entry.get("term"):
+        return OdeEffect(name)
+    return OdeEffect(name, entry["equation"], parse_expression(entry["term"], f"{place}, {entry['term']!r}"))
 
 
 def _check_sizes(system: OdeSystem) -> None:
@@ -165,6 +183,29 @@ def _check_used(system: OdeSystem) -> None:
         raise ModelError(f"no equation reads the input {system.input}: correct its name")
 
 
+def _check_effects(system: OdeSystem) -> None:
+    """Check effects, the parameter that is the gain, and the states that others spill into."""
+    names = [each.name for each in system.states]
+    if system.gain and system.gain not in {each.name for each in system.parameters}:
+        raise ModelError(f"gain: there is no parameter {system.gain!r}: take one of [parameters]")
+    for state in system.states:
+        if state.spills_into and (state.spills_into not in names or state.spills_into == state.name):
+            raise ModelError(f"[states] {state.name}: spills_into has to be another state")
+    extended = replace(system, parameters=(*system.parameters, OdeParameter(EFFECT_VALUE, 0.0)))
+    for effect in system.effects:
+        place = f"[effects] {effect.name}"
+        if effect.term is None:
+            if effect.name.partition(":")[2] not in names:
+                raise ModelError(f"{place}: give equation and term, or the name of a state after the colon")
+            continue
+        if EFFECT_VALUE not in find_symbols(effect.term) or EFFECT_VALUE in system.find_names():
+            raise ModelError(
+                f"{place}: the term has to contain {EFFECT_VALUE}, and nothing else may have that name"
+            )
+        check_symbols(effect.term, extended, place)
+        extended.with_term(effect.equation, effect.term)
+
+
 def describe_system(system: OdeSystem) -> dict[str, Any]:
     """Return the document of a system, from which `make_system` makes the same system."""
     document: dict[str, Any] = {
@@ -181,6 +222,9 @@ def describe_system(system: OdeSystem) -> dict[str, Any]:
         "input_unit": system.input_unit,
         "output_unit": system.output_unit,
         "steps": system.steps,
+        "gain": system.gain,
+        "contains": list(system.contains),
+        "effects": {each.name: _describe_effect(each) for each in system.effects},
     }
     for each in system.parameters:
         document["parameters"][each.name]["value"] = each.value
@@ -194,6 +238,12 @@ def describe_system(system: OdeSystem) -> dict[str, Any]:
     return {
         key: value for key, value in document.items() if value not in ("", [], {}, 0) or key == "equations"
     }
+
+
+def _describe_effect(effect: OdeEffect) -> dict[str, str]:
+    if effect.term is None:
+        return {}
+    return {"equation": effect.equation, "term": render(effect.term)}
 
 
 def _given(entry: OdeParameter | OdeState, default: OdeParameter | OdeState) -> dict[str, Any]:

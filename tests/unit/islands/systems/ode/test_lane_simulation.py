@@ -208,7 +208,12 @@ def test_the_delay_of_a_held_signal_keeps_its_mean() -> None:
     delayed = held.delay(0.3 * DT, DT)
     assert delayed.start[1:] == pytest.approx(0.7 * FORCE[1:] + 0.3 * FORCE[:-1], abs=1e-13)
     assert delayed.start[0] == FORCE[0]
-    assert np.all(held.differentiate(DT).middle == 0.0)
+
+
+def test_the_rate_of_a_held_signal_is_that_of_a_ramp_to_the_next_value() -> None:
+    rate = SampledSignal(FORCE, FORCE, FORCE).differentiate(DT)
+    assert rate.middle[:-1] == pytest.approx(np.diff(FORCE) / DT)
+    assert rate.end[-1] == 0.0
 
 
 def test_the_rate_of_a_parabola_is_exact() -> None:
