@@ -29,7 +29,6 @@ from islands.discrepancy.gross_errors.closed_loop import find_closed_loop  # noq
 from islands.discrepancy.gross_errors.gross_error import GrossError  # noqa: E402
 from islands.discrepancy.gross_errors.gross_error_search import find_gross_errors  # noqa: E402
 from islands.discrepancy.interfaces.simulator import Simulator  # noqa: E402
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator  # noqa: E402
 from islands.discrepancy.simulators.extended import ExtendedSimulator  # noqa: E402
 from islands.discrepancy.simulators.linear import estimate_linear  # noqa: E402
 from islands.io.simulator_spec.factory import make_simulator  # noqa: E402
@@ -108,7 +107,7 @@ ERRORS: Mapping[str, tuple[Callable[[Dataset], Dataset], str, float | None, tupl
 def make_given_simulator(name: str, record: Dataset, clean: Dataset) -> tuple[Simulator, Mapping[str, float]]:
     """Return the simulator of a system with given parameters, and their tolerances."""
     if name == "piezo":
-        return BoucWenPiezoSimulator(), SYSTEMS[name].tolerance
+        return make_simulator("bouc-wen-piezo", record), SYSTEMS[name].tolerance
     if name == "linear":
         linear = estimate_linear(2, 0, clean[: clean.samples // 2])
         known = [each.name for each in linear.parameters if each.name[0] in "ab" and each.nominal]

@@ -20,7 +20,7 @@ SHARED_CLASS_NAMES = {"Event", "HistoryPoint", "Preview"}
 
 #: Module names that two packages use: the application of each interface, errors of each package,
 #: and records of jobs, keys and the second-order system, which a store or a simulator has a module for.
-SHARED_MODULE_NAMES = {"app", "errors", "second_order"}
+SHARED_MODULE_NAMES = {"app", "errors"}
 
 
 def test_imports_keep_the_contracts() -> None:

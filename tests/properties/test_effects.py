@@ -5,8 +5,8 @@ import pytest
 
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.effect import SimulationContext, Site
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from support.built_in_simulators import make_piezo
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def context() -> SimulationContext:
 
 @pytest.fixture(scope="module")
 def alone(context: SimulationContext) -> ExtendedSimulator:
-    return ExtendedSimulator(BoucWenPiezoSimulator(), (), context)
+    return ExtendedSimulator(make_piezo(), (), context)
 
 
 @pytest.fixture(params=CATALOGUE)

@@ -10,8 +10,7 @@ from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.context import ForceCoordinate, SimulationContext
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import ResampledSimulator
-from islands.discrepancy.simulators.second_order import SecondOrderSimulator
-from islands.systems.second_order import SecondOrder
+from support.built_in_simulators import make_oscillator
 
 DT = 0.01
 
@@ -33,8 +32,8 @@ def oscillator_recordings(
     for (position, rate), samples in zip(STATES, lengths, strict=False):
         u = scipy.signal.lfilter([0.05], [1.0, -0.95], rng.standard_normal(samples + 200))[200:]
         u *= 20.0 / np.std(u)
-        system = SecondOrder(0.5, 4.0, 200.0, position, rate)
-        simulator = ResampledSimulator(SecondOrderSimulator(system, ("N", "m"), 0.1), oversampling=8)
+        oscillator = make_oscillator(0.5, 4.0, 200.0, position, rate)
+        simulator = ResampledSimulator(oscillator, oversampling=8)
         context = SimulationContext(u, DT, {}, {}, 60.0, 0.3, "N", "m", samples * DT)
         simulation = ExtendedSimulator(simulator, added, replace(context, force_coordinate=coordinate))
         values = simulation.nominal

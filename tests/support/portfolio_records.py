@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from islands.data.dataset import Dataset
-from islands.systems.hysteresis_operators import bouc_wen, play_from
+from islands.discrepancy.interfaces.context import SimulationContext
+from islands.systems.hysteresis_operators import play_from
+from support.built_in_simulators import make_piezo
 
 Signal = NDArray[np.float64]
 
@@ -148,9 +150,11 @@ def _iterate(step: Callable[[float, float, Signal], float]) -> Callable[[Signal]
 
 
 def _bouc_wen(u: Signal, leak: float = 0.0, asymmetry: float = 0.0) -> Signal:
-    h = np.zeros(len(u))
-    bouc_wen(np.ascontiguousarray(u[:, 0]), DT, 1.0, 1.5, 0.7, leak, 0.0, asymmetry, 0.0, h)
-    return 1.0 * u[:, 0] - 0.6 * h
+    x = np.ascontiguousarray(u[:, 0])
+    context = SimulationContext(x, DT, {}, {}, 1.0, 1.0, "V", "um", x.size * DT)
+    effects = {"relaxation": leak, "loop-asymmetry": asymmetry}
+    h = x - make_piezo().simulate(np.array([1.0, 1.5, 0.7, 1.0]), x, context, effects, ())
+    return x - 0.6 * h
 
 
 def _several_plays(u: Signal) -> Signal:

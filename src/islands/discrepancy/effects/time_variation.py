@@ -8,6 +8,9 @@ import scipy
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 
+#: Names of the effects that change the gain.
+GAIN_EFFECTS = frozenset(("gain-step", "ageing"))
+
 #: Number of candidate instants of a change.
 INSTANTS = 27
 

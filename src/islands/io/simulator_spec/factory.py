@@ -23,13 +23,13 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator, estimate_linear
 from islands.discrepancy.simulators.narx import NarxSimulator
-from islands.discrepancy.simulators.ode import make_ode_simulator
+from islands.discrepancy.simulators.ode_preparation import make_ode_simulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, RecordError, SettingsError, lookup
 from islands.io.models import model_from_json
-from islands.io.simulator_spec.ode_spec import OdeSpec
+from islands.io.simulator_spec.ode_spec import OdeSpec, read_built_in
 from islands.io.simulator_spec.spec_base import ParameterRange, SimulatorEntry
 from islands.io.simulator_spec.specification import (
     SIMULATORS,
@@ -79,15 +79,16 @@ def make_simulator(
     if isinstance(spec, ExtendedSpec):
         return _make_saved_extension(spec, record, columns or {})
     entry = SIMULATORS[spec.kind]
-    factory = resolve_name(entry.factory)
-    simulator: Simulator
     if isinstance(spec, PhysicalSpec):
         _check_parameters(entry, spec.parameters)
         if entry.estimated:
             _check_estimable(record)
-        simulator = factory(spec.parameters, record, estimation_part(record).samples)
-    else:
-        simulator = factory(spec, record, columns or {})
+        if not entry.factory.endswith("make_built_in"):
+            old: Simulator = resolve_name(entry.factory)(
+                spec.parameters, record, estimation_part(record).samples
+            )
+            return old
+    simulator: Simulator = resolve_name(entry.factory)(spec, record, columns or {})
     return simulator
 
 
@@ -184,6 +185,16 @@ def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapp
         added.append(effect)
         values += [each.parameters[name].value for name in names]
     return SavedExtension(inner, tuple(added), np.array(values), scales)
+
+
+def make_built_in(spec: PhysicalSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
+    """Make a built-in simulator; parameters that are not given have their nominal value or are estimated."""
+    system = read_built_in(spec.kind).with_values(spec.parameters)
+    estimator = SIMULATORS[spec.kind].estimator
+    if not estimator:
+        return make_ode_simulator(system, record)
+    system, states = resolve_name(estimator)(system, spec.parameters, estimation_part(record))
+    return make_ode_simulator(system, record, states)
 
 
 def make_ode(spec: OdeSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:

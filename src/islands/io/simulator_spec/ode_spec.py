@@ -1,6 +1,9 @@
 """Specification of a simulator that a user writes as equations: a TOML file, or its content as JSON."""
 
 import tomllib
+from dataclasses import replace
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -32,6 +35,7 @@ class OdeParameterSpec(SpecModel):
     lower: FiniteFloat | None = None
     upper: FiniteFloat | None = None
     fixed: bool = False
+    positive: bool = False
 
 
 class OdeStateSpec(SpecModel):
@@ -42,15 +46,23 @@ class OdeStateSpec(SpecModel):
     fixed: bool = False
     lower: FiniteFloat | None = None
     upper: FiniteFloat | None = None
+    spills_into: Annotated[str, Field(max_length=100)] = ""
 
 
 class OdeForceSpec(SpecModel):
     """Coordinate of force laws; see `OdeForce`."""
 
     coordinate: _Name
-    rate: _Name
+    rate: Annotated[str, Field(max_length=100)] = ""
     unit: _Unit = ""
     drive: Annotated[str, Field(max_length=500)] = ""
+
+
+class OdeEffectSpec(SpecModel):
+    """Term of an effect; see `OdeEffect`."""
+
+    equation: Annotated[str, Field(max_length=100)] = ""
+    term: Annotated[str, Field(max_length=500)] = ""
 
 
 def _allow_number(given: Any) -> Any:
@@ -76,6 +88,9 @@ class OdeSpec(SimulatorSpec):
     input_unit: _Unit = ""
     output_unit: _Unit = ""
     steps: Annotated[int, Field(ge=0, le=MAX_STEPS)] = 0
+    gain: Annotated[str, Field(max_length=100)] = ""
+    contains: Annotated[tuple[_Name, ...], Field(max_length=20)] = ()
+    effects: Annotated[dict[_Name, OdeEffectSpec], Field(max_length=50)] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _check_equations(self, _info: ValidationInfo) -> "OdeSpec":
@@ -103,3 +118,11 @@ class OdeSpec(SimulatorSpec):
             raise SettingsError(f"{text} cannot be read as TOML ({error}): write ode:FILE.toml") from error
         document.setdefault("name", Path(text).stem)
         return cls.model_validate({**document, "kind": kind})
+
+
+@cache
+def read_built_in(name: str) -> OdeSystem:
+    """Return the equations of a built-in simulator."""
+    document = files("islands.systems").joinpath("built_in", f"{name}.toml").read_text(encoding="utf-8")
+    system = OdeSpec.model_validate({**tomllib.loads(document), "kind": "ode"}).make_system()
+    return replace(system, is_built_in=True)

@@ -89,15 +89,17 @@ class SimulatorEntry:
     spec : type
         Pydantic model of the specification.
     factory : str
-        ``module:function``, imported when the first simulator is made, since it needs the kernels. A physical
-        system takes the given parameters, the record and the number of samples of its estimation part; any
-        other simulator takes its specification, the record and the columns of the record's file.
+        ``module:function``, imported when the first simulator is made, since it needs the kernels. It takes
+        the specification, the record and the columns of the record's file.
     parameters : mapping
         Parameters of a physical system that can be given, and their ranges.
     estimated : str
         What is estimated from the record unless it is given; empty if nothing is.
     is_remote : bool
         Whether REST accepts the simulator.
+    estimator : str
+        ``module:function`` that estimates the parameters of a physical system that are not given, from its
+        equations, the given parameters and the estimation part of the record; empty if nothing is estimated.
     """
 
     name: str
@@ -108,6 +110,7 @@ class SimulatorEntry:
     parameters: Mapping[str, ParameterRange] = field(default_factory=dict)
     estimated: str = ""
     is_remote: bool = True
+    estimator: str = ""
 
 
 def read_object(path: str, failure: type[ModelError] | type[SettingsError]) -> dict[str, Any]:

@@ -137,6 +137,7 @@ class LocalExtendedSpec(ExtendedSpec):
 
 
 _PHYSICAL = "islands.discrepancy.simulators"
+_ESTIMATORS = "islands.discrepancy.simulators.built_in"
 _FACTORY = "islands.io.simulator_spec.factory"
 
 _ENTRIES = (
@@ -146,7 +147,7 @@ _ENTRIES = (
         "Piezoelectric actuator: y = dp u - h, h' = A u' - beta |u'| h - gamma u' |h|. Parameters that "
         "are not given have the values of the paper",
         PhysicalSpec,
-        f"{_PHYSICAL}.bouc_wen_piezo:make_bouc_wen_piezo",
+        f"{_FACTORY}:make_built_in",
         dict.fromkeys(("A", "beta", "gamma", "dp"), ParameterRange.REAL),
     ),
     SimulatorEntry(
@@ -154,9 +155,10 @@ _ENTRIES = (
         "[:FILE.json]",
         "Oscillator: m x'' + c x' + k x = u, y = x",
         PhysicalSpec,
-        f"{_PHYSICAL}.second_order:make_second_order",
+        f"{_FACTORY}:make_built_in",
         dict.fromkeys(("m", "c", "k"), ParameterRange.REAL),
         estimated="m, c, k; position and rate at the first sample",
+        estimator=f"{_ESTIMATORS}:estimate_oscillator",
     ),
     SimulatorEntry(
         "rigid-axis",
@@ -178,9 +180,10 @@ _ENTRIES = (
         "[:FILE.json]",
         "Two tanks: x1' = k3 u - k1 sqrt(x1), x2' = k1 sqrt(x1) - k2 sqrt(x2), y = x2",
         PhysicalSpec,
-        f"{_PHYSICAL}.cascaded_tanks:make_cascaded_tanks",
+        f"{_FACTORY}:make_built_in",
         dict.fromkeys(("k1", "k2", "k3"), ParameterRange.POSITIVE),
         estimated="k1, k2, k3; both levels at the first sample",
+        estimator=f"{_ESTIMATORS}:estimate_tanks",
     ),
     SimulatorEntry(
         "ode",

@@ -6,7 +6,6 @@ from types import MappingProxyType
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.discrepancy.simulators.narx import NarxSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError
@@ -111,8 +110,8 @@ def _make_narx(faulty: FaultyRecord) -> Simulator:
     return NarxSimulator(model, "narx", record.y[: model.maximum_lag])
 
 
-def _with_estimated_parameters(name: str) -> Callable[[FaultyRecord], Simulator]:
-    """Return a factory of a physical simulator whose parameters are estimated from the record."""
+def _make_built_in(name: str) -> Callable[[FaultyRecord], Simulator]:
+    """Return a factory of a built-in simulator; parameters are estimated from the record if possible."""
     return lambda faulty: make_simulator(name, faulty.record)
 
 
@@ -127,7 +126,7 @@ _INPUT_FAULTS = frozenset(
 #: Cases by name. To add a case, add an entry; to add a system, add a file to `trials.injection`.
 CASES: Mapping[str, SimulatedCase] = MappingProxyType(
     {
-        "bouc-wen-piezo": SimulatedCase(PIEZO, lambda _: BoucWenPiezoSimulator(), EXACT, PIEZO.tolerance),
+        "bouc-wen-piezo": SimulatedCase(PIEZO, _make_built_in("bouc-wen-piezo"), EXACT, PIEZO.tolerance),
         "narx": SimulatedCase(
             PIEZO,
             _make_narx,
@@ -143,19 +142,15 @@ CASES: Mapping[str, SimulatedCase] = MappingProxyType(
             perturbed=False,
             without=_EQUATION_FAULTS | _INPUT_FAULTS | {"wrong-parameter"},
         ),
-        "second-order": SimulatedCase(
-            OSCILLATOR, _with_estimated_parameters("second-order"), EXACT, {}, free=True
-        ),
+        "second-order": SimulatedCase(OSCILLATOR, _make_built_in("second-order"), EXACT, {}, free=True),
         "linear": SimulatedCase(
             OSCILLATOR,
-            _with_estimated_parameters("linear:2"),
+            _make_built_in("linear:2"),
             EXACT,
             {},
             free=True,
             without=frozenset(("offset", "gain-step", "ageing")),
         ),
-        "cascaded-tanks": SimulatedCase(
-            TANKS, _with_estimated_parameters("cascaded-tanks"), EXACT, {}, free=True
-        ),
+        "cascaded-tanks": SimulatedCase(TANKS, _make_built_in("cascaded-tanks"), EXACT, {}, free=True),
     }
 )

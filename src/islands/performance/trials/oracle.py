@@ -70,7 +70,10 @@ def _rmse(found: Diagnosis, fit: CalibrationResult) -> float:
 
 
 def _fit_with_effect(fit: CalibrationResult, effect: Effect, target: Target) -> CalibrationResult:
-    """Add an effect to a simulation and fit it from the most promising starting points."""
+    """Add an effect to a simulation and fit it from the most promising starting points.
+
+    The fit is returned as it is if no starting point changes the output, such as a limit that is not reached.
+    """
     old, context = fit.simulation, fit.simulation.context
     extended = old.with_effects(catalogue_order((*old.effects, effect)))
     part = extended.get_slice(effect)
@@ -90,4 +93,5 @@ def _fit_with_effect(fit: CalibrationResult, effect: Effect, target: Target) -> 
         )
     best = sorted(starts, key=lambda each: -each[0])[:_STARTS]
     fits = [calibrate(extended, target, start) for _, start in best]
-    return min((each for each in fits if np.isfinite(each.mean_square)), key=lambda each: each.mean_square)
+    finite = (each for each in fits if np.isfinite(each.mean_square))
+    return min(finite, key=lambda each: each.mean_square, default=fit)

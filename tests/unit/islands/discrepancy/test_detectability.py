@@ -21,7 +21,6 @@ from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
 from islands.discrepancy.inference import noise_floor
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.surrogates import (
     STRENGTHS,
@@ -33,8 +32,9 @@ from islands.discrepancy.surrogates import (
 )
 from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.trial import TOLERANCE
+from support.built_in_simulators import make_piezo
 
-SIMULATOR = BoucWenPiezoSimulator()
+SIMULATOR = make_piezo()
 
 #: Effects that most tests inject.
 INJECTED = ("offset", "jump")

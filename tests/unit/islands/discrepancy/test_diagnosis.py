@@ -10,14 +10,13 @@ from islands.discrepancy.calibration.preparation import HOLDOUT_FRACTION, MIN_SA
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError, SettingsError
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.trial import TOLERANCE
-from islands.systems.bouc_wen import BoucWenPiezo
+from support.built_in_simulators import make_piezo
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +26,7 @@ def record() -> Dataset:
 
 @pytest.fixture(scope="module")
 def found(record: Dataset) -> Diagnosis:
-    return diagnose(record, BoucWenPiezoSimulator(), TOLERANCE)
+    return diagnose(record, make_piezo(), TOLERANCE)
 
 
 def with_input(record: Dataset, column: int, values: object) -> Dataset:
@@ -58,7 +57,7 @@ def test_injected_drag_is_named_with_its_strength_and_gain(found: Diagnosis) -> 
 
 @pytest.mark.ci
 def test_diagnosis_is_reproducible(record: Dataset, found: Diagnosis) -> None:
-    again = diagnose(record, BoucWenPiezoSimulator(), TOLERANCE)
+    again = diagnose(record, make_piezo(), TOLERANCE)
     assert as_json(diagnosis_document(again)) == as_json(diagnosis_document(found))
 
 
@@ -67,7 +66,7 @@ def test_holdout_part_only_changes_the_gain(record: Dataset, found: Diagnosis) -
     y = np.array(record.y)
     fitted = int((1 - HOLDOUT_FRACTION) * record.samples)
     y[fitted:] += 1.0
-    other = diagnose(replace(record, y=y), BoucWenPiezoSimulator(), TOLERANCE)
+    other = diagnose(replace(record, y=y), make_piezo(), TOLERANCE)
     assert (other.effects, other.candidates, other.verdict) == (
         found.effects,
         found.candidates,
@@ -84,7 +83,7 @@ def clean() -> Dataset:
 
 
 #: A simulator with two parameters far from those of the records.
-DETUNED = BoucWenPiezoSimulator(BoucWenPiezo(dp=1.3, A=0.7))
+DETUNED = make_piezo(dp=1.3, A=0.7)
 
 
 def test_parameter_without_a_tolerance_is_calibrated(clean: Dataset) -> None:
@@ -99,7 +98,7 @@ def test_parameter_beyond_its_tolerance_is_a_discrepancy(clean: Dataset) -> None
 
 
 def test_recorded_output_can_be_diagnosed(record: Dataset) -> None:
-    simulated = np.array(BoucWenPiezoSimulator().simulate(*_nominal(record)))
+    simulated = np.array(make_piezo().simulate(*_nominal(record)))
     drifted = replace(
         record, y=simulated + 0.5 * record.time / record.time[-1] + 0.01 * np.sin(37.0 * record.time**2)
     )
@@ -111,7 +110,7 @@ def test_recorded_output_can_be_diagnosed(record: Dataset) -> None:
 def _nominal(record: Dataset) -> tuple:
     from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
 
-    core = BoucWenPiezoSimulator()
+    core = make_piezo()
     context = make_context(record, core, count_fitted_samples(record))
     return np.array([each.nominal for each in core.parameters]), context.u, context, {}, ()
 
@@ -130,7 +129,7 @@ UNUSABLE = {
 def test_unusable_record_is_rejected(record: Dataset, case: str) -> None:
     spoil, message = UNUSABLE[case]
     with pytest.raises(RecordError, match=message):
-        diagnose(spoil(record), BoucWenPiezoSimulator())
+        diagnose(spoil(record), make_piezo())
 
 
 @pytest.mark.parametrize(
@@ -143,7 +142,7 @@ def test_unusable_record_is_rejected(record: Dataset, case: str) -> None:
 )
 def test_invalid_tolerance_is_rejected(record: Dataset, tolerance: dict, message: str) -> None:
     with pytest.raises(SettingsError, match=message):
-        diagnose(record, BoucWenPiezoSimulator(), tolerance)
+        diagnose(record, make_piezo(), tolerance)
 
 
 def test_tolerance_of_a_parameter_that_is_zero_is_rejected(record: Dataset) -> None:
@@ -156,4 +155,4 @@ def test_tolerance_of_a_parameter_that_is_zero_is_rejected(record: Dataset) -> N
 
 def test_diverging_simulation_is_rejected(record: Dataset) -> None:
     with pytest.raises(RecordError, match="diverges on this input"), np.errstate(all="ignore"):
-        diagnose(record, BoucWenPiezoSimulator(BoucWenPiezo(gamma=-5.0)))
+        diagnose(record, make_piezo(gamma=-5.0))

@@ -9,8 +9,8 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.errors import SettingsError
+from support.built_in_simulators import make_piezo
 from support.simulated_records import recorded, wave
 
 
@@ -56,16 +56,16 @@ INVALID: dict[str, tuple[Effect, str]] = {
 def test_error_names_the_invalid_effect(record: Dataset, case: str) -> None:
     effect, message = INVALID[case]
     with pytest.raises(SettingsError, match=f"the effect {effect.name} is broken: {message}") as raised:
-        diagnose(record, BoucWenPiezoSimulator(), catalogue=(effect, CATALOGUE["jump"]))
+        diagnose(record, make_piezo(), catalogue=(effect, CATALOGUE["jump"]))
     assert str(raised.value).endswith(".py or remove the effect from the catalogue")
 
 
 def test_effect_without_starting_points_is_skipped(record: Dataset) -> None:
     effect = replace(VALID, starting_points=lambda _context, _residual: ())
-    found = diagnose(record, BoucWenPiezoSimulator(), catalogue=(effect, CATALOGUE["jump"]))
+    found = diagnose(record, make_piezo(), catalogue=(effect, CATALOGUE["jump"]))
     assert {each.name for each in found.candidates} <= {"jump"}
 
 
 def test_effects_with_equal_names_are_rejected(record: Dataset) -> None:
     with pytest.raises(SettingsError, match="offset is given twice: rename one"):
-        diagnose(record, BoucWenPiezoSimulator(), catalogue=(VALID, CATALOGUE["jump"], VALID))
+        diagnose(record, make_piezo(), catalogue=(VALID, CATALOGUE["jump"], VALID))

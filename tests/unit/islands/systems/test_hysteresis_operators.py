@@ -3,13 +3,11 @@
 from itertools import pairwise
 
 import numpy as np
-import pytest
-import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from islands.systems.hysteresis_operators import bouc_wen, play_from, slider
+from islands.systems.hysteresis_operators import play_from, slider
 
 Array = NDArray[np.float64]
 
@@ -63,45 +61,3 @@ def test_play_stays_within_its_width_and_moves_only_at_its_edges(u: Array, width
     assert (np.abs(u - x) <= width).all()
     moving = np.flatnonzero(np.diff(x)) + 1
     assert np.array_equal(np.abs(u - x)[moving], np.full(moving.size, width))
-
-
-def apply_bouc_wen(u: Array, dt: float, *values: float) -> Array:
-    h = np.empty(u.size)
-    bouc_wen(np.ascontiguousarray(u), dt, *values, h)
-    return h
-
-
-def test_bouc_wen_element_matches_reference_solution() -> None:
-    dt = 0.01
-    t = dt * np.arange(600)
-    u = 20 * np.sin(3 * t) + 5 * np.cos(7.3 * t)
-    A, beta, gamma, leak, rate, asymmetry, h0 = 0.8, 0.04, -0.01, 0.5, 2e-3, 0.01, 1.5
-    h, known = h0, []
-    for k in range(t.size):
-        known.append(h)
-        if k + 1 < t.size:
-            v = (u[k + 1] - u[k]) / dt
-            faster = 1.0 + rate * abs(v)
-
-            def slope(_s, h, v=v, faster=faster):
-                return (
-                    A * v
-                    - beta * faster * abs(v) * h
-                    - gamma * faster * v * np.abs(h)
-                    - leak * h
-                    - asymmetry * abs(v) * np.abs(h)
-                )
-
-            h = float(scipy.integrate.solve_ivp(slope, (0, dt), [h], rtol=1e-9, atol=1e-11).y[0, -1])
-    found = apply_bouc_wen(u, dt, A, beta, gamma, leak, rate, asymmetry, h0)
-    # The equation has a kink within a step in which h changes sign.
-    assert found == pytest.approx(np.array(known), abs=5e-4)
-    assert np.max(np.abs(found)) > 5.0
-
-
-@given(st.floats(0.2, 5.0))
-def test_bouc_wen_without_leak_and_rate_is_rate_independent(faster: float) -> None:
-    t = 0.01 * np.arange(300)
-    u = 20 * np.sin(3 * t) + 5 * np.cos(7.3 * t)
-    parameters = (0.8, 0.04, -0.01, 0.0, 0.0, 0.01, 0.0)
-    assert np.array_equal(apply_bouc_wen(u, 0.01, *parameters), apply_bouc_wen(u, 0.01 / faster, *parameters))

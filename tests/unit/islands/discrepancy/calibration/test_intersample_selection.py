@@ -10,12 +10,11 @@ from islands.discrepancy.calibration.intersample_selection import same_discretis
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
 from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
+from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
-from islands.discrepancy.simulators.second_order import SecondOrderSimulator
-from islands.systems.second_order import SecondOrder
+from support.built_in_simulators import make_oscillator, make_piezo
 from support.simulated_records import recorded
 
 Array = NDArray[np.float64]
@@ -23,8 +22,8 @@ Array = NDArray[np.float64]
 SAMPLES, DT, FINE = 800, 0.01, 20
 
 
-def oscillator(m: float = 0.5, c: float = 2.0, k: float = 500.0) -> SecondOrderSimulator:
-    return SecondOrderSimulator(SecondOrder(m, c, k), ("N", "m"), 0.05)
+def oscillator(m: float = 0.5, c: float = 2.0, k: float = 500.0) -> OdeSimulator:
+    return make_oscillator(m, c, k)
 
 
 def simulate_finely(u: Array, m: float = 0.5, c: float = 2.0, k: float = 500.0, linear: bool = True) -> Array:
@@ -132,7 +131,7 @@ def test_simulator_without_integration_is_returned_unchanged() -> None:
 
 
 def test_discretisations_are_compared_by_behaviour_and_step() -> None:
-    core = BoucWenPiezoSimulator()
+    core = make_piezo()
     assert same_discretisation(core, core)
     assert same_discretisation(core, ResampledSimulator(core, InterSample.FOH, 1))
     assert not same_discretisation(core, ResampledSimulator(core, InterSample.ZOH, 1))

@@ -23,11 +23,11 @@ from islands.discrepancy.inference.screening import SCORE_TIE, screen_effects
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN, refine_by_swaps, stepwise_search
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.evolution.progress import ignore_progress
+from support.built_in_simulators import make_piezo
 from support.simulated_records import DT, made, recorded, wave
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ def calibrate_to(
 @pytest.mark.ci
 def test_screening_does_not_depend_on_the_order_of_evaluation() -> None:
     u = wave(300)
-    core = BoucWenPiezoSimulator()
+    core = make_piezo()
     nominal, _ = calibrate_to(recorded(u, u), core)
     y = nominal.output + 1e-4 * u**2 + 0.05 * np.random.default_rng(2).standard_normal(u.size)
     base, target = calibrate_to(recorded(u, y), core)
@@ -179,7 +179,7 @@ def test_noise_model_is_white_once_both_causes_are_found() -> None:
 def test_deviation_from_the_prior_is_part_of_the_residual() -> None:
     """Parameters absorb a sensor gain at a cost in the prior; the gain is screened next to another effect."""
     u = wave(3000)
-    core = BoucWenPiezoSimulator()
+    core = make_piezo()
     simulation = ExtendedSimulator(core, (), make_context(recorded(u, u), core, u.size))
     y = 1.1 * simulation.simulate(simulation.nominal) + 2.0
     y = y + 0.05 * np.random.default_rng(4).standard_normal(u.size)

@@ -13,8 +13,8 @@ from islands.discrepancy.calibration.preparation import count_fitted_samples, ma
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator, resample_input
-from islands.discrepancy.simulators.second_order import SecondOrderSimulator
-from islands.systems.second_order import SecondOrder
+from islands.discrepancy.simulators.ode import OdeSimulator
+from support.built_in_simulators import make_oscillator
 from support.simulated_records import recorded, simulate_oscillator, wave
 
 Array = NDArray[np.float64]
@@ -25,8 +25,8 @@ VALUES = (0.5, 1.5, 2000.0)
 signals = st.lists(st.floats(-10, 10), min_size=4, max_size=80).map(np.array)
 
 
-def oscillator() -> SecondOrderSimulator:
-    return SecondOrderSimulator(SecondOrder(*VALUES), ("N", "m"), 0.1)
+def oscillator() -> OdeSimulator:
+    return make_oscillator(*VALUES)
 
 
 def simulate(simulator: Simulator, u: Array) -> Array:

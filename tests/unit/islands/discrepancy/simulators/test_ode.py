@@ -1,4 +1,4 @@
-"""Simulators that are equations: examples, agreement with built-in simulators, several runs at once."""
+"""Simulators that are equations: examples, several runs at once, mistakes in files."""
 
 import json
 from functools import cache
@@ -19,7 +19,7 @@ from islands.discrepancy.simulators.intersample import InterSample, ResampledSim
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.io.simulator_spec.document import describe_extension
 from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import PhysicalSpec, parse_spec
+from islands.io.simulator_spec.specification import parse_spec
 from support.repository import DOCS
 from support.simulated_records import EQUATIONS, wave
 
@@ -114,67 +114,11 @@ def parse_spec_of(document: dict[str, object]) -> object:
     return spec.model_validate(json.loads(json.dumps(document)))
 
 
-def forced(simulation: ExtendedSimulator, names: tuple[str, ...]) -> Array:
-    """Simulate with effects at their first starting points."""
-    effects = tuple(CATALOGUE[name] for name in names)
-    extended = simulation.with_effects(effects)
-    values = extended.nominal
-    for effect in effects:
-        values[extended.get_slice(effect)] = effect.starting_points(simulation.context, np.ones(1))[0]
-    return extended.simulate(values)
-
-
-def built_in(name: str, **parameters: float) -> ExtendedSimulator:
-    record = make_record(name)
-    return extend(make_simulator(PhysicalSpec(kind=name, parameters=parameters), record), record)
-
-
-def test_the_oscillator_has_the_bits_of_the_built_in_one() -> None:
-    theirs, ours = built_in("second-order", m=0.5, c=4.0, k=200.0), example("second-order")
-    values = np.array([0.45, 4.4, 190.0, 0.1, -0.3])
-    assert np.array_equal(ours.simulate(values), theirs.simulate(values))
-
-
-@pytest.mark.parametrize(
-    "name", ["coulomb-friction", "second-hysteresis", "gain-step", "delay", "even-nonlinearity"]
-)
-def test_effects_on_the_oscillator_are_those_on_the_built_in_one(name: str) -> None:
-    theirs, ours = built_in("second-order", m=0.5, c=4.0, k=200.0), example("second-order")
-    same = ExtendedSimulator(theirs.simulator, (), ours.context)
-    values = ours.nominal
-    found, expected = forced(ours, (name,)), forced(same, (name,))
-    assert found - ours.simulate(values) == pytest.approx(expected - same.simulate(same.nominal), abs=0.02)
-    assert np.max(np.abs(found - ours.simulate(values))) > 1e-4
-
-
 def test_an_offset_of_the_oscillator_is_an_offset_of_its_force() -> None:
     ours = example("second-order")
     offset = ours.simulate(ours.nominal, {"input-offset:v": 3.0 / 0.5})
     moved = ExtendedSimulator(ours.simulator, (), ours.context)
     assert np.mean(offset - moved.simulate(moved.nominal)) == pytest.approx(3.0 / 200.0, rel=0.05)
-
-
-def test_the_tanks_agree_with_the_built_in_ones_within_the_integration_error() -> None:
-    """The built-in rule is of second order: a step of half the size divides the difference by four."""
-    differences = []
-    for steps in (1, 2):
-        ours, theirs = (
-            ExtendedSimulator(ResampledSimulator(each.simulator, InterSample.FOH, steps), (), each.context)
-            for each in (example("cascaded-tanks"), built_in("cascaded-tanks", k1=0.05, k2=0.05, k3=0.03))
-        )
-        values = np.array([0.05, 0.05, 0.03, 5.0, 5.0])
-        differences.append(np.max(np.abs(ours.simulate(values) - theirs.simulate(values))))
-    assert differences[0] < 5e-3
-    assert differences[0] / differences[1] == pytest.approx(4.0, rel=0.3)
-
-
-def test_a_clipped_tank_loses_its_overflow_like_the_built_in_one() -> None:
-    clip = {"state-clip:x2": 4.0}, {"state-clip:lower": 4.0, "state-clip:lower caught": 0.0}
-    values = np.array([0.05, 0.05, 0.03, 5.0, 3.5])
-    ours = example("cascaded-tanks").simulate(values, clip[0])
-    theirs = built_in("cascaded-tanks", k1=0.05, k2=0.05, k3=0.03).simulate(values, clip[1])
-    assert ours == pytest.approx(theirs, abs=5e-3)
-    assert ours.max() == 4.0
 
 
 def test_a_limit_of_a_state_holds_in_both_directions() -> None:
@@ -207,12 +151,6 @@ def test_a_recording_that_diverges_fails_its_point_only() -> None:
     assert np.array_equal(found[0], both.simulate(points[0]))
 
 
-def test_the_piezo_agrees_with_the_built_in_one() -> None:
-    ours, theirs = example("bouc-wen-piezo"), built_in("bouc-wen-piezo")
-    difference = ours.simulate(ours.nominal) - theirs.simulate(theirs.nominal)
-    assert np.max(np.abs(difference)) < 1e-9
-
-
 def test_runs_at_once_have_the_bits_of_single_runs() -> None:
     simulation = example("dc-motor")
     simulator, context = simulation.simulator, simulation.context
@@ -239,7 +177,7 @@ def test_tolerances_are_those_of_the_file() -> None:
     simulator = example("dc-motor").simulator
     expected = {"R": 0.05, "L": 0.1, "K": 0.03, "J": 0.05}
     assert get_tolerances(ResampledSimulator(simulator)) == expected
-    assert get_tolerances(built_in("bouc-wen-piezo").simulator) == {}
+    assert get_tolerances(example("bouc-wen-piezo").simulator) == {}
     with pytest.raises(SettingsError, match="the tolerance of R is a fraction"):  # given ones take precedence
         islands.diagnose(make_record("dc-motor"), simulator, tolerance={"R": 2.0})
 

@@ -1,0 +1,119 @@
+"""Preparation of the equations of a user for a record: units, channels, initial states, sizes, and steps."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from islands.data.channel_names import parse_channel_name
+from islands.data.dataset import Dataset
+from islands.discrepancy.interfaces.context import SimulationContext
+from islands.discrepancy.simulators.coordinates import peak_amplitude
+from islands.discrepancy.simulators.ode import OdeSimulator
+from islands.errors import RecordError
+from islands.systems.ode.ode_expression import Symbol
+from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.system_document import MAX_STEPS
+from islands.systems.ode.system_parts import OdeState
+
+#: Numbers of steps per sample that are tried until a nominal simulation does not diverge.
+_STEPS = (1, 2, 4, 8, 16, 32, 64, 128, MAX_STEPS)
+
+
+def make_ode_simulator(
+    system: OdeSystem, record: Dataset, estimated: Mapping[str, float] | None = None
+) -> OdeSimulator:
+    """Make a simulator of a system for a record, whose first output may determine an initial state.
+
+    Parameters
+    ----------
+    system : OdeSystem
+    record : Dataset
+    estimated : mapping, optional
+        Estimates of states at the first sample, by name.
+
+    Raises
+    ------
+    RecordError
+        The record has not the channels or the units of the equations, or the simulation diverges on it.
+    """
+    _check_units(system, record)
+    system = _fill_units(system, record)
+    channels = {name: _find_channel(name, record) for name in system.channels}
+    first = float(np.nan_to_num(record.y[0]))
+    initial = {each.name: _find_initial(each, system, first) for each in system.states}
+    initial |= estimated or {}
+    sized = [*initial, *(f"d{name}/dt" for name in initial)]
+    rough = OdeSimulator(system, initial, dict.fromkeys(sized, 1.0), channels)
+    part = record.longest_segment
+    names, units = part.input_names, part.input_units
+    signals = {name: np.ascontiguousarray(u) for name, u in zip(names, part.u.T, strict=True)}
+    context = SimulationContext(
+        u=signals[names[0]],
+        dt=part.dt,
+        channels=signals,
+        units=dict(zip(names, units, strict=True)),
+        input_peak=1.0,
+        output_peak=1.0,
+        input_unit=units[0] or "1",
+        output_unit=part.output_unit or "1",
+        fit_end_time=part.samples * part.dt,
+    )
+    expressions = tuple(Symbol(name) for name in initial) + tuple(right for _, right in system.derivatives)
+    for steps in (system.steps,) if system.steps else _STEPS:
+        rough = replace(rough, system=replace(system, steps=steps))
+        sizes = [peak_amplitude(signal) for signal in rough.simulate_nominal(context, expressions)]
+        if np.isfinite(sizes).all():
+            break
+    else:
+        raise RecordError(
+            f"the simulation {system.name} diverges on this input: check its equations, the values and units "
+            "of its parameters, and the sampling time"
+        )
+    return replace(rough, sizes=dict(zip(sized, sizes, strict=True)))
+
+
+def _find_initial(state: OdeState, system: OdeSystem, measured: float) -> float:
+    if state.initial is not None:
+        return state.initial
+    value = measured if system.output == Symbol(state.name) else 0.0
+    return min(max(value, state.lower), state.upper)
+
+
+def _find_channel(name: str, record: Dataset) -> str:
+    found = [each for each in record.input_names[1:] if each == name or parse_channel_name(each).stem == name]
+    if len(found) != 1:
+        others = ", ".join(record.input_names[1:]) or "none"
+        raise RecordError(
+            f"the equations read the channel {name}, and the channels of the record are {others}: give its "
+            f"column as a channel, and name it {name} in the equations"
+        )
+    return found[0]
+
+
+def _check_units(system: OdeSystem, record: Dataset) -> None:
+    for what, expected, unit in (
+        ("input", system.input_unit, record.input_units[0]),
+        ("output", system.output_unit, record.output_unit),
+    ):
+        if expected and unit and expected != unit:
+            raise RecordError(
+                f"the {what} of {system.name} is in {expected}, that of the record in {unit}: convert the "
+                f"column, or write the equations for {unit}"
+            )
+
+
+def _fill_units(system: OdeSystem, record: Dataset) -> OdeSystem:
+    """Return a system in which ``{input}`` and ``{output}`` in units are the units of the record."""
+    given = {"{input}": record.input_units[0] or "1", "{output}": record.output_unit or "1"}
+
+    def fill(unit: str) -> str:
+        for name, own in given.items():
+            unit = unit.replace(name, own)
+        return unit
+
+    return replace(
+        system,
+        parameters=tuple(replace(each, unit=fill(each.unit)) for each in system.parameters),
+        states=tuple(replace(each, unit=fill(each.unit)) for each in system.states),
+    )
