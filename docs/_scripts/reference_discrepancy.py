@@ -110,6 +110,8 @@ def simulators() -> str:
         '`FILE.json` is an object with the parameters that are known: `{"m": 1.2, "k": 4000}`.\n',
         "`FILE.toml` contains equations: see "
         "[Write a simulation as equations](../how-to/write-a-simulation.md).\n",
+        "`OPTIONS` are names of variables of an FMU: see "
+        "[Diagnose an FMU](../how-to/simulate-with-an-fmu.md).\n",
         section(
             "Functions in equations",
             "In addition to the operators `+ - * / **` and the comparisons `< <= > >=`.",

@@ -12,6 +12,7 @@ from islands.discrepancy.interfaces.context import SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators import (
+    fmu,
     intersample,
     linear,
     narx,
@@ -21,6 +22,7 @@ from islands.discrepancy.simulators import (
     saved_extension,
 )
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.io.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.specification import SIMULATORS, PhysicalSpec
 from support.simulated_records import made
 
@@ -30,13 +32,22 @@ CLASSES = {
     "linear": linear.LinearSimulator,
     "model": narx.NarxSimulator,
     "column": recorded_output.RecordedOutput,
+    "fmu": fmu.FmuSimulator,
     "python": python_function.PythonFunctionSimulator,
     "held": intersample.ResampledSimulator,
     "extended": saved_extension.SavedExtension,
 }
 
 #: Modules of the package that define no simulator of a specification.
-SHARED_MODULES = {"__init__", "built_in", "coordinates", "extended", "ode_effects", "ode_preparation"}
+SHARED_MODULES = {
+    "__init__",
+    "built_in",
+    "coordinates",
+    "extended",
+    "ode_effects",
+    "ode_preparation",
+    "record_channels",
+}
 
 
 def make(name: str) -> Simulator:
@@ -74,6 +85,7 @@ def possible_effects(simulator: Simulator, context: SimulationContext) -> list[E
     )
 
 
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 def test_every_simulator_has_a_record() -> None:
     assert {*SIMULATORS, "held", "extended"} == made().keys()
     modules = {path.stem for path in Path(intersample.__file__).parent.glob("*.py")}

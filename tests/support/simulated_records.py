@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import scipy
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.simulator import Simulator
+from islands.io.export.fmu.compiler import find_compiler
+from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import (
@@ -20,8 +23,8 @@ from islands.io.simulator_spec.specification import (
     LocalSpec,
     ModelSpec,
     PhysicalSpec,
-    ProgramSpec,
 )
+from support.oscillator_fmus import write_oscillator
 from support.repository import ROOT
 
 #: File with a simulator that is a Python function.
@@ -29,6 +32,9 @@ PROGRAM = Path(__file__).with_name("naive_damper.py")
 
 #: Folder with simulators that are equations.
 EQUATIONS = ROOT / "examples" / "simulations"
+
+#: Folder of FMUs, which exists until the process ends.
+FMUS = TemporaryDirectory()
 
 #: Samples of a record.
 SAMPLES = 600
@@ -90,9 +96,14 @@ def simulate_oscillator(u: NDArray[np.float64], m: float, c: float, k: float) ->
     return np.asarray(x)
 
 
+def write_fmu() -> str:
+    """Write an oscillator as an FMU; return its path."""
+    return str(write_oscillator(Path(FMUS.name) / "oscillator.fmu"))
+
+
 @cache
 def made() -> Mapping[str, SpecAndRecord]:
-    """Return the specifications and their records by name."""
+    """Return the specifications and their records by name; FMUs require a C compiler."""
     u = wave()
     rng = np.random.default_rng(11)
     oscillation = simulate_oscillator(u, 0.5, 4.0, 200.0)
@@ -101,7 +112,10 @@ def made() -> Mapping[str, SpecAndRecord]:
     plain = recorded(u, 0.8 * u + 0.01 * rng.standard_normal(u.size))
     oscillator = recorded(u, oscillation, units=("N", "m"))
     spring = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})
+    can_compile = find_compiler() is not None
+    fmus = {"fmu": SpecAndRecord(FmuSpec(kind="fmu", file=write_fmu()), oscillator)} if can_compile else {}
     return {
+        **fmus,
         "bouc-wen-piezo": SpecAndRecord(PhysicalSpec(kind="bouc-wen-piezo"), plain),
         "second-order": SpecAndRecord(spring, oscillator),
         "rigid-axis": SpecAndRecord(

@@ -8,6 +8,7 @@ import typer
 from islands.errors import SettingsError
 from islands.io.models import read_model
 from islands.io.result_models import find_model_file
+from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import (
     SIMULATORS,
@@ -51,7 +52,8 @@ Rows = Annotated[
 ModelFile = Annotated[
     str,
     typer.Argument(
-        help="A model file, a result folder, an extended.json, ode:FILE.toml, or published:12, :13, :14."
+        help="A model file, a result folder, an extended.json, ode:FILE.toml, fmu:FILE.fmu, or published:12, "
+        ":13, :14."
     ),
 ]
 Channels = Annotated[
@@ -117,9 +119,11 @@ def extended(text: str) -> LocalExtendedSpec | None:
     return found
 
 
-def written_simulation(text: str) -> OdeSpec | None:
-    """Read a simulation that is given as equations, ``ode:FILE.toml``; return None for anything else."""
-    found = parse_spec(text) if text.startswith("ode:") else None
+def written_simulation(text: str) -> OdeSpec | FmuSpec | None:
+    """Read equations, ``ode:FILE.toml``, or an FMU with all names filled in; None for anything else."""
+    found = parse_spec(text) if text.startswith(("ode:", "fmu:")) else None
+    if isinstance(found, FmuSpec):
+        return FmuSpec.from_model(found.make_model())
     return found if isinstance(found, OdeSpec) else None
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from islands.errors import SettingsError
-from islands.io.simulator_spec.specification import parse_spec
+from islands.io.simulator_spec.specification import SIMULATORS, innermost, parse_spec
 from islands_api.client.calls import DatasetRef, RequestSpec, as_list, get_id, make_submission
 from islands_api.client.recording_parts import make_part
 from islands_api.schemas import JobView
@@ -49,8 +49,8 @@ def diagnose(
     Raises
     ------
     SettingsError
-        The simulation is unknown or is Python code, a number is NaN or infinite, or the idempotency key is
-        not printable ASCII.
+        The simulation is unknown or is code (Python, an FMU), a number is NaN or infinite, or the
+        idempotency key is not printable ASCII.
     ModelError
         A model file cannot be read.
     """
@@ -77,14 +77,14 @@ def parse_simulation(text: str) -> dict[str, Any]:
     Raises
     ------
     SettingsError
-        The simulation is unknown, or is Python code, which a service does not run.
+        The simulation is unknown, or is code (Python, an FMU), which a service does not run.
     ModelError
         A model file cannot be read.
     """
-    document = parse_spec(text).model_dump(mode="json", exclude_unset=True)
-    if document["kind"] == "python":
+    spec = parse_spec(text)
+    if not SIMULATORS[innermost(spec).kind].is_remote:
         raise SettingsError(
             f"{text}: a service does not run code of its clients: run 'islands diagnose' locally, or send "
             "the simulated output as a column of the record"
         )
-    return dict(document)
+    return dict(spec.model_dump(mode="json", exclude_unset=True))

@@ -26,6 +26,7 @@ from islands.io.result_models import (
     read_error_measurement,
     read_preprocessing,
 )
+from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.factory import simulate_spec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost
@@ -148,7 +149,7 @@ def _describe_steps(done: Preprocessing) -> str:
 
 
 def _simulate_extended(
-    spec: LocalExtendedSpec | OdeSpec,
+    spec: LocalExtendedSpec | OdeSpec | FmuSpec,
     record: Path,
     mode: str,
     out: Path | None,
@@ -158,10 +159,10 @@ def _simulate_extended(
     rows: str | None,
     reading: ReadingOptions,
 ) -> None:
-    """Simulate equations or the result of a diagnosis, with initial states that are fitted to the record."""
+    """Simulate equations, an FMU or the result of a diagnosis; initial states are fitted to the record."""
     if mode != "free-run":
         raise SettingsError(f"a simulation supports free runs only: --mode {mode} is for models")
-    if isinstance(spec, OdeSpec):
+    if isinstance(spec, OdeSpec | FmuSpec):
         expected, expected_output, effects = (spec.input, *spec.channels), spec.output, [spec.name]
     else:
         expected, expected_output = spec.inputs, spec.output

@@ -13,6 +13,7 @@ from islands.discrepancy.interfaces.force import add_output_forces, pack_force_l
 from islands.discrepancy.interfaces.simulator import Forces, SimulationRun
 from islands.discrepancy.simulators.coordinates import input_coordinate, output_coordinate, peak_amplitude
 from islands.discrepancy.simulators.ode_effects import find_effects, list_terms
+from islands.discrepancy.simulators.record_channels import sample_channel
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.lane_simulation import (
     LaneInput,
@@ -203,9 +204,7 @@ class OdeSimulator:
         """Return the channels, which are linear between their samples, and the time if it is read."""
         found = make_time(context.start_time, samples, context.dt) if Symbol(TIME) in program.signals else {}
         for name, recorded in self.channels.items():
-            signal = context.channels[recorded]
-            steps = np.arange(samples) * (signal.size / samples)
-            found[name] = interpolate_linearly(np.interp(steps, np.arange(signal.size), signal))
+            found[name] = interpolate_linearly(sample_channel(context, recorded, samples))
         return {name: signal.refine(max(self.system.steps, 1)) for name, signal in found.items()}
 
     def _find_limits(

@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.context import SimulationContext
 from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.ode import OdeSimulator
+from islands.discrepancy.simulators.record_channels import find_channel, make_nominal_context
 from islands.errors import RecordError
 from islands.systems.ode.ode_expression import Symbol
 from islands.systems.ode.ode_system import OdeSystem
@@ -39,26 +38,13 @@ def make_ode_simulator(
     """
     _check_units(system, record)
     system = _fill_units(system, record)
-    channels = {name: _find_channel(name, record) for name in system.channels}
+    channels = {name: find_channel(name, record, "the equations read") for name in system.channels}
     first = float(np.nan_to_num(record.y[0]))
     initial = {each.name: _find_initial(each, system, first) for each in system.states}
     initial |= estimated or {}
     sized = [*initial, *(f"d{name}/dt" for name in initial)]
     rough = OdeSimulator(system, initial, dict.fromkeys(sized, 1.0), channels)
-    part = record.longest_segment
-    names, units = part.input_names, part.input_units
-    signals = {name: np.ascontiguousarray(u) for name, u in zip(names, part.u.T, strict=True)}
-    context = SimulationContext(
-        u=signals[names[0]],
-        dt=part.dt,
-        channels=signals,
-        units=dict(zip(names, units, strict=True)),
-        input_peak=1.0,
-        output_peak=1.0,
-        input_unit=units[0] or "1",
-        output_unit=part.output_unit or "1",
-        fit_end_time=part.samples * part.dt,
-    )
+    context = make_nominal_context(record)
     expressions = tuple(Symbol(name) for name in initial) + tuple(right for _, right in system.derivatives)
     for steps in (system.steps,) if system.steps else _STEPS:
         rough = replace(rough, system=replace(system, steps=steps))
@@ -78,17 +64,6 @@ def _find_initial(state: OdeState, system: OdeSystem, measured: float) -> float:
         return state.initial
     value = measured if system.output == Symbol(state.name) else 0.0
     return min(max(value, state.lower), state.upper)
-
-
-def _find_channel(name: str, record: Dataset) -> str:
-    found = [each for each in record.input_names[1:] if each == name or parse_channel_name(each).stem == name]
-    if len(found) != 1:
-        others = ", ".join(record.input_names[1:]) or "none"
-        raise RecordError(
-            f"the equations read the channel {name}, and the channels of the record are {others}: give its "
-            f"column as a channel, and name it {name} in the equations"
-        )
-    return found[0]
 
 
 def _check_units(system: OdeSystem, record: Dataset) -> None:

@@ -13,6 +13,7 @@ from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, S
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.fmu import FmuSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator
 from islands.discrepancy.simulators.narx import NarxSimulator
@@ -21,6 +22,7 @@ from islands.discrepancy.simulators.python_function import PythonFunctionSimulat
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.io.models import model_json
+from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.spec_base import EffectSpec, FrameSpec, ScalesSpec, ValueSpec
 from islands.io.simulator_spec.specification import (
@@ -30,7 +32,6 @@ from islands.io.simulator_spec.specification import (
     LocalSpec,
     ModelSpec,
     PhysicalSpec,
-    ProgramSpec,
 )
 
 
@@ -116,6 +117,8 @@ def describe_extension(
             return ModelSpec(kind="model", model=json.loads(model_json(model)), name=simulator.name)
         case OdeSimulator() if not simulator.system.is_built_in:
             return OdeSpec.from_system(simulator.system.with_values(named))
+        case FmuSimulator():
+            return FmuSpec.from_model(simulator.model.with_values(named))
         case RecordedOutput():
             return ColumnSpec(kind="column", column=simulator.column)
         case LinearSimulator():

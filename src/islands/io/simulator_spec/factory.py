@@ -20,6 +20,7 @@ from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.segments import fill_gaps
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.fmu import make_fmu_simulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator, estimate_linear
 from islands.discrepancy.simulators.narx import NarxSimulator
@@ -29,6 +30,7 @@ from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, RecordError, SettingsError, lookup
 from islands.io.models import model_from_json
+from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.ode_spec import OdeSpec, read_built_in
 from islands.io.simulator_spec.spec_base import ParameterRange, SimulatorEntry
 from islands.io.simulator_spec.specification import (
@@ -40,7 +42,6 @@ from islands.io.simulator_spec.specification import (
     LocalSpec,
     ModelSpec,
     PhysicalSpec,
-    ProgramSpec,
     SimulationSpec,
     parse_spec,
 )
@@ -236,6 +237,11 @@ def make_python_function(spec: ProgramSpec, _record: Dataset, _columns: Mapping[
     if not callable(function):
         raise SettingsError(f"{spec.path} has no function {spec.function!r}: write python:FILE.py:FUNCTION")
     return PythonFunctionSimulator(function, f"{spec.path}:{spec.function}", spec.parameters)
+
+
+def make_fmu(spec: FmuSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
+    """Read an FMU and make a simulator of it."""
+    return make_fmu_simulator(spec.make_model(), record)
 
 
 def make_identified_model(spec: ModelSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from pydantic import ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from islands.errors import ModelError, SettingsError, lookup
+from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.spec_base import (
     EffectSpec,
@@ -71,21 +72,6 @@ class LinearSpec(SimulatorSpec):
         return cls.model_validate({"kind": kind, "order": order, "delay": delay or 0})
 
 
-class ProgramSpec(SimulatorSpec):
-    """A Python function in a file. Accepted on the command line only, since it runs on this machine."""
-
-    kind: Literal["python"]
-    path: str
-    function: str
-    parameters: dict[str, FiniteFloat] = Field(default_factory=dict, max_length=64)
-
-    @classmethod
-    def from_text(cls, kind: str, text: str) -> "LocalSpec":
-        """Parse ``FILE.py:FUNCTION``."""
-        path, _, function = text.rpartition(":")
-        return cls.model_validate({"kind": kind, "path": path, "function": function})
-
-
 class ModelSpec(SimulatorSpec):
     """An identified model: the content of a model file."""
 
@@ -131,7 +117,7 @@ class ExtendedSpec(SpecModel):
 
 
 class LocalExtendedSpec(ExtendedSpec):
-    """A simulator with effects, which may be a Python function."""
+    """A simulator with effects, which may be a Python function or an FMU."""
 
     core: "LocalSpec"  # type: ignore[assignment]
 
@@ -227,6 +213,16 @@ _ENTRIES = (
         estimated="its parameters",
         is_remote=False,
     ),
+    SimulatorEntry(
+        "fmu",
+        ":FILE.fmu[?OPTIONS]",
+        "Functional Mock-up Unit of FMI 2.0 or 3.0, as Simulink, Dymola, OpenModelica and other tools "
+        "export it. It is native code, so REST does not accept it",
+        FmuSpec,
+        f"{_FACTORY}:make_fmu",
+        estimated="its parameters, the states at the first sample",
+        is_remote=False,
+    ),
 )
 
 #: All simulators by name.
@@ -245,7 +241,7 @@ SimulationSpec: TypeAlias = Annotated[
 
 #: Specifications that the command line and the Python functions accept.
 LocalSpec: TypeAlias = Annotated[
-    PhysicalSpec | OdeSpec | LinearSpec | ModelSpec | ColumnSpec | LocalExtendedSpec | ProgramSpec,
+    PhysicalSpec | OdeSpec | LinearSpec | ModelSpec | ColumnSpec | LocalExtendedSpec | ProgramSpec | FmuSpec,
     Field(discriminator="kind"),
 ]
 

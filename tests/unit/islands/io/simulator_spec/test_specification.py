@@ -18,6 +18,7 @@ from islands.io.simulator_spec.specification import (
     SimulationSpec,
     parse_spec,
 )
+from support.simulated_records import extension, made
 
 
 @pytest.fixture(params=SIMULATORS)
@@ -61,6 +62,19 @@ def test_physical_systems_are_parsed_without_arguments() -> None:
     for name, entry in SIMULATORS.items():
         if entry.spec is PhysicalSpec:
             assert parse_spec(name) == PhysicalSpec(kind=name)
+
+
+@pytest.mark.parametrize(
+    "code", [{"kind": "fmu", "file": "a.fmu"}, {"kind": "python", "path": "a.py", "function": "f"}]
+)
+def test_code_is_refused_over_rest_alone_and_within_an_extended_simulation(code: dict[str, str]) -> None:
+    assert TypeAdapter(LocalSpec).validate_python(code).kind == code["kind"]
+    spring = made()["second-order"].spec
+    extended = {**extension(spring), "kind": "extended"}
+    assert TypeAdapter(SimulationSpec).validate_python(extended)
+    for given in (code, {**extended, "core": code}):
+        with pytest.raises(ValidationError, match="union_tag_invalid"):
+            TypeAdapter(SimulationSpec).validate_python(given)
 
 
 def test_a_kind_outside_the_table_is_refused() -> None:

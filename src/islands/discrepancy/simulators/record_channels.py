@@ -1,0 +1,56 @@
+"""Columns of a record that a simulator reads in addition to its input."""
+
+import numpy as np
+
+from islands.data.channel_names import parse_channel_name
+from islands.data.dataset import Dataset
+from islands.discrepancy.interfaces.context import Signal, SimulationContext
+from islands.errors import RecordError
+
+
+def find_channel(name: str, record: Dataset, reader: str) -> str:
+    """Return the channel of a record that has a name, with or without a unit behind it.
+
+    Parameters
+    ----------
+    reader : str
+        What reads the channel, for the message.
+
+    Raises
+    ------
+    RecordError
+        There is no such channel, or several.
+    """
+    found = [each for each in record.input_names[1:] if each == name or parse_channel_name(each).stem == name]
+    if len(found) != 1:
+        others = ", ".join(record.input_names[1:]) or "none"
+        raise RecordError(
+            f"{reader} the channel {name}, and the channels of the record are {others}: give its column as "
+            f"a channel, and name it {name} there"
+        )
+    return found[0]
+
+
+def sample_channel(context: SimulationContext, name: str, samples: int) -> Signal:
+    """Return a channel with a given number of samples, interpolated linearly."""
+    signal = context.channels[name]
+    steps = np.arange(samples) * (signal.size / samples)
+    return np.interp(steps, np.arange(signal.size), signal)
+
+
+def make_nominal_context(record: Dataset) -> SimulationContext:
+    """Return the context of a simulation that determines scales: that of the longest recording."""
+    part = record.longest_segment
+    names, units = part.input_names, part.input_units
+    signals = {name: np.ascontiguousarray(u) for name, u in zip(names, part.u.T, strict=True)}
+    return SimulationContext(
+        u=signals[names[0]],
+        dt=part.dt,
+        channels=signals,
+        units=dict(zip(names, units, strict=True)),
+        input_peak=1.0,
+        output_peak=1.0,
+        input_unit=units[0] or "1",
+        output_unit=part.output_unit or "1",
+        fit_end_time=part.samples * part.dt,
+    )

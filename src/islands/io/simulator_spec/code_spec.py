@@ -1,0 +1,156 @@
+"""Specifications of simulations that are code: a Python function, or an FMU with the variables that are used.
+
+They are accepted on the command line and in Python only, since the code runs on this machine.
+"""
+
+import re
+import tomllib
+from math import isinf
+from pathlib import Path
+from typing import Annotated, Any, Literal
+from urllib.parse import parse_qsl
+
+from pydantic import BeforeValidator, Field, FiniteFloat
+
+from islands.errors import SettingsError
+from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
+from islands.systems.fmu.fmi_description import read_description
+from islands.systems.fmu.fmu_model import FmuModel, FmuParameterChoice, choose_variables
+
+_Name = Annotated[str, Field(min_length=1, max_length=500)]
+
+#: Options behind the file name that are lists of names.
+_LISTS = ("channels", "initial", "parameters")
+
+#: Comma between names; a name can contain others in brackets, as ``K[1,2]``.
+_COMMA = re.compile(r",(?![^\[]*\])")
+
+
+class ProgramSpec(SimulatorSpec):
+    """A Python function in a file."""
+
+    kind: Literal["python"]
+    path: str
+    function: str
+    parameters: dict[str, FiniteFloat] = Field(default_factory=dict, max_length=64)
+
+    @classmethod
+    def from_text(cls, kind: str, text: str) -> "ProgramSpec":
+        """Parse ``FILE.py:FUNCTION``."""
+        path, _, function = text.rpartition(":")
+        return cls.model_validate({"kind": kind, "path": path, "function": function})
+
+
+class FmuParameterSpec(SpecModel):
+    """Parameter of an FMU; the model description has the defaults. See `FmuParameter`."""
+
+    value: FiniteFloat | None = None
+    tolerance: FiniteFloat | None = None
+    lower: FiniteFloat | None = None
+    upper: FiniteFloat | None = None
+    fixed: bool = False
+
+
+def _allow_number(given: Any) -> Any:
+    return {"value": given} if isinstance(given, int | float) else given
+
+
+class FmuSpec(SimulatorSpec):
+    """Functional Mock-up Unit."""
+
+    kind: Literal["fmu"]
+    file: _Name
+    interface: Literal["", "co-simulation", "model-exchange"] = ""
+    input: str = ""
+    output: str = ""
+    channels: Annotated[tuple[_Name, ...], Field(max_length=15)] = ()
+    parameters: dict[_Name, Annotated[FmuParameterSpec, BeforeValidator(_allow_number)]] | None = Field(
+        default=None, max_length=100
+    )
+    initial: Annotated[tuple[_Name, ...], Field(max_length=100)] | None = None
+    steps: Annotated[int, Field(ge=0, le=256)] = 0
+
+    @property
+    def name(self) -> str:
+        """Name of the file."""
+        return Path(self.file).name
+
+    def make_model(self) -> FmuModel:
+        """Return the FMU with its variables; the file is read.
+
+        Raises
+        ------
+        ModelError
+            The file is not an FMU for this machine.
+        SettingsError
+            It has not the variables, or fmpy is not installed.
+        """
+        chosen = self.parameters
+        return choose_variables(
+            read_description(self.file, self.interface),
+            self.input,
+            self.output,
+            self.channels,
+            None
+            if chosen is None
+            else {name: FmuParameterChoice(**each.model_dump()) for name, each in chosen.items()},
+            self.initial,
+            self.steps,
+        )
+
+    @classmethod
+    def from_model(cls, model: FmuModel) -> "FmuSpec":
+        """Return the specification of an FMU with its variables."""
+        return cls(
+            kind="fmu",
+            file=model.description.path,
+            interface=model.description.interface.value,
+            input=model.input.name,
+            output=model.output.name,
+            channels=tuple(each.name for each in model.channels),
+            parameters={
+                each.variable.name: FmuParameterSpec(
+                    value=each.value,
+                    tolerance=each.tolerance,
+                    lower=None if isinf(each.lower) else each.lower,
+                    upper=None if isinf(each.upper) else each.upper,
+                    fixed=each.fixed,
+                )
+                for each in model.parameters
+            },
+            initial=tuple(each.variable.name for each in model.initial),
+            steps=model.steps,
+        )
+
+    @classmethod
+    def from_text(cls, kind: str, text: str) -> "FmuSpec":
+        """Parse ``FILE.fmu?input=NAME&parameters=NAME,NAME=VALUE``, or the path of a TOML file."""
+        if text.endswith(".toml"):
+            return cls._from_file(kind, Path(text))
+        file, _, query = text.partition("?")
+        options: dict[str, Any] = {}
+        try:
+            given = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
+        except ValueError:
+            raise SettingsError(f"{query}: write OPTION=VALUE&OPTION=VALUE behind {file}?") from None
+        for name, value in given:
+            options[name] = list(filter(None, _COMMA.split(value))) if name in _LISTS else value
+        if "parameters" in options:
+            options["parameters"] = dict(map(_parse_parameter, options["parameters"]))
+        return cls.model_validate({**options, "kind": kind, "file": file})
+
+    @classmethod
+    def _from_file(cls, kind: str, path: Path) -> "FmuSpec":
+        """Read a TOML file; the FMU that it names is relative to its folder."""
+        try:
+            document = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise SettingsError(f"{path} cannot be read as TOML ({error}): write fmu:FILE.toml") from error
+        if isinstance(document.get("file"), str):
+            document["file"] = str(path.parent / document["file"])
+        return cls.model_validate({**document, "kind": kind})
+
+
+def _parse_parameter(text: str) -> tuple[str, dict[str, str]]:
+    name, _, value = text.partition("=")
+    return name, {"value": value} if value else {}
