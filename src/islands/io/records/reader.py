@@ -45,7 +45,7 @@ READERS: dict[str, Callable[[Path, ReadingOptions], Table]] = {
 def read_record(
     path: str | Path,
     inputs: Sequence[str],
-    output: str,
+    output: str | None,
     dt: float | None = None,
     rows: slice | None = None,
     missing_output: bool = False,
@@ -82,8 +82,9 @@ def read_record(
     inputs : sequence of str
         Names of the input columns, in the order of the model's inputs; ``u_V+1`` reads the column u_V one
         sample early, ``u`` the column ``u [V]``.
-    output : str
-        Name of the output column.
+    output : str or None
+        Name of the output column. None for an input without data, as `plan_experiment` takes it: all values
+        of the output are then missing.
     dt : float, optional
         Sampling time in seconds, for files that do not contain it. If the file contains it, both must agree
         within 1 %; time stamps with jitter or few digits are then replaced. An NPZ or MAT file may contain it
@@ -138,7 +139,7 @@ def read_record(
 def read_dataset(
     path: str | Path,
     inputs: Sequence[str],
-    output: str,
+    output: str | None,
     dt: float | None = None,
     rows: slice | None = None,
     missing_output: bool = False,

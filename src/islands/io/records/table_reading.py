@@ -26,7 +26,7 @@ def read_table(
     table: Table,
     file: str,
     inputs: Sequence[str],
-    output: str,
+    output: str | None,
     dt: float | None = None,
     rows: slice | None = None,
     missing_output: bool = False,
@@ -54,38 +54,40 @@ def read_table(
     """
     inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
     sources = [find_column(name, table.names) for name in inputs]
-    output = find_column(output, table.names)
+    output = None if output is None else find_column(output, table.names)
+    outputs = () if output is None else (output,)
+    chosen = (*sources, *outputs)
     check_choice(table.names, sources, output, file, options.time, table.others)
     structures = split_structures(table.names)
-    structure = structures[output]
-    clock = options.time or time_column(table.names, file, (*sources, output), structure, table.clocks)
-    columns = table.read(tuple(dict.fromkeys((*sources, output, *([clock] if clock else [])))), rows)
+    structure = structures[chosen[-1]]
+    clock = options.time or time_column(table.names, file, chosen, structure, table.clocks)
+    columns = table.read(tuple(dict.fromkeys((*chosen, *([clock] if clock else [])))), rows)
     # A simulation needs no more samples than the lags of its model, which it checks.
     check_length(columns, *([2] if missing_output else []))
     required = [name for name in columns.numbers if not (missing_output and name == output)]
     if options.gaps is None:
         for name in columns.numbers:
             check_values(columns, name, missing=name == output)
-    values = np.column_stack([columns.numbers[name] for name in (*sources, output)])
+    values = np.column_stack([columns.numbers[name] for name in chosen])
     if options.gaps is None and options.resample is None:
         step, start = find_sampling(table, columns, clock, dt, structure, options.time is not None)
         found = UniformRecording(values, step, step * columns.first if start is None else start, (), ())
     else:
         recording = make_recording(table, columns, values, clock, dt, structure, options.time is not None)
-        places = [place for place, name in enumerate((*sources, output)) if name in required]
+        places = [place for place, name in enumerate(chosen) if name in required]
         found = make_uniform(recording, places, options.gaps, options.resample)
-        for name, column in zip((*sources, output), found.values.T, strict=True):
+        for name, column in zip(chosen, found.values.T, strict=True):
             check_repaired(column, name, file, missing=name not in required)
-    for name in () if missing_output else (*(() if resting_inputs else sources), output):
+    for name in () if missing_output else (*(() if resting_inputs else sources), *outputs):
         check_varies(columns, name)
     record = Dataset(
-        u=found.values[:, :-1],
-        y=found.values[:, -1],
+        u=found.values[:, : len(sources)],
+        y=found.values[:, -1] if outputs else np.full(len(found.values), np.nan),
         dt=found.dt,
         input_names=tuple(sources),
-        output_name=output,
+        output_name=output or "y",
         input_units=tuple(parse_unit(source.removeprefix(structures[source])) for source in sources),
-        output_unit=parse_unit(output.removeprefix(structure)),
+        output_unit=parse_unit(output.removeprefix(structure)) if output else "",
         segments=found.segments,
         recordings=(file,) * max(1, len(found.segments)),
         start=found.start,

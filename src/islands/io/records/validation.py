@@ -32,7 +32,7 @@ def check_unique(names: Sequence[str], file: str) -> None:
 def check_choice(
     names: Sequence[str],
     inputs: Sequence[str],
-    output: str,
+    output: str | None,
     file: str,
     time: str | None = None,
     others: str = "",
@@ -53,9 +53,10 @@ def check_choice(
     repeated = [name for name, count in Counter(inputs).items() if count > 1]
     if repeated:
         raise RecordError(f"column {repeated[0]} is given as an input twice: name it once")
-    if time is not None and time in (*inputs, output):
+    chosen = (*inputs, *([] if output is None else [output]))
+    if time in chosen:
         raise RecordError(f"column {time} is given as the time and as an input or output: name another one")
-    for name in (*inputs, output, *([] if time is None else [time])):
+    for name in (*chosen, *([] if time is None else [time])):
         if name not in names:
             raise RecordError(
                 f"{file} has no column {name}; it has "

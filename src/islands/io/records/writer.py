@@ -31,6 +31,19 @@ def write_record(record: Dataset, path: str | Path) -> None:
     _write(path, names, zip(_round_times(record), *record.u.T.tolist(), record.y.tolist(), strict=True))
 
 
+def write_input(u: NDArray[np.float64], dt: float, name: str, path: str | Path) -> None:
+    """Write an input as the columns ``t_s`` and its name, such as ``u_V``, which contains its unit.
+
+    Parameters
+    ----------
+    u : ndarray, shape (samples,)
+    dt : float
+        Sampling time in seconds.
+    """
+    times = _round_times(Dataset(u=u, y=np.zeros(u.size), dt=dt))
+    _write(path, ("t_s", name), zip(times, u.tolist(), strict=True))
+
+
 def write_simulation(
     record: Dataset, simulated: NDArray[np.float64], path: str | Path, band: Band | None = None
 ) -> None:
