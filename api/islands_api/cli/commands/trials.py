@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 
 from islands.errors import SettingsError, lookup
-from islands.figures.confusion import draw_confusion
+from islands.figures.matrices.confusion import draw_confusion
 from islands.figures.style import save
 from islands.performance.trials.cases import CASES, SimulatedCase
 from islands.performance.trials.injection.noise import NOISES

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from islands.figures.confusion import draw_confusion
+from islands.figures.matrices.confusion import draw_confusion
 from islands.figures.style import FRAME, RESIDUAL, SIMULATED, save
 from islands.performance.trials.injection.piezo import PIEZO
 

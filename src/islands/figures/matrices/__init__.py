@@ -1,0 +1,1 @@
+"""Matrices of causes as figures."""
