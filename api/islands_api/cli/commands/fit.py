@@ -17,11 +17,11 @@ from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.model.candidate_library import LIBRARIES
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, progress
-from islands_api.cli.coupled_run import couple_data, coupled_options, join_columns, show_coupled
 from islands_api.cli.output_folder import check_folder, show_result
 from islands_api.cli.preprocessing_options import check_one_output, with_preprocessing_options
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
+from islands_api.cli.runs.coupled_run import couple_data, coupled_options, join_columns, show_coupled
 
 #: Default library for several outputs.
 SEVERAL_OUTPUTS = "polynomial"

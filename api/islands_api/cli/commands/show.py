@@ -10,7 +10,7 @@ from islands.io.export.closed_form import closed_form
 from islands.io.export.extension import EXTENDED_EXPORTS
 from islands.io.result_text.text_layout import term_table
 from islands_api.cli import options
-from islands_api.cli.coupled_run import read_coupled
+from islands_api.cli.runs.coupled_run import read_coupled
 
 
 def show(

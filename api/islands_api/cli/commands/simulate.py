@@ -34,8 +34,8 @@ from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output
-from islands_api.cli.coupled_run import read_coupled, read_warm_up, simulate_coupled
 from islands_api.cli.record_options import with_reading_options
+from islands_api.cli.runs.coupled_run import read_coupled, read_warm_up, simulate_coupled
 
 
 @with_reading_options

@@ -21,7 +21,7 @@ from islands.simulation.coupled_free_run import coupled_free_run, match_coupled
 from islands.validation.metrics import metrics
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output, print_message, progress
-from islands_api.cli.identify_run import RunOptions
+from islands_api.cli.runs.identify_run import RunOptions
 from islands_api.cli.search_progress import search_progress
 from islands_service.engines import ENGINES
 

@@ -1,0 +1,1 @@
+"""Runs of the command line that are longer than the command that starts them."""
