@@ -11,6 +11,7 @@ from islands.discrepancy.effects import EFFECTS as EFFECTS
 from islands.discrepancy.interfaces.context import Parameter as Parameter
 from islands.discrepancy.interfaces.effect import Effect as Effect
 from islands.discrepancy.interfaces.effect import Site as Site
+from islands.discrepancy.planning.experiment_plan import ExperimentPlan as ExperimentPlan
 from islands.errors import IslandsError as IslandsError
 from islands.errors import ModelError as ModelError
 from islands.errors import RecordError as RecordError
@@ -24,6 +25,7 @@ from islands.facade.coupled.coupled_identification import identify_coupled as id
 from islands.facade.coupled.coupled_result import CoupledResult as CoupledResult
 from islands.facade.diagnose import diagnose as diagnose
 from islands.facade.diagnose import function_simulator as function_simulator
+from islands.facade.diagnose import plan_experiment as plan_experiment
 from islands.facade.engine_choice import Ray as Ray
 from islands.facade.explain_residual import explain_residual as explain_residual
 from islands.facade.fit import fit as fit

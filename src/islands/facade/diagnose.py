@@ -1,14 +1,17 @@
-"""`diagnose`: compare a simulation with a record and name what the simulation gets wrong."""
+"""`diagnose` names what a simulation gets wrong on a record; `plan_experiment` says what one could show."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import diagnose as diagnose_simulator
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.planning.experiment_plan import DecisiveLimits, ExperimentPlan
+from islands.discrepancy.planning.experiment_plan import plan_experiment as plan_with_simulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.io.data_frames import as_record
@@ -73,12 +76,72 @@ def diagnose(
         an effect is invalid.
     """
     record = as_record(record, dt=dt, inputs=inputs, output=output, resting_inputs=True)
+    simulator = _as_simulator(simulation, record, columns)
+    return diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)
+
+
+def plan_experiment(
+    record: Dataset,
+    simulation: str | Model | SimulationSpec | LocalSpec | Simulator,
+    *,
+    noise_std: float | None = None,
+    separate: Sequence[str] = (),
+    amplitude: float | None = None,
+    rate: float | None = None,
+    duration: float | None = None,
+    tolerance: Mapping[str, float] | None = None,
+    effects: Sequence[Effect] = EFFECTS,
+    seed: int = 0,
+    progress: ProgressCallback = ignore_progress,
+    parallel_map: ParallelMap = map,
+) -> ExperimentPlan:
+    """Find which causes of a discrepancy an experiment could tell apart, before it is carried out.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record with the input; its output may be missing: ``read_record(path, ["u_V"], None)``, or
+        ``Dataset(u, np.full(len(u), np.nan), dt)``.
+    simulation : str, Model, spec or Simulator
+        As in `diagnose`.
+    noise_std : float, optional
+        Standard deviation of the white noise of the output, in its unit; by default it is estimated from the
+        output of the record.
+    separate : sequence of str
+        Names of two effects for which cheaper and better experiments are compared; by default the decisive
+        experiment is for all causes that the given one does not separate.
+    amplitude, rate, duration : float, optional
+        Limits of the decisive experiment: half of the range of the input, its largest rate per second, and
+        seconds; by default those of the given input.
+    tolerance, effects, seed, progress, parallel_map
+        As in `diagnose`.
+
+    Raises
+    ------
+    RecordError
+        The record cannot be used, or the simulation diverges on it.
+    SettingsError, ModelError
+        There is no such simulation or cause, or a setting is not possible.
+    """
+    limits = DecisiveLimits(amplitude, rate, duration)
+    simulator = _as_simulator(simulation, record, None)
+    return plan_with_simulator(
+        *(record, simulator, noise_std, tolerance, separate, limits, seed, parallel_map, progress, effects)
+    )
+
+
+def _as_simulator(
+    simulation: str | Model | SimulationSpec | LocalSpec | Simulator,
+    record: Dataset,
+    columns: Mapping[str, Signal] | None,
+) -> Simulator:
     simulator: Any = simulation
     if isinstance(simulation, Model):
         simulator = make_model_simulator(simulation, "the model", record)
     elif isinstance(simulation, str) or hasattr(simulation, "kind"):  # a simulator has no `kind`
         simulator = make_simulator(simulation, record, columns)  # type: ignore[arg-type]
-    return diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)
+    made: Simulator = simulator
+    return made
 
 
 def function_simulator(function: Callable[..., Signal], **nominal: float) -> Simulator:

@@ -1,0 +1,1 @@
+"""Planning of experiments: which causes an input and its channels could tell apart, before any data."""

@@ -1,0 +1,102 @@
+"""Set-up of a planned experiment: checks, noise, and the effects that a diagnosis would search for."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.calibration.levenberg_marquardt import calibrate
+from islands.discrepancy.calibration.preparation import (
+    MIN_SAMPLES,
+    estimation_part,
+    make_context,
+    make_target,
+    select_effects,
+)
+from islands.discrepancy.effects import EFFECTS
+from islands.discrepancy.inference.noise_floor import explainable_variance, noise_variance_from_periods
+from islands.discrepancy.interfaces.effect import Effect
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.planning.experiment import Experiment, MeasuredChannel
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.recorded_output import RecordedOutput
+from islands.errors import RecordError, SettingsError
+
+
+def make_experiment(
+    record: Dataset,
+    simulator: Simulator,
+    noise_std: float | None,
+    prior_std: Mapping[str, float],
+    catalogue: Sequence[Effect] = EFFECTS,
+) -> tuple[Experiment, list[Effect]]:
+    """Make the experiment with the input of a record, and list the effects that it could show.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record with the input, and further channels. Its output may be missing.
+    simulator : Simulator
+    noise_std : float or None
+        Standard deviation of the noise of the output; None to estimate it from the measured output.
+    prior_std : mapping
+        Relative standard deviations of parameters about their nominal values.
+
+    Raises
+    ------
+    RecordError
+        The record is too short or has several recordings, the simulation diverges on it, or there is no
+        output to estimate the noise from.
+    SettingsError
+        The noise is not positive, or the simulation is a recorded column.
+    """
+    _check(record, simulator, noise_std)
+    fitted = estimation_part(record).samples
+    context = make_context(_fill_output(record), simulator, fitted)
+    if noise_std is None:
+        noise_std = _estimate_noise_std(record, ExtendedSimulator(simulator, (), context), prior_std, fitted)
+    output = MeasuredChannel(record.output_name, record.output_unit, simulator, context, noise_std)
+    effects = select_effects(simulator, context, prior_std, catalogue)
+    return Experiment((output,), prior_std, fitted), effects
+
+
+def _check(record: Dataset, simulator: Simulator, noise_std: float | None) -> None:
+    if record.samples < MIN_SAMPLES:
+        raise RecordError(
+            f"the input has {record.samples} samples, and a diagnosis needs at least {MIN_SAMPLES}: plan a "
+            "longer experiment"
+        )
+    if len(record.segments) > 1:
+        raise RecordError(f"a plan is for one recording, and the record has {len(record.segments)}: give one")
+    if isinstance(simulator, RecordedOutput):
+        raise SettingsError(
+            "a recorded column cannot be simulated with other inputs: give a simulation that computes it"
+        )
+    if noise_std is not None and not (np.isfinite(noise_std) and noise_std > 0.0):
+        raise SettingsError(f"the noise is a positive number in the unit of the output, got {noise_std:g}")
+
+
+def _fill_output(record: Dataset) -> Dataset:
+    """Return a record whose output is zero where it is missing; the scale of a resting output needs it."""
+    return replace(record, y=np.nan_to_num(record.y))
+
+
+def _estimate_noise_std(
+    record: Dataset, simulation: ExtendedSimulator, prior_std: Mapping[str, float], fitted: int
+) -> float:
+    """Return the noise of the measured output: what repeats in no period, or what nothing predicts."""
+    if np.isnan(record.y).any():
+        raise RecordError(
+            "the noise is unknown, since the record has no complete output: give its standard deviation"
+        )
+    base = calibrate(simulation, make_target(record, fitted, prior_std), simulation.nominal)
+    u, residual = record.u[:fitted, 0], (record.y - base.output)[:fitted]
+    variance = noise_variance_from_periods(u, record.y[:fitted], ())
+    if variance is None:
+        rng = np.random.default_rng(0)
+        explained = explainable_variance(residual, u, base.output[:fitted], rng)
+        variance = float(np.mean(residual**2)) - explained
+    if variance <= 0.0:
+        raise RecordError("the output has no noise: give the standard deviation of that in the experiment")
+    return float(np.sqrt(variance))

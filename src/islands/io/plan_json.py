@@ -1,0 +1,94 @@
+"""Plan of an experiment as a JSON document: ``plan.json``."""
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from math import isfinite
+from typing import Any
+
+from islands.discrepancy.planning.alternative_experiments import AlternativeExperiment, choose_cheapest
+from islands.discrepancy.planning.decisive_experiment import DecisiveExperiment
+from islands.discrepancy.planning.experiment_plan import ExperimentPlan
+from islands.discrepancy.planning.isolability import IsolabilityRow
+from islands.discrepancy.planning.pair_separation import PairSeparation
+from islands.io.result_folder import record_document
+
+SCHEMA = "islands.plan/1"
+
+
+def plan_document(plan: ExperimentPlan) -> dict[str, Any]:
+    """Return a plan as a JSON document.
+
+    Misfits are in standard deviations of the noise. Misfits that are not reached, and entries of a cause with
+    itself, are None.
+    """
+    isolability = plan.isolability
+    cheapest = choose_cheapest(plan.alternatives)
+    return {
+        "schema": SCHEMA,
+        "record": record_document(plan.record),
+        "simulation": plan.simulation,
+        "noise_std": plan.noise_std,
+        "causes": [
+            {"name": name, "family": effect.family, **_describe_row(row)}
+            for name, effect, row in zip(
+                isolability.names, isolability.effects, isolability.rows, strict=True
+            )
+        ],
+        "separable_from_misfit": [_finite(row.misfits) for row in isolability.rows],
+        "expected_log_likelihood_ratio": [_finite(row.ratios) for row in isolability.rows],
+        "inseparable_groups": [list(group) for group in isolability.groups],
+        "undetectable": list(isolability.undetectable),
+        "pair": list(plan.pair),
+        "alternatives": [_describe_alternative(each) for each in plan.alternatives],
+        "cheapest_alternative": None if cheapest is None else cheapest.change,
+        "decisive_experiment": None if plan.decisive is None else _describe_decisive(plan.decisive),
+    }
+
+
+def _describe_row(row: IsolabilityRow) -> dict[str, Any]:
+    reference = row.reference
+    return {
+        "detectable": None if row.detectable is None else asdict(row.detectable),
+        "reference_misfit": None if reference is None else reference.misfit,
+        "reference_values": None if reference is None else list(reference.values),
+    }
+
+
+def _finite(numbers: Iterable[float]) -> list[float | None]:
+    return [number if isfinite(number) else None for number in numbers]
+
+
+def _describe_separation(separation: PairSeparation) -> dict[str, Any]:
+    return {
+        "distance": separation.distance,
+        "required_distance": separation.required,
+        "expected_log_likelihood_ratio": separation.expected_ratio,
+        "is_sufficient": separation.sufficiency >= 1.0,
+    }
+
+
+def _describe_alternative(each: AlternativeExperiment) -> dict[str, Any]:
+    return {
+        "change": each.change,
+        "cost": each.cost.name.lower(),
+        "amplitude": each.amplitude,
+        "rate": each.rate,
+        "duration_s": each.duration,
+        **_describe_separation(each.separation),
+    }
+
+
+def _describe_decisive(decisive: DecisiveExperiment) -> dict[str, Any]:
+    return {
+        "input": decisive.description,
+        "samples": decisive.u.size,
+        "dt": decisive.dt,
+        "pairs": [
+            {
+                "causes": list(pair.names),
+                "given": _describe_separation(before),
+                "decisive": _describe_separation(after),
+            }
+            for pair, before, after in zip(decisive.pairs, decisive.before, decisive.after, strict=True)
+        ],
+    }

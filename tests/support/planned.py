@@ -1,0 +1,68 @@
+"""Experiments with cheap simulations whose separations are known in closed form."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.interfaces.effect import Effect, Signal
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.planning.cause import Cause, CauseScale
+from islands.discrepancy.planning.experiment import Experiment
+from islands.discrepancy.planning.experiment_setup import make_experiment
+from islands.discrepancy.planning.pair_separation import CausePair
+from islands.discrepancy.planning.response_dictionary import ResponseDictionary
+from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
+
+DT = 0.01
+
+
+def amplify(u: Signal, _dt: float, k: float = 2.0) -> Signal:
+    """Return the output of an amplifier, which has no dynamics."""
+    return k * u
+
+
+def amplifier() -> Simulator:
+    return PythonFunctionSimulator(amplify, "amplifier", {})
+
+
+def input_record(u: Signal, dt: float = DT) -> Dataset:
+    """Return the record of an input that was not measured yet."""
+    return Dataset(
+        u=u,
+        y=np.full(u.size, np.nan),
+        dt=dt,
+        input_names=("u_V",),
+        input_units=("V",),
+        output_name="y_um",
+        output_unit="um",
+    )
+
+
+def wave(frequencies: tuple[float, ...], samples: int = 400, dt: float = DT) -> Signal:
+    """Return sines of equal amplitude whose sum begins at zero."""
+    t = dt * np.arange(samples)
+    return np.sum([np.sin(2 * np.pi * frequency * t) for frequency in frequencies], axis=0)
+
+
+def amplifier_experiment(
+    u: Signal, noise_std: float = 0.2, prior_std: Mapping[str, float] | None = None
+) -> Experiment:
+    return make_experiment(input_record(u), amplifier(), noise_std, prior_std or {})[0]
+
+
+def take_effects(*names: str) -> list[Effect]:
+    return [CATALOGUE[name] for name in names]
+
+
+def make_cause(experiment: Experiment, effect: str | Effect, misfit: float = 1.0) -> Cause:
+    """Return a cause of a misfit, given in standard deviations of the noise."""
+    chosen = CATALOGUE[effect] if isinstance(effect, str) else effect
+    cause = CauseScale(ResponseDictionary(experiment), chosen).find_cause(misfit)
+    assert cause is not None
+    return cause
+
+
+def make_pair(experiment: Experiment, one: str, other: str) -> CausePair:
+    return CausePair(make_cause(experiment, one), make_cause(experiment, other))
