@@ -16,6 +16,8 @@ from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.planning.experiment_plan import plan_experiment
+from islands.errors import SettingsError
 from islands.facade.explain_residual import explain_residual
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
@@ -28,6 +30,14 @@ from islands_api.cli.console import Display, compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
+from islands_api.cli.runs.plan_run import (
+    PLAN,
+    PlanOptions,
+    read_input,
+    show_plan,
+    with_plan_options,
+    write_plan,
+)
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
 #: File of the result document.
@@ -36,14 +46,23 @@ RESULT = "discrepancy.json"
 #: File of the report.
 REPORT = "report.html"
 
+#: Options of a diagnosis.
+NO_PLAN = PlanOptions()
 
+
+@with_plan_options
 @with_reading_options
 def diagnose(
-    records: options.Records,
     inputs: options.Inputs,
-    output_column: options.Output,
     out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
     simulated: options.Simulated,
+    records: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="RECORD...", help="Recordings of one system, as for fit; one for --plan."),
+    ] = None,
+    output_column: Annotated[
+        str | None, typer.Option("--output", help="Output column; not needed for --plan.")
+    ] = None,
     channels: options.Channels = None,
     tolerance: options.Tolerances = None,
     dt: options.SamplingTime = None,
@@ -54,13 +73,32 @@ def diagnose(
         bool,
         typer.Option("--self-test", help="Estimate which effects this record can reveal; takes minutes."),
     ] = False,
+    planning: PlanOptions = NO_PLAN,
     workers: Annotated[
         int | None,
-        typer.Option("--workers", min=1, help="Cores; by default 1, for the self-test all."),
+        typer.Option("--workers", min=1, help="Cores; by default 1, for the self-test and plans all."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
 ) -> None:
     """Find the errors of a simulation on recordings, name their causes, measure the gain of correction."""
+    if planning.plan:
+        check_folder(out, force, PLAN)
+        compile_kernels()
+        columns_of_input = [options.single_input(options.columns(inputs)), *(channels or [])]
+        data = read_input(records or [], columns_of_input, output_column, dt, rows, reading, planning)
+        with progress("plan") as show, _parallel_map(workers, True) as parallel:
+            simulator = make_simulator(parse_spec(simulated), data)
+            plan = plan_experiment(
+                *(data, simulator, planning.noise_std, options.tolerances(tolerance or []), planning.pair),
+                *(planning.limits, seed, parallel, show),
+            )
+            show("figure", 1.0)
+            write_plan(plan, out)
+        show_plan(plan, out)
+        return
+    planning.check_unused()
+    if not records or output_column is None:
+        raise SettingsError("a diagnosis needs a record and --output: give both, or --plan before any data")
     check_folder(out, force, RESULT)
     compile_kernels()
     with progress("diagnose") as show:
