@@ -13,10 +13,11 @@ from islands.discrepancy.calibration.levenberg_marquardt import Target, evaluate
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.io.export.fmu.compiler import find_compiler
 from islands.io.records import write_record
 from islands.io.simulator_spec.document import extended_json
 from support.command_line import fail, succeed
-from support.simulated_records import EQUATIONS, made
+from support.simulated_records import EQUATIONS, made, write_fmu
 
 #: Cubic stiffness in V / um^3.
 STRENGTH = 3e-5
@@ -111,3 +112,17 @@ def test_equations_are_simulated_without_a_diagnosis(tmp_path: Path) -> None:
     assert "R2 1.00000" in printed
     assert "has no column F" in fail("simulate", path, tmp_path / "record.csv")
     assert "free runs only" in fail("simulate", path, tmp_path / "record.csv", "--mode", "one-step")
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
+def test_an_fmu_is_simulated_without_a_diagnosis(tmp_path: Path) -> None:
+    case = made()["fmu"]
+    write_record(case.record, tmp_path / "record.csv")
+    columns = (tmp_path / "record.csv", "--input", "u_N", "--output", "y_m")
+    printed = succeed("simulate", f"fmu:{write_fmu()}", *columns)
+    assert "free-run: with oscillator.fmu" in printed
+    assert "R2 1.00000" in printed
+    assert "has no column u" in fail("simulate", f"fmu:{write_fmu()}", columns[0])
+    assert "has no input 'force': take one of u" in fail(
+        "simulate", f"fmu:{write_fmu()}?input=force", *columns
+    )

@@ -56,6 +56,7 @@ def write_oscillator(
     events: bool = False,
     disturbance: bool = False,
     platform: str | None = None,
+    resources: bool = False,
 ) -> Path:
     """Write an FMU of ``m x'' + c x' + k x = u + w`` with the output x.
 
@@ -73,12 +74,16 @@ def write_oscillator(
         Whether the second input w is described.
     platform : str, optional
         Folder of the library; by default that of this machine.
+    resources : bool
+        Whether the FMU has a folder with resources.
     """
     folder = platform or (fmpy.platform if version == 2 else fmpy.platform_tuple)
     text = _describe(version, interfaces.split(), fixed_step, events, disturbance)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", text)
         library = f"binaries/{folder}/mass{fmpy.sharedLibraryExtension}"
+        if resources:
+            archive.writestr("resources/table.txt", "1 2 3")
         archive.writestr(library, compile_oscillator(version, *macros))
     return path
 

@@ -1,12 +1,16 @@
 """Loaded FMU of this process: one instance, which is reset before every simulation."""
 
 import ctypes
+import hashlib
+import io
+import sys
 import tempfile
 import threading
 import weakref
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,9 +49,11 @@ class FmuRun:
 
 
 class FmuInstance:
-    """Instance of an FMU, with the folder that it is extracted to.
+    """Instance of an FMU.
 
-    The folder is deleted, and the library unloaded, when the instance is no longer used or the process ends.
+    It is freed, and its library unloaded, when it is no longer used or the process ends. The folder that the
+    FMU is extracted to is deleted as soon as the library is loaded, or with the instance if the FMU has
+    resources, which it may read later.
 
     Parameters
     ----------
@@ -56,7 +62,7 @@ class FmuInstance:
     Raises
     ------
     ModelError
-        The library cannot be loaded, or gives no instance.
+        The file is not the one that was described, its library cannot be loaded, or gives no instance.
     """
 
     def __init__(self, description: FmiDescription) -> None:
@@ -67,8 +73,9 @@ class FmuInstance:
         self._finalizer = weakref.finalize(self, self._resources.release)
         self._is_fresh = False
         try:
-            import_fmpy().extract(description.path, unzipdir=self._resources.folder.name)
             self._instantiate()
+        except ModelError:
+            raise
         except Exception as error:  # fmpy raises bare exceptions
             raise ModelError(self._describe(f"{description.path} cannot be loaded: {error}")) from error
 
@@ -108,6 +115,8 @@ class FmuInstance:
             self._messages.clear()
             try:
                 self._initialise(values, signals, start_time)
+            except ModelError:
+                raise
             except Exception as error:  # a status of the FMU that is not OK, or an instance that fails
                 self._is_fresh = False
                 self._recover(getattr(error, "status", 0))
@@ -118,13 +127,17 @@ class FmuInstance:
     def _instantiate(self) -> None:
         from fmpy.simulation import instantiate_fmu  # noqa: PLC0415 - only if an FMU is used
 
-        self._resources.free_instance()
+        self._resources.release()
         description = self._description
-        found = import_fmpy().read_model_description(self._resources.folder.name, validate=False)
+        folder = self._resources.extract(description)
+        found = import_fmpy().read_model_description(folder, validate=False)
         log = _make_log(self._messages)
         kind = "ModelExchange" if description.interface == FmiInterface.MODEL_EXCHANGE else "CoSimulation"
-        self._fmu = instantiate_fmu(self._resources.folder.name, found, fmi_type=kind, logger=log)
+        self._fmu = instantiate_fmu(folder, found, fmi_type=kind, logger=log)
         self._resources.fmu = self._fmu
+        # Other systems keep a library without its file; then a process that is killed leaves no folder.
+        if sys.platform != "win32" and not Path(folder, "resources").exists():
+            self._resources.delete_folder()
         self._functions = _find_functions(self._fmu, description)
         self._is_fresh = True
 
@@ -201,17 +214,30 @@ class _Resources:
     """Folder and instance of an FMU, which outlive the object that uses them until it is finalised."""
 
     def __init__(self) -> None:
-        self.folder = tempfile.TemporaryDirectory(prefix="islands-fmu-", ignore_cleanup_errors=True)
+        self.folder: tempfile.TemporaryDirectory[str] | None = None
         self.fmu: Any = None
 
-    def free_instance(self) -> None:
+    def extract(self, description: FmiDescription) -> str:
+        """Extract the FMU that was described to a new folder; return its path."""
+        content = Path(description.path).read_bytes()
+        if hashlib.sha256(content).hexdigest() != description.digest:
+            raise ModelError(
+                f"{description.path} has changed since it was first read: start again, or restore the file"
+            )
+        self.folder = tempfile.TemporaryDirectory(prefix="islands-fmu-", ignore_cleanup_errors=True)
+        import_fmpy().extract(io.BytesIO(content), unzipdir=self.folder.name)
+        return self.folder.name
+
+    def delete_folder(self) -> None:
+        if self.folder is not None:
+            self.folder.cleanup()
+            self.folder = None
+
+    def release(self) -> None:
         if self.fmu is not None:
             self.fmu.freeInstance()
             self.fmu = None
-
-    def release(self) -> None:
-        self.free_instance()
-        self.folder.cleanup()
+        self.delete_folder()
 
 
 @lru_cache(maxsize=_LOADED)
@@ -223,10 +249,7 @@ def load_fmu(path: str, digest: str, interface: FmiInterface) -> FmuInstance:
     ModelError
         The file is not the one that was described, or cannot be loaded.
     """
-    description = read_description(path, interface)
-    if description.digest != digest:
-        raise ModelError(f"{path} has changed since it was first read: start again, or restore the file")
-    return FmuInstance(description)
+    return FmuInstance(replace(read_description(path, interface), digest=digest))
 
 
 def _make_log(messages: list[str]) -> Callable[..., None]:

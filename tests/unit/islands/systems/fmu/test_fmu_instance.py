@@ -128,16 +128,17 @@ def test_a_divergent_simulation_is_nan_after_it_overflows(tmp_path: Path) -> Non
     assert "ends the simulation after" in found.failure
 
 
-def test_the_folder_of_an_fmu_is_deleted_with_its_instance(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("resources", [False, True])
+def test_a_folder_exists_only_for_resources_and_as_long_as_the_instance(
+    resources: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = write_oscillator(tmp_path / "mass.fmu")
+    path = write_oscillator(tmp_path / "mass.fmu", resources=resources)
     folder = tmp_path / "extracted"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     fmu = load(path)
-    run(fmu)
-    assert len(list(folder.iterdir())) == 1
+    assert run(fmu).failure == ""
+    assert len(list(folder.iterdir())) == resources
     del fmu
     gc.collect()
     assert not list(folder.iterdir())
