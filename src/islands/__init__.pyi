@@ -31,6 +31,8 @@ from islands.facade.explain_residual import explain_residual as explain_residual
 from islands.facade.fit import fit as fit
 from islands.facade.identify import identify as identify
 from islands.facade.inspect_record import inspect_record as inspect_record
+from islands.facade.record_monitor import create_monitor as create_monitor
+from islands.facade.record_monitor import monitor_record as monitor_record
 from islands.facade.results.fitted_model import FittedModel as FittedModel
 from islands.facade.results.model_analysis import linearise as linearise
 from islands.facade.results.model_simulation import simulate as simulate
@@ -38,6 +40,9 @@ from islands.facade.results.result import Result as Result
 from islands.facade.results.saved_result import SavedModel as SavedModel
 from islands.facade.results.saved_result import SavedResult as SavedResult
 from islands.facade.results.saved_result import read_result as read_result
+from islands.io.checkpoints.monitor_state import SavedMonitor as SavedMonitor
+from islands.io.checkpoints.monitor_state import read_monitor as read_monitor
+from islands.io.checkpoints.monitor_state import write_monitor as write_monitor
 from islands.io.data_frames import as_record as as_record
 from islands.io.export.coupled.coupled_document import read_coupled_model as read_coupled_model
 from islands.io.export.coupled.coupled_document import write_coupled_model as write_coupled_model

@@ -29,6 +29,8 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "them.",
         "diagnose": "Find the errors of a simulation on recordings, name their causes, measure the gain of "
         "correction.",
+        "monitor": "Follow a simulation over the records of a folder, and raise an alarm when an effect has "
+        "changed.",
         "simulate": "Simulate a model on a record. A free run needs only the first samples of the output.",
         "show": "Show or write a model as an equation, a program, a block for a simulator, or JSON.",
         "examples": "Records to try the commands on: list them, copy them.",
@@ -44,6 +46,11 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "keys": "API keys of a service: create, list, revoke.",
         "admin": "Operation of a service: audit, owners, backup, restore.",
     }
+)
+
+#: Folders of the commands that are not in the folder of all commands.
+FOLDERS: Mapping[str, str] = MappingProxyType(
+    {**dict.fromkeys(("demo", "examples", "systems"), "demonstration"), "monitor": "monitoring"}
 )
 
 #: Extra of ``pyproject.toml`` by the package that it installs.
@@ -94,7 +101,8 @@ class Commands(TyperGroup):
         if self._is_listing:
             return TyperCommand(cmd_name, help=COMMANDS[cmd_name])
         try:
-            module = import_module(f"islands_api.cli.commands.{cmd_name}")
+            place = ".".join(filter(None, (FOLDERS.get(cmd_name), cmd_name)))
+            module = import_module(f"islands_api.cli.commands.{place}")
         except ModuleNotFoundError as error:
             raise explain_missing_package(error, cmd_name) from error
         group = getattr(module, cmd_name)

@@ -125,6 +125,7 @@ class Projection:
         inverse_std, nominal = prior_precision(simulation, target.prior_std)
         inverse_std = inverse_std * target.prior_weight**0.5
         columns = []
+        self._absorbing: list[int] = []
         points = values + DIFFERENCE_STEP * np.diag(simulation.scales)
         shifted = simulation.simulate_batch(points) if values.size else points
         for index, (scale, moved) in enumerate(zip(simulation.scales, shifted, strict=True)):
@@ -135,7 +136,11 @@ class Projection:
             # orthogonal basis of columns that are zero would contain arbitrary directions.
             if not simulation.is_copy[index] or response[target.estimation_part].any():
                 columns.append(self._stack(response, prior))
-        self._basis = np.linalg.qr(np.column_stack(columns))[0] if columns else None
+                self._absorbing.append(index)
+        self._scales = simulation.scales
+        self._basis: Signal | None = None
+        if columns:
+            self._basis, self._factor = np.linalg.qr(np.column_stack(columns))
         # The deviation of calibrated values from their prior is part of the residual to be explained.
         self.residual = self._project(self._stack(target.y - base.output, inverse_std * (nominal - values)))
         self._samples = base.noise.effective_samples
@@ -147,6 +152,15 @@ class Projection:
     def __call__(self, response: Signal) -> Signal:
         """Project a response, shape (samples,), followed by a zero for the prior of each parameter."""
         return self._project(self._stack(response, np.zeros(self._values)))
+
+    def absorb(self, response: Signal) -> Signal:
+        """Return the change of the base's parameters that reproduces most of a response, (parameters,)."""
+        change = np.zeros(self._values)
+        if self._basis is not None:
+            product = self._basis.T @ self._stack(response, change)
+            found = np.linalg.lstsq(self._factor, product, rcond=None)[0]
+            change[self._absorbing] = found * self._scales[self._absorbing]
+        return change
 
     def _project(self, stacked: Signal) -> Signal:
         return stacked if self._basis is None else stacked - self._basis @ (self._basis.T @ stacked)

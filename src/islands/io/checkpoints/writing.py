@@ -24,7 +24,7 @@ HALL_SCHEMA = "islands.hall/1"
 
 def write_checkpoint(archipelago: Archipelago, path: Path, about: Mapping[str, Any]) -> None:
     """Write an archipelago and its metadata ``about``; replace an existing file atomically."""
-    _write(_render_checkpoint(archipelago, about, str.encode), path)
+    replace_file(_render_checkpoint(archipelago, about, str.encode), path)
 
 
 def checkpoint_text(archipelago: Archipelago, about: Mapping[str, Any]) -> str:
@@ -66,10 +66,11 @@ def write_hall(hall: HallOfFame, path: Path) -> None:
     """Write a hall of fame. The bytes do not depend on the engine or the machine that ran the search."""
     texts: dict[int, str] = {}
     hall_of_fame = [_individual(each, texts) for each in hall.entries]
-    _write([json.dumps({"schema": HALL_SCHEMA, "hall": hall_of_fame}).encode()], path)
+    replace_file([json.dumps({"schema": HALL_SCHEMA, "hall": hall_of_fame}).encode()], path)
 
 
-def _write(parts: Iterable[bytes], path: Path) -> None:
+def replace_file(parts: Iterable[bytes], path: Path) -> None:
+    """Write a file; an existing one is replaced atomically, once the new one is on the disk."""
     incomplete = path.with_suffix(".part")
     with incomplete.open("wb") as stream:
         stream.writelines(parts)

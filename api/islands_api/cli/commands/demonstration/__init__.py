@@ -1,0 +1,1 @@
+"""Commands that try islands out: a demonstration, records of examples, simulated systems."""

@@ -1,0 +1,1 @@
+"""Command that follows a simulation from record to record."""

@@ -1,0 +1,1 @@
+"""Monitoring: states of the effects of a simulation from record to record, and changes of them."""

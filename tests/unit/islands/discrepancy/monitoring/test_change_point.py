@@ -1,0 +1,31 @@
+"""Instant of a change: error, interval, and form."""
+
+import numpy as np
+import pytest
+
+from islands.discrepancy.monitoring.change_point import ChangeForm, locate_change
+
+TRAINING, ONSET, RECORDS = 20, 60, 90
+
+
+def draw(seed: int, step: float = 0.0, slope: float = 0.0) -> np.ndarray:
+    values = np.random.default_rng(seed).standard_normal(RECORDS)
+    after = np.maximum(np.arange(RECORDS) - ONSET + 1.0, 0.0)
+    return 7.0 + 0.1 * (values + step * (after > 0) + slope * after)
+
+
+@pytest.mark.parametrize("step", [1.0, 2.0, 4.0])
+def test_the_interval_contains_the_instant_of_a_step_in_95_percent(step):
+    found = [locate_change(draw(seed, step), TRAINING) for seed in range(60)]
+    assert sum(each.earliest <= ONSET <= each.latest for each in found) >= 52
+    assert np.median([abs(each.record - ONSET) for each in found]) <= 4.0 / step**2
+
+
+def test_a_drift_is_told_from_a_step():
+    assert locate_change(draw(0, slope=0.5), TRAINING).form == ChangeForm.RAMP
+    assert locate_change(draw(0, step=4.0), TRAINING).form == ChangeForm.STEP
+
+
+def test_the_onset_of_a_drift_is_found():
+    errors = [locate_change(draw(seed, slope=0.5), TRAINING).record - ONSET for seed in range(20)]
+    assert abs(np.median(errors)) <= 2

@@ -1,0 +1,100 @@
+"""A monitor of an oscillator: causes, instants, false alarms, and continuation from its saved state."""
+
+from dataclasses import replace
+
+import pytest
+from benchmarks.monitor import run
+
+from islands.discrepancy.monitoring.monitor import AlarmKind, MonitorSettings
+from islands.errors import RecordError, SettingsError
+from islands.facade.record_monitor import monitor_record
+from islands.io.checkpoints.monitor_document import monitor_document
+from islands.io.checkpoints.monitor_state import monitor_from_json, monitor_to_json
+from islands.io.result_text.monitor_text import describe_alarm_text
+from support.monitored_oscillator import ONSET, TRAINING, follow, make_records, undisturbed_monitor
+
+
+def disturb(**change):
+    """Return the monitor after six records with a change."""
+    return follow(make_records(ONSET + 6, **change)[ONSET:], undisturbed_monitor())
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("change", "kind", "cause"),
+    [
+        ({"k": 97.0}, AlarmKind.PARAMETER, "k"),
+        ({"c": 2.2}, AlarmKind.PARAMETER, "c"),
+        ({"play": 0.5}, AlarmKind.EFFECT, "backlash"),
+    ],
+)
+def test_a_change_is_named_with_its_cause_and_instant(change, kind, cause):
+    state = disturb(**change).state
+    (alarm,) = state.alarms
+    assert (alarm.kind, alarm.cause) == (kind, cause)
+    assert alarm.earliest <= ONSET <= alarm.latest
+    assert abs(alarm.since - ONSET) <= 1
+    assert f"since record {alarm.since}" in describe_alarm_text(state, alarm)
+
+
+@pytest.mark.ci
+def test_the_strength_of_an_effect_that_appeared_is_that_of_the_machine():
+    (alarm,) = disturb(play=0.5).state.alarms
+    ((name, value, _unit),) = alarm.strength
+    assert name == "b"
+    assert value == pytest.approx(0.5, rel=0.1)
+
+
+@pytest.mark.ci
+def test_an_unchanged_machine_raises_no_alarm_and_trains_once():
+    state = undisturbed_monitor().state
+    assert not state.alarms
+    assert [each.statistic is None for each in state.records] == [True] * TRAINING + [False] * (
+        ONSET - TRAINING
+    )
+
+
+@pytest.mark.ci
+def test_a_continued_monitor_has_the_bits_of_an_uninterrupted_one():
+    saved = undisturbed_monitor()
+    for record in make_records(ONSET + 6, k=97.0)[ONSET:]:
+        saved = follow((record,), monitor_from_json(monitor_to_json(saved)))
+    assert saved.state == disturb(k=97.0).state
+
+
+def test_a_record_that_cannot_be_analysed_leaves_the_monitor_valid():
+    records = make_records(2)
+    saved = follow(records[:1])
+    with pytest.raises(RecordError, match="at least 200"):
+        monitor_record(saved, records[1][:100], "short")
+    with pytest.raises(RecordError, match="sampl"):
+        monitor_record(saved, replace(records[1], dt=0.02), "slow")
+    assert len(follow(records[1:], saved).state.records) == 2
+
+
+def test_the_document_has_the_states_with_their_intervals():
+    document = monitor_document(follow(make_records(1)))
+    assert document["status"] == "training"
+    values = document["records"][0]["values"]["k"]
+    assert values["ci95"][0] < values["value"] < values["ci95"][1]
+    assert document["records"][0]["scores"].keys() == {*document["effects"]}
+
+
+@pytest.mark.parametrize(
+    "given", [{"false_alarms": 0.0}, {"false_alarms": 1e-3, "training": 3}, {"false_alarms": 2.0}]
+)
+def test_impossible_settings_are_refused(given):
+    with pytest.raises(SettingsError):
+        MonitorSettings(**given)
+
+
+def test_a_text_that_is_no_state_is_refused():
+    with pytest.raises(SettingsError, match="start a new one"):
+        monitor_from_json('{"schema": "islands.model/1"}')
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("colour", [0.0, 0.8])
+def test_a_month_of_an_unchanged_machine_has_at_most_one_false_alarm_on_average(colour):
+    alarms = [run(seed, colour, 24 + 720, lambda _: {}, False) for seed in range(100, 104)]
+    assert sum(map(len, alarms)) <= 8  # 4 are expected at most; exceeded with a probability of 2 %
