@@ -12,7 +12,12 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.monitoring.alarm_rate import DEFAULT_RATE, parse_alarm_rate
-from islands.discrepancy.monitoring.monitor import TRAINING, MonitorSettings, MonitorState, follow_record
+from islands.discrepancy.monitoring.record_follower import (
+    TRAINING,
+    MonitorSettings,
+    MonitorState,
+    follow_record,
+)
 from islands.errors import RecordError, SettingsError
 from islands.io.checkpoints.monitor_state import RejectedRecord, SavedMonitor
 from islands.io.simulator_spec.document import describe_extension

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.discrepancy.interfaces.context import Signal
-from islands.discrepancy.monitoring.effect_states import Reference
+from islands.discrepancy.monitoring.effect_states import MonitorReference
 
 #: Fraction of the change that a cause must explain.
 MIN_FRACTION = 0.5
@@ -43,7 +43,7 @@ class ChangeCause:
     strength: tuple[tuple[str, float, str], ...] = ()
 
 
-def explain_change(values: Signal, changes: Signal, since: int, reference: Reference) -> ChangeCause:
+def explain_change(values: Signal, changes: Signal, since: int, reference: MonitorReference) -> ChangeCause:
     """Find the cause that explains a change of the mean best, by generalised least squares.
 
     Parameters
@@ -54,7 +54,7 @@ def explain_change(values: Signal, changes: Signal, since: int, reference: Refer
         Row j is the change of the values if cause j alone changes, up to a factor.
     since : int
         First changed record.
-    reference : Reference
+    reference : MonitorReference
     """
     before, after = values[:since], values[since:]
     scale = np.std(before, axis=0, ddof=1)

@@ -19,6 +19,9 @@ CLIP = 4.0
 #: Number of successive records beyond the limit that are no outliers.
 RUN = 3
 
+#: Smallest number of records after a change.
+MIN_CHANGED = 2
+
 #: Largest autocorrelation that is removed.
 MAX_AUTOCORRELATION = 0.9
 
@@ -52,12 +55,16 @@ def find_threshold(rate: float) -> float:
     return float(scipy.optimize.brentq(lambda each: compute_alarm_rate(each) - rate, highest, 35.0))
 
 
-def limit_values(values: Signal, training: int, clip: float = CLIP) -> Signal:
+def limit_values(values: Signal, errors: Signal, training: int, clip: float = CLIP) -> Signal:
     """Standardise sequences by the median and the deviation of their training, and clip them.
+
+    The variance of a value is that between records plus the square of its standard error: records differ by
+    more than their noise, and some of them determine a value less than others.
 
     Parameters
     ----------
-    values : ndarray, shape (records, sequences)
+    values, errors : ndarray, shape (records, sequences)
+        Values and their standard errors; zero if they are unknown.
     training : int
         Number of first records in which nothing changes.
     clip : float
@@ -72,9 +79,10 @@ def limit_values(values: Signal, training: int, clip: float = CLIP) -> Signal:
     deviation = np.median(np.abs(first - centre), axis=0) / _MAD
     # A value at a bound in most records has a median deviation of zero.
     deviation = np.where(deviation > 0.0, deviation, np.std(first, axis=0))
-    rounding = 1e-9 * np.max(np.abs(first), axis=0)
-    is_constant = deviation <= rounding
-    standardised = (values - centre) / np.where(is_constant, 1.0, deviation)
+    is_constant = deviation <= 1e-9 * np.max(np.abs(first), axis=0)
+    between = np.maximum(deviation**2 - np.median(errors[:training], axis=0) ** 2, 0.0)
+    scale = np.sqrt(between + errors**2)
+    standardised = (values - centre) / np.where(is_constant | (scale == 0.0), 1.0, scale)
     limited = _limit(np.maximum(standardised, 0.0), clip) - _limit(np.maximum(-standardised, 0.0), clip)
     return np.where(is_constant, 0.0, limited)
 
@@ -101,18 +109,18 @@ def test_steps(limited: Signal, training: int, autocorrelation: Signal) -> Signa
 
     Returns
     -------
-    ndarray, shape (records - training, sequences)
-        Signed statistic, standard normal without a change; at most the last `WINDOW` rows.
+    ndarray, shape (records - training - MIN_CHANGED + 1, sequences)
+        Signed statistic, standard normal without a change; at most `WINDOW` rows.
     """
-    count = len(limited)
+    count, last = len(limited), len(limited) - MIN_CHANGED + 1
     rho = autocorrelation
     rest = 1.0 - rho
     white = np.concatenate([limited[:1] * np.sqrt(1.0 - rho**2), limited[1:] - rho * limited[:-1]])
-    first = max(training, count - WINDOW)
-    after = (count - 1.0 - np.arange(first, count))[:, None]
+    first = max(training, last - WINDOW)
+    after = (count - 1.0 - np.arange(first, last))[:, None]
     sums = np.cumsum(white[::-1], axis=0)[::-1]
     # Inner products of the step h, the constant c and the values e, all of them whitened.
-    he = white[first:] + rest * (sums[first:] - white[first:])
+    he = white[first:last] + rest * (sums[first:last] - white[first:last])
     hc, hh = rest + rest**2 * after, 1.0 + rest**2 * after
     cc = (1.0 - rho**2) + rest**2 * (count - 1)
     ce = np.sqrt(1.0 - rho**2) * white[0] + rest * (sums[0] - white[0])
@@ -136,7 +144,7 @@ def estimate_autocorrelation(limited: Signal, training: int) -> Signal:
     """
     count = len(limited)
     steps = test_steps(limited, training, np.zeros(limited.shape[1]))
-    start = count - len(steps) + np.argmax(np.abs(steps), axis=0)
+    start = count - MIN_CHANGED + 1 - len(steps) + np.argmax(np.abs(steps), axis=0)
     is_after = np.arange(count)[:, None] >= start
     residual = _remove_line(limited - _average(limited, ~is_after) * ~is_after, is_after)
     is_pair = is_after[1:] == is_after[:-1]
@@ -166,13 +174,13 @@ def _estimate_variance_ratio(residual: Signal, variance: Signal) -> Signal:
     return ratio
 
 
-def compute_statistics(values: Signal, training: int) -> tuple[Signal, NDArray[np.int64]]:
+def compute_statistics(values: Signal, errors: Signal, training: int) -> tuple[Signal, NDArray[np.int64]]:
     """Compute the test statistic of each sequence after its last record.
 
     Parameters
     ----------
-    values : ndarray, shape (records, sequences)
-        More records than the training.
+    values, errors : ndarray, shape (records, sequences)
+        As of `limit_values`, with at least `MIN_CHANGED` records after the training.
     training : int
 
     Returns
@@ -182,11 +190,11 @@ def compute_statistics(values: Signal, training: int) -> tuple[Signal, NDArray[n
     ndarray of int, shape (sequences,)
         The record at which that step begins.
     """
-    limited = limit_values(values, training)
+    limited = limit_values(values, errors, training)
     steps = test_steps(limited, training, estimate_autocorrelation(limited, training))
     best = np.argmax(np.abs(steps), axis=0)
     found: Signal = np.take_along_axis(steps, best[None], axis=0)[0]
-    return found, len(values) - len(steps) + best
+    return found, len(values) - MIN_CHANGED + 1 - len(steps) + best
 
 
 def _average(values: Signal, is_used: NDArray[np.bool_]) -> Signal:

@@ -43,7 +43,7 @@ class ChangePoint:
     form: ChangeForm
 
 
-def locate_change(values: Signal, training: int) -> ChangePoint:
+def locate_change(values: Signal, errors: Signal, training: int) -> ChangePoint:
     """Estimate since which record a sequence has changed.
 
     The interval contains 95 % of the marginal likelihood of the instant; the mean before the change, its
@@ -51,13 +51,15 @@ def locate_change(values: Signal, training: int) -> ChangePoint:
 
     Parameters
     ----------
-    values : ndarray, shape (records,)
+    values, errors : ndarray, shape (records,)
+        Values and their standard errors, as of `limit_values`.
     training : int
         Number of first records, which have not changed.
     """
-    rho = float(estimate_autocorrelation(limit_values(values[:, None], training), training)[0])
+    column, error = values[:, None], errors[:, None]
+    rho = float(estimate_autocorrelation(limit_values(column, error, training), training)[0])
     # Without a limit, at which a ramp would become a step.
-    sequence = limit_values(values[:, None], training, np.inf)[:, 0]
+    sequence = limit_values(column, error, training, np.inf)[:, 0]
     count = sequence.size
     first = max(training, count - WINDOW)
     since = np.arange(first, count)

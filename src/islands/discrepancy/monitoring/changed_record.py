@@ -4,8 +4,8 @@ A change of many standard deviations is outside the range in which responses are
 record: each cause is calibrated to it.
 """
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,18 +14,68 @@ from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResul
 from islands.discrepancy.calibration.preparation import select_effects
 from islands.discrepancy.inference.screening import screen_effects
 from islands.discrepancy.inference.verdict import explained_fraction
-from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.simulator import (
+    Forces,
+    SimulationRun,
+    Simulator,
+    simulate_runs,
+    take_recording,
+)
 from islands.discrepancy.monitoring.change_cause import ChangeCause, choose_cause
-from islands.discrepancy.monitoring.effect_states import EffectStates, Reference, calibrate_record
+from islands.discrepancy.monitoring.effect_states import EffectStates, MonitorReference, calibrate_record
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.intersample import SimulatorWrapper
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CentredSimulator(SimulatorWrapper):
+    """Simulator whose nominal values are the means of undisturbed records, the means of their prior.
+
+    Attributes
+    ----------
+    simulator : Simulator
+    means : mapping
+        Nominal values by the names of parameters; all others are those of the simulator.
+    """
+
+    simulator: Simulator
+    means: Mapping[str, float]
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the simulator with other nominal values."""
+        return tuple(
+            replace(each, nominal=self.means.get(each.name, each.nominal))
+            for each in self.simulator.parameters
+        )
+
+    def for_samples(self, first: int, last: int) -> "CentredSimulator":
+        """Return the simulator of one recording."""
+        return replace(self, simulator=take_recording(self.simulator, first, last))
+
+    def simulate(
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        forces: Forces,
+    ) -> Signal:
+        """Simulate the output; see `Simulator.simulate`."""
+        return self.simulator.simulate(values, x, context, effect_parameters, forces)
+
+    def simulate_batch(self, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
+        """Simulate the outputs of several runs, at once if the simulator can."""
+        return simulate_runs(self.simulator, runs, context)
 
 
 def explain_record(
     record: Dataset,
     simulator: Simulator,
     tolerance: Mapping[str, float],
-    reference: Reference,
-    undisturbed: list[EffectStates],
+    reference: MonitorReference,
+    undisturbed: Sequence[EffectStates],
 ) -> ChangeCause:
     """Calibrate each cause to a changed record and return the best one.
 
@@ -38,13 +88,14 @@ def explain_record(
     simulator : Simulator
     tolerance : mapping
         Relative standard deviations of parameters, by which the effects are selected.
-    reference : Reference
-    undisturbed : list of EffectStates
+    reference : MonitorReference
+    undisturbed : sequence of EffectStates
         States of the records before the change.
     """
-    free, target = calibrate_record(record, simulator, tolerance, reference.noise)
+    centred = CentredSimulator(simulator, _find_means(reference, undisturbed))
+    free, target = calibrate_record(record, centred, tolerance, reference.noise)
     effects = select_effects(simulator, free.simulation.context, target.prior_std)
-    spreads = _find_spreads(reference, undisturbed)
+    spreads = _find_spreads(reference, undisturbed, centred.means)
     simulation = free.simulation
     held = replace(target, prior_std=spreads)
     base = calibrate(simulation, held, simulation.nominal)
@@ -73,13 +124,19 @@ def explain_record(
     return choose_cause(causes)
 
 
-def _find_spreads(reference: Reference, undisturbed: list[EffectStates]) -> dict[str, float]:
-    """Return the standard deviation of each parameter about its nominal value, relative to that."""
+def _find_means(reference: MonitorReference, undisturbed: Sequence[EffectStates]) -> dict[str, float]:
+    means = np.mean([each.values for each in undisturbed], axis=0)
+    return {each.name: float(mean) for each, mean in zip(reference.parameters, means, strict=True)}
+
+
+def _find_spreads(
+    reference: MonitorReference, undisturbed: Sequence[EffectStates], means: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the standard deviation of each parameter from record to record, relative to its mean."""
     spreads = {}
     for index, parameter in enumerate(reference.parameters):
-        if parameter.nominal:
-            values = np.array([each.values[index] for each in undisturbed])
-            spread = float(np.sqrt(np.mean((values - parameter.nominal) ** 2)) / abs(parameter.nominal))
+        if mean := means[parameter.name]:
+            spread = float(np.std([each.values[index] for each in undisturbed], ddof=1) / abs(mean))
             spreads[parameter.name] = max(spread, 1e-9)
     return spreads
 

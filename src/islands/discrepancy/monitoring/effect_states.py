@@ -52,7 +52,7 @@ class MonitoredParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Direction:
+class MonitoredEffect:
     """Response to an effect that the simulation does not have, at one of the effect's starting points.
 
     Attributes
@@ -68,21 +68,21 @@ class Direction:
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class MonitorReference:
     """Quantities of the first record that all records are analysed with.
 
     Attributes
     ----------
     parameters : tuple of MonitoredParameter
         Parameters of the simulation, without initial states.
-    directions : tuple of Direction
+    directions : tuple of MonitoredEffect
         Effects that the simulation does not have.
     coefficients, difference_order, variance
         Noise model that whitens residuals, see `NoiseModel`.
     """
 
     parameters: tuple[MonitoredParameter, ...]
-    directions: tuple[Direction, ...]
+    directions: tuple[MonitoredEffect, ...]
     coefficients: tuple[float, ...]
     difference_order: float
     variance: float
@@ -129,6 +129,11 @@ class EffectStates:
         noise = float(np.log(max(self.noise, tiny)))
         return np.array([*self.values, *self.scores, noise, float(np.log(max(self.rmse, tiny))) - noise])
 
+    @property
+    def statistic_errors(self) -> Signal:
+        """Standard errors of `statistics`: those of the parameters, otherwise zero."""
+        return np.array([*self.errors, *np.zeros(len(self.scores) + 2)])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordAnalysis:
@@ -145,7 +150,7 @@ class RecordAnalysis:
     changes: Signal
 
 
-def make_reference(record: Dataset, simulator: Simulator, tolerance: Mapping[str, float]) -> Reference:
+def make_reference(record: Dataset, simulator: Simulator, tolerance: Mapping[str, float]) -> MonitorReference:
     """Analyse the first record: its noise model, and the effects that can be monitored.
 
     Effects at an instant or with a frequency that have to be searched for have no fixed response. They
@@ -171,9 +176,9 @@ def make_reference(record: Dataset, simulator: Simulator, tolerance: Mapping[str
             > MIN_VISIBLE * _measure(target, response, fit)
         ]
         if sizes:
-            directions.append(Direction(effect.name, max(sizes)[1]))
+            directions.append(MonitoredEffect(effect.name, max(sizes)[1]))
     noise = fit.noise
-    return Reference(
+    return MonitorReference(
         tuple(
             MonitoredParameter(each.name, each.unit, float(each.nominal))
             for each in fit.simulation.parameters
@@ -187,7 +192,7 @@ def make_reference(record: Dataset, simulator: Simulator, tolerance: Mapping[str
 
 
 def estimate_states(
-    record: Dataset, simulator: Simulator, tolerance: Mapping[str, float], reference: Reference
+    record: Dataset, simulator: Simulator, tolerance: Mapping[str, float], reference: MonitorReference
 ) -> RecordAnalysis:
     """Calibrate the parameters to a record, and compute the scores of the effects of a reference.
 

@@ -1,15 +1,15 @@
 """States of the effects of a monitored simulation over the records, with alarms."""
 
 from datetime import datetime
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from islands.discrepancy.monitoring.monitor import MonitorState
+from islands.discrepancy.interfaces.context import Signal
+from islands.discrepancy.monitoring.record_follower import MonitorState
 from islands.figures.style import (
     BAND,
     FRAME,
@@ -46,23 +46,13 @@ def draw_monitored_states(state: MonitorState) -> Figure:
     title = f"{len(state.records)} records, {alarms} {'alarm' if alarms == 1 else 'alarms'}"
     figure = blank(0.8 + 0.95 * count, title)
     panels = figure.subplots(count, sharex=True, squeeze=False)[:, 0]
-    places = _get_places(state)
+    places, has_times = _get_places(state)
     values = np.array([each.states.values for each in state.records])
     errors = np.array([each.states.errors for each in state.records])
     scores = np.array([each.states.scores for each in state.records])
     for index, (axes, parameter) in enumerate(zip(panels, parameters, strict=False)):
-        limits = 1.96 * errors[:, index]
-        axes.errorbar(
-            places,
-            values[:, index],
-            limits,
-            fmt=".",
-            ms=3,
-            lw=0,
-            elinewidth=0.7,
-            color=MEASURED,
-            ecolor=FRAME,
-        )
+        _draw_intervals(axes, places, values[:, index], 1.96 * errors[:, index])
+        axes.plot(places, values[:, index], ".", ms=3, color=MEASURED)
         axes.set_ylabel(label(parameter.name.replace(" ", "\n", 1), parameter.unit))
     for axes, index in zip(panels[len(parameters) :], effects, strict=False):
         axes.plot(places, scores[:, index], ".", ms=3, color=RESIDUAL)
@@ -75,8 +65,8 @@ def draw_monitored_states(state: MonitorState) -> Figure:
         axes.yaxis.set_major_locator(MaxNLocator(3, steps=STEPS))
         _mark_alarms(axes, state, places)
     _annotate_alarms(panels[0], state, places)
-    panels[-1].set_xlabel("record" if isinstance(places, np.ndarray) else "time of the record")
-    if not isinstance(places, np.ndarray):
+    panels[-1].set_xlabel("time of the record" if has_times else "record")
+    if has_times:
         locator = AutoDateLocator()  # type: ignore[no-untyped-call]
         panels[-1].xaxis.set_major_locator(locator)
         panels[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
@@ -95,18 +85,25 @@ def _choose_effects(state: MonitorState) -> list[int]:
     return list(dict.fromkeys([*named, *map(int, largest)]))[:_MAX_EFFECTS]
 
 
-def _get_places(state: MonitorState) -> Any:
+def _get_places(state: MonitorState) -> tuple[Signal, bool]:
     """Return the times of the records if all of them are known and increase, otherwise their indices."""
     times = [each.time for each in state.records]
     if all(times) and times == sorted(times):
-        return [datetime.fromisoformat(each) for each in times]
-    return np.arange(len(times))
+        found = [datetime.fromisoformat(each) for each in times]
+        return np.asarray(date2num(found), dtype=np.float64), True  # type: ignore[no-untyped-call]
+    return np.arange(len(times), dtype=np.float64), False
 
 
-def _draw_statistic(axes: Axes, state: MonitorState, places: Any) -> None:
+def _draw_intervals(axes: Axes, places: Signal, values: Signal, limits: Signal) -> None:
+    """Draw vertical intervals as one line with gaps: a line for each would be most of the file."""
+    ends = np.column_stack([values - limits, values + limits, np.full_like(values, np.nan)])
+    axes.plot(np.repeat(places, 3), ends.ravel(), color=FRAME, lw=0.7)
+
+
+def _draw_statistic(axes: Axes, state: MonitorState, places: Signal) -> None:
     known = {index: each.statistic for index, each in enumerate(state.records) if each.statistic is not None}
     statistics = list(known.values())
-    axes.plot([places[index] for index in known], statistics, ".", ms=3, color=MEASURED)
+    axes.plot(places[list(known)], statistics, ".", ms=3, color=MEASURED)
     axes.axhline(state.threshold, color=SIMULATED, lw=0.9, ls="--")
     axes.set_ylim(0.0, 1.25 * max([state.threshold, *statistics]))
     axes.set_ylabel("statistic\nand limit")
@@ -114,14 +111,14 @@ def _draw_statistic(axes: Axes, state: MonitorState, places: Any) -> None:
     axes.axvspan(places[0], places[first], color=SHADE, zorder=0.2)
 
 
-def _mark_alarms(axes: Axes, state: MonitorState, places: Any) -> None:
+def _mark_alarms(axes: Axes, state: MonitorState, places: Signal) -> None:
     for alarm in state.alarms:
         axes.axvspan(places[alarm.earliest], places[alarm.latest], color=BAND, zorder=0.3)
         axes.axvline(places[alarm.since], color=SIMULATED, lw=0.7, ls=":")
         axes.axvline(places[alarm.record], color=SIMULATED, lw=1.0)
 
 
-def _annotate_alarms(axes: Axes, state: MonitorState, places: Any) -> None:
+def _annotate_alarms(axes: Axes, state: MonitorState, places: Signal) -> None:
     for number, alarm in enumerate(state.alarms):
         text = (
             f"{alarm.cause} {alarm.kind}".strip() if alarm.cause not in str(alarm.kind) else str(alarm.kind)

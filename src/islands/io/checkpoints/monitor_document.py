@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from islands.discrepancy.monitoring.monitor import Alarm, MonitoredRecord, MonitorState
+from islands.discrepancy.monitoring.record_follower import Alarm, MonitoredRecord, MonitorState
 from islands.io.checkpoints.monitor_state import SavedMonitor
 
 SCHEMA = "islands.monitor/1"

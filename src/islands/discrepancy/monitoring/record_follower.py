@@ -10,12 +10,12 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.monitoring.change_cause import MIN_FRACTION, ChangeCause, explain_change
-from islands.discrepancy.monitoring.change_detection import compute_statistics, find_threshold
+from islands.discrepancy.monitoring.change_detection import MIN_CHANGED, compute_statistics, find_threshold
 from islands.discrepancy.monitoring.change_point import ChangeForm, locate_change
 from islands.discrepancy.monitoring.changed_record import explain_record
 from islands.discrepancy.monitoring.effect_states import (
     EffectStates,
-    Reference,
+    MonitorReference,
     estimate_states,
     make_reference,
 )
@@ -146,7 +146,7 @@ class MonitorState:
     Attributes
     ----------
     settings : MonitorSettings
-    reference : Reference or None
+    reference : MonitorReference or None
         None before the first record.
     records : tuple of MonitoredRecord
         In the order in which they were analysed.
@@ -158,7 +158,7 @@ class MonitorState:
     """
 
     settings: MonitorSettings
-    reference: Reference | None = None
+    reference: MonitorReference | None = None
     records: tuple[MonitoredRecord, ...] = ()
     alarms: tuple[Alarm, ...] = ()
     start: int = 0
@@ -167,7 +167,7 @@ class MonitorState:
     @property
     def is_training(self) -> bool:
         """Whether no change can be found yet."""
-        return len(self.records) - self.start <= self.settings.training
+        return len(self.records) - self.start < self.settings.training + MIN_CHANGED
 
     @property
     def threshold(self) -> float:
@@ -215,7 +215,8 @@ def follow_record(
 def _detect(state: MonitorState, record: Dataset, simulator: Simulator) -> MonitorState:
     """Return the state with the statistic of its last record, and with an alarm if there is a change."""
     values = np.array([each.states.statistics for each in state.records[state.start :]])
-    statistics, starts = compute_statistics(values, state.settings.training)
+    errors = np.array([each.states.statistic_errors for each in state.records[state.start :]])
+    statistics, starts = compute_statistics(values, errors, state.settings.training)
     strongest = int(np.argmax(np.abs(statistics)))
     largest = float(abs(statistics[strongest]))
     records = (*state.records[:-1], replace(state.records[-1], statistic=largest))
@@ -223,7 +224,7 @@ def _detect(state: MonitorState, record: Dataset, simulator: Simulator) -> Monit
     if largest <= state.threshold:
         return state
     cause = _find_cause(state, values, int(starts[strongest]), record, simulator)
-    alarm = _describe_change(state, values, statistics, cause)
+    alarm = _describe_change(state, values, errors, statistics, cause)
     return replace(state, alarms=(*state.alarms, alarm), start=alarm.since)
 
 
@@ -241,7 +242,7 @@ def _find_cause(
 
 
 def _describe_change(
-    state: MonitorState, values: Signal, statistics: Signal, cause: ChangeCause | None
+    state: MonitorState, values: Signal, errors: Signal, statistics: Signal, cause: ChangeCause | None
 ) -> Alarm:
     """Return the alarm of a change: its kind, cause and instant, and the values before and since then."""
     assert state.reference is not None
@@ -254,7 +255,7 @@ def _describe_change(
         kind = AlarmKind.PARAMETER if cause.is_parameter else AlarmKind.EFFECT
         shown = names.index(name) if name in names else strongest
     located = shown if abs(statistics[shown]) > state.threshold else strongest
-    point = locate_change(values[:, located], state.settings.training)
+    point = locate_change(values[:, located], errors[:, located], state.settings.training)
     sequence = np.exp(values[:, shown]) if shown >= len(names) else values[:, shown]
     return Alarm(
         record=len(state.records) - 1,
