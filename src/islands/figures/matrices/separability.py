@@ -8,8 +8,8 @@ from matplotlib.patches import Patch
 from islands.discrepancy.planning.isolability import Isolability
 from islands.figures.style import FRAME, RESIDUAL, SHADE, SIMULATED, WIDTH, blank, finish, house_style
 
-#: Margin for the names, in inches.
-_MARGIN = 1.55
+#: Smallest margin for the names, in inches, and their width per character and point of font size.
+_MIN_MARGIN, _CHARACTER = 1.2, 0.62 / 72
 
 #: Height of the legend in inches.
 _LEGEND = 0.65
@@ -40,13 +40,14 @@ def draw_separability(isolability: Isolability, title: str = "") -> Figure:
     """
     names, misfits = isolability.names, isolability.misfits
     count = len(names)
-    cell = min(_CELL, (WIDTH - _MARGIN - 0.1) / count)
+    margin = max(_MIN_MARGIN, 0.1 + _CHARACTER * _MAX_NAMES * max(map(len, names)))
+    cell = min(_CELL, (WIDTH - margin - 0.1) / count)
     top = 0.35 if title else 0.1
-    height = cell * count + _MARGIN + _LEGEND + top
+    height = cell * count + margin + _LEGEND + top
     figure = blank(height, title)
     figure.set_layout_engine("none")  # cells are squares of a fixed size
     size = cell * count
-    axes = figure.add_axes((_MARGIN / WIDTH, _LEGEND / height, size / WIDTH, size / height))
+    axes = figure.add_axes((margin / WIDTH, _LEGEND / height, size / WIDTH, size / height))
     shades = LinearSegmentedColormap.from_list("separability", ["#dcebf5", RESIDUAL, "#00304d"])
     colours = shades.with_extremes(over=SIMULATED, bad=SHADE)
     finite = np.where(np.isinf(misfits), 1e9, misfits)
@@ -81,7 +82,7 @@ def draw_separability(isolability: Isolability, title: str = "") -> Figure:
     axes.grid(visible=False)
     for side in axes.spines.values():
         side.set(visible=True, color=FRAME)
-    bar = figure.add_axes((_MARGIN / WIDTH, 0.42 / height, 0.45 * size / WIDTH, 0.09 / height))
+    bar = figure.add_axes((margin / WIDTH, 0.42 / height, 0.45 * size / WIDTH, 0.09 / height))
     figure.colorbar(mesh, cax=bar, orientation="horizontal", ticks=[0.1, 1.0, 10.0], format="%g")
     bar.tick_params(labelsize=7.0, which="both", length=2)
     bar.set_xlabel("separable from this misfit on, in noise standard deviations", fontsize=7.0, labelpad=1)
