@@ -1,9 +1,10 @@
 """Compare planned separations with diagnoses of simulated data.
 
-``python benchmarks/planned_separation.py [SEEDS]`` plans experiments with several simulators, simulates
-records with one cause at the misfit of the plan, and diagnoses them. It prints how often a cause is named,
-how often causes that the plan calls separable are not among its equivalents, and how often those that it
-calls inseparable are.
+``python benchmarks/planned_separation.py [SEEDS] [--decisive]`` plans experiments with several simulators,
+simulates records with one cause at the misfit of the plan, and diagnoses them. It prints how often a cause is
+named, how often causes that the plan calls separable are not among its equivalents, and how often those that
+it calls inseparable are. With ``--decisive`` it counts how often a cause is named without the other one of a
+pair as its equivalent, on records of the given input and of the decisive one.
 """
 
 import sys
@@ -17,8 +18,13 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.interfaces.simulator import get_tolerances
+from islands.discrepancy.planning.cause import CauseScale
+from islands.discrepancy.planning.decisive_experiment import design_experiment
+from islands.discrepancy.planning.experiment import make_model
 from islands.discrepancy.planning.experiment_setup import make_experiment
 from islands.discrepancy.planning.isolability import Isolability, find_isolability
+from islands.discrepancy.planning.pair_separation import CausePair
+from islands.discrepancy.planning.planned_input import find_limits
 from islands.discrepancy.planning.response_dictionary import ResponseDictionary
 from islands.io.simulator_spec.factory import make_simulator
 from islands.systems.signals import sines
@@ -28,8 +34,9 @@ ROOT = Path(__file__).resolve().parents[1]
 #: Number of records of each cause.
 SEEDS = 10
 
-#: A plan is compared with diagnoses where its misfits are clear by this factor.
-CLEAR = 1.3
+#: Reference misfits, relative to those from which a cause is separable in nine of ten records, that count as
+#: separable and as inseparable. At the latter, it is separable in less than one of ten.
+SEPARABLE, INSEPARABLE = 1.3, 0.43
 
 
 @dataclass(frozen=True)
@@ -53,6 +60,9 @@ class Planned:
     noise: float
     causes: tuple[str, ...]
 
+
+#: Noise of the motor's speed, and pairs of causes, for decisive experiments.
+NOISE, PAIRS = 0.25, (("cubic-stiffness", "even-nonlinearity"), ("delay", "sensor-lag"))
 
 EXPERIMENTS = {
     "dc-motor": Planned(
@@ -120,10 +130,10 @@ def compare(planned: Planned, cause: str, seeds: Sequence[int]) -> Agreement:
         listed = {first.name, *first.equivalents}
         found.named += cause.partition(":")[0] in listed
         for other, ratio in ratios.items():
-            if ratio > CLEAR:
+            if ratio > SEPARABLE:
                 found.separable += 1
                 found.separated += other not in listed
-            elif ratio < 1.0 / CLEAR:
+            elif ratio < INSEPARABLE:
                 found.inseparable += 1
                 found.equivalent += other in listed
     return found
@@ -141,9 +151,49 @@ def _rate_by_cause(isolability: Isolability, index: int) -> dict[str, float]:
     return ratios
 
 
+def count_decided(pair: tuple[str, str], seeds: Sequence[int]) -> tuple[int, int]:
+    """Hide the first cause of a pair in a motor, at 1 sigma with the given input, and diagnose.
+
+    Returns
+    -------
+    int, int
+        Number of records in which it alone is named, with the given input and with the decisive one.
+    """
+    planned = EXPERIMENTS["dc-motor"]
+    record = Dataset(u=planned.u, y=np.full(planned.u.size, np.nan), dt=planned.dt)
+    simulator = make_simulator(planned.spec, record)
+    experiment, effects = make_experiment(record, simulator, NOISE, get_tolerances(simulator))
+    dictionary = ResponseDictionary(experiment)
+    known = {effect.name: effect for effect in effects}
+    causes = [CauseScale(dictionary, known[name]).find_cause(1.0) for name in pair]
+    limits = replace(find_limits(planned.u, planned.dt), rate=100.0)
+    decisive = design_experiment(experiment, [CausePair(*causes)], limits, planned.u.size)
+    print(f"{' or '.join(pair)}: {decisive.description}, {decisive.before} to {decisive.after}", flush=True)
+    counts = []
+    for u in (planned.u, decisive.u):
+        model = make_model(experiment.with_input(u), known[pair[0]])
+        y = model.output.simulate(model.insert(known[pair[0]], causes[0].values))
+        counts.append(sum(_is_decided(planned, u, y, pair, seed) for seed in seeds))
+    return counts[0], counts[1]
+
+
+def _is_decided(planned: Planned, u: np.ndarray, y: np.ndarray, pair: tuple[str, str], seed: int) -> bool:
+    measured = Dataset(
+        u=u, y=y + NOISE * np.random.default_rng([seed, 43]).standard_normal(y.size), dt=planned.dt
+    )
+    found = diagnose(measured, make_simulator(planned.spec, measured)).effects
+    return bool(found) and found[0].name == pair[0] and pair[1] not in found[0].equivalents
+
+
 def main() -> None:
     """Print the comparison."""
-    seeds = range(int(sys.argv[1]) if len(sys.argv) > 1 else SEEDS)
+    given = [each for each in sys.argv[1:] if each != "--decisive"]
+    seeds = range(int(given[0]) if given else SEEDS)
+    if "--decisive" in sys.argv:
+        for pair in PAIRS:
+            before, after = count_decided(pair, seeds)
+            print(f"{pair[0]} alone named: {before} and {after} of {len(seeds)}", flush=True)
+        return
     total: Counter[str] = Counter()
     for name, planned in EXPERIMENTS.items():
         for cause in planned.causes:

@@ -1,0 +1,20 @@
+"""Plans agree with diagnoses of simulated records, on three simulations."""
+
+import pytest
+from benchmarks.planned_separation import EXPERIMENTS, compare
+
+SEEDS = range(10)
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize(
+    ("experiment", "cause"),
+    [("dc-motor", "delay"), ("second-order", "backlash"), ("bouc-wen-piezo", "exponential-creep")],
+)
+def test_diagnoses_separate_the_causes_that_the_plan_calls_separable(experiment: str, cause: str) -> None:
+    found = compare(EXPERIMENTS[experiment], cause, SEEDS)
+    assert found.named >= 9
+    assert found.separable > 100
+    assert found.separated >= 0.9 * found.separable
+    assert found.equivalent >= 0.8 * found.inseparable
