@@ -132,6 +132,7 @@ def _list_texts(signals: list[str], rate: str) -> Iterator[str]:
     yield TIME
     for signal in signals:
         yield f"{TIME}*{signal}"
+        yield f"{rate}*{signal}"
         yield f"abs({rate})*{signal}"
     for one, other in itertools.combinations(signals, 2):
         for first in FACTORS:
