@@ -47,6 +47,7 @@ SHARED_MODULES = {
     "ode_effects",
     "ode_preparation",
     "record_channels",
+    "shooting",
 }
 
 

@@ -1,4 +1,4 @@
-"""Kernels for mechanical systems with force elements, along a given motion or in a balance of forces."""
+"""Force elements, and their sum along a given motion."""
 
 from functools import cache
 from typing import NamedTuple
@@ -82,55 +82,3 @@ def integrate_along(x, rate, dt, elements, total):
                 third = call_law(derivative, half, v, z + 0.5 * dt * second, numbers)
                 fourth = call_law(derivative, x[k + 1], v, z + dt * third, numbers)
                 z += dt / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
-
-
-@kernel
-def _state_derivative(state, drive, mass, damping, stiffness, elements, slope):
-    """Write the derivative of ``state``: coordinate, rate, and the states of the elements."""
-    force = drive - damping * state[1] - stiffness * state[0]
-    for e in range(elements.forces.size):
-        numbers = elements.numbers.ctypes.data + 8 * WIDTH * e
-        force += elements.signs[e] * call_law(elements.forces[e], state[0], state[1], state[2 + e], numbers)
-        if elements.state_derivatives[e] != 0:
-            slope[2 + e] = call_law(elements.state_derivatives[e], state[0], state[1], state[2 + e], numbers)
-        else:
-            slope[2 + e] = 0.0
-    slope[0] = state[1]
-    slope[1] = force / mass
-
-
-@kernel
-def integrate_motion(u, intersample, dt, mass, damping, stiffness, elements, restarts, x0, v0, x):
-    """Integrate ``m x'' + c x' + k x = u + forces`` by RK4, one step per sample; write ``x`` (samples,).
-
-    ``intersample`` (2, samples) is the input half a step after each sample, and at the end of the step just
-    before the next sample, where the input may jump. At samples with ``restarts`` set, the motion restarts
-    from ``x0`` and ``v0``; the elements keep their states. ``x`` is NaN from the sample at which the motion
-    is not finite.
-    """
-    size = 2 + elements.forces.size
-    state, at = np.zeros(size), np.empty(size)
-    state[2:] = elements.initial_states
-    first, second, third, fourth = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-    for k in range(u.size):
-        if restarts[k]:
-            state[0], state[1] = x0[k], v0[k]
-        x[k] = state[0]
-        if not np.isfinite(state[0]):
-            x[k:] = np.nan
-            return
-        if k + 1 == u.size:
-            return
-        half, end = intersample[0, k], intersample[1, k]
-        _state_derivative(state, u[k], mass, damping, stiffness, elements, first)
-        for i in range(size):
-            at[i] = state[i] + 0.5 * dt * first[i]
-        _state_derivative(at, half, mass, damping, stiffness, elements, second)
-        for i in range(size):
-            at[i] = state[i] + 0.5 * dt * second[i]
-        _state_derivative(at, half, mass, damping, stiffness, elements, third)
-        for i in range(size):
-            at[i] = state[i] + dt * third[i]
-        _state_derivative(at, end, mass, damping, stiffness, elements, fourth)
-        for i in range(size):
-            state[i] += dt / 6.0 * (first[i] + 2.0 * second[i] + 2.0 * third[i] + fourth[i])

@@ -7,8 +7,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from islands.data.dataset import Dataset
+from islands.discrepancy.simulators.shooting import smooth
 from islands.systems.ode.lane_simulation import LaneInput, interpolate_linearly, simulate_lanes
 from islands.systems.ode.ode_program import generate_program
 from islands.systems.ode.ode_system import OdeSystem
@@ -19,6 +21,9 @@ _EMPTYING_TIMES = np.geomspace(0.005, 0.2, 8)
 
 #: Trial values of the level of the upper tank, relative to that of the lower tank.
 _LEVEL_RATIOS = (0.3, 1.0, 3.0)
+
+#: Rate vs within which the dry friction of an axis changes its sign, relative to the typical rate.
+_RELATIVE_RATE = 0.01
 
 #: A system with estimated parameters, and estimates of its states at the first sample by name.
 Estimate = tuple[OdeSystem, Mapping[str, float]]
@@ -40,12 +45,8 @@ def estimate_oscillator(system: OdeSystem, given: Mapping[str, float], record: D
     # Bounds of the damping are relative to critical damping, since its value may be close to zero.
     critical = 2.0 * abs(found.stiffness / found.mass) ** 0.5 * found.mass
     ends = (min(0.0, 10.0 * critical), max(0.0, 10.0 * critical))
-    system = system.with_values({"m": found.mass, "c": found.damping, "k": found.stiffness})
-    parameters = tuple(
-        replace(each, lower=ends[0], upper=ends[1]) if each.name == "c" else each
-        for each in system.parameters
-    )
-    return replace(system, parameters=parameters), {"x": found.position, "v": found.rate}
+    values = {"m": found.mass, "c": found.damping, "k": found.stiffness}
+    return _set(system, values, {"c": ends}), {"x": found.position, "v": found.rate}
 
 
 def estimate_tanks(system: OdeSystem, given: Mapping[str, float], record: Dataset) -> Estimate:
@@ -72,3 +73,38 @@ def estimate_tanks(system: OdeSystem, given: Mapping[str, float], record: Datase
         errors = np.mean((simulate_lanes(generate_program(system), part.dt, lanes)[:, 0] - y) ** 2, axis=1)
     values, levels = points[int(np.argmin(np.nan_to_num(errors, nan=np.inf)))]
     return system.with_values(values), levels
+
+
+def estimate_axis(system: OdeSystem, given: Mapping[str, float], record: Dataset) -> Estimate:
+    """Estimate the parameters of ``rigid-axis``; arguments as of `estimate_oscillator`.
+
+    The estimate uses the inverse dynamics: least squares of the force on smoothed acceleration, rate and
+    direction (Olsen and Petersen 2001).
+    """
+    rate, acceleration = smooth(record.y, record, 1), smooth(record.y, record, 2)
+    typical_rate = float(np.std(rate)) or 1.0
+    columns = np.column_stack([acceleration, rate, np.tanh(rate / (0.02 * typical_rate))])
+    names = ("m", "c", "F")
+    free = [place for place, name in enumerate(names) if name not in given]
+    known = np.array([given.get(name, 0.0) for name in names])
+    force = smooth(record.u[:, 0], record)
+    known[free] = scipy.optimize.lsq_linear(
+        columns[:, free], force - columns @ known, bounds=(1e-12, np.inf)
+    ).x
+    mass, damping, dry = map(float, known)
+    # Bounds of friction are relative to a typical force, since the friction may be close to zero.
+    most = 20.0 * (dry + damping * typical_rate + mass * typical_rate / (system.shooting / 5.0))
+    values = {"m": mass, "c": damping, "F": dry, "vs": given.get("vs", _RELATIVE_RATE * typical_rate)}
+    return _set(system, values, {"c": (0.0, most / typical_rate), "F": (0.0, most)}), {}
+
+
+def _set(
+    system: OdeSystem, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
+) -> OdeSystem:
+    """Return a system with other values and bounds of parameters."""
+    parameters = system.with_values(values).parameters
+    bounded = [
+        replace(each, lower=bounds[each.name][0], upper=bounds[each.name][1]) if each.name in bounds else each
+        for each in parameters
+    ]
+    return replace(system, parameters=tuple(bounded))

@@ -14,6 +14,7 @@ from islands.discrepancy.interfaces.simulator import Forces, SimulationRun
 from islands.discrepancy.simulators.coordinates import input_coordinate, output_coordinate, peak_amplitude
 from islands.discrepancy.simulators.ode_effects import find_effects, list_terms
 from islands.discrepancy.simulators.record_channels import sample_channel
+from islands.discrepancy.simulators.shooting import Shots
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.lane_simulation import (
     LaneInput,
@@ -44,6 +45,8 @@ class OdeSimulator:
         Largest absolute values of the states and of their derivatives (``dx/dt``) in a nominal simulation.
     channels : mapping
         Channels of the record by their names in the equations.
+    shots : Shots or None
+        Shooting intervals; None for a free run.
     parameters : tuple of Parameter
         Parameters that are not fixed, then the initial states that are not.
     """
@@ -52,6 +55,7 @@ class OdeSimulator:
     initial: Mapping[str, float]
     sizes: Mapping[str, float]
     channels: Mapping[str, str]
+    shots: Shots | None = None
     parameters: tuple[Parameter, ...] = field(init=False)
     state_effects: tuple[Effect, ...] = field(init=False)
     supported_effects: frozenset[str] = field(init=False)
@@ -62,7 +66,7 @@ class OdeSimulator:
         system = self.system
         declared = (
             *(_make_parameter(each) for each in system.parameters if not each.fixed),
-            *(self._make_initial(each) for each in system.states if not each.fixed),
+            *(self._make_initial(each) for each in system.states if not (each.fixed or self.shots)),
         )
         supported, of_states = find_effects(system, self.sizes)
         object.__setattr__(self, "parameters", declared)
@@ -131,7 +135,11 @@ class OdeSimulator:
         )
         has_factor = bool(self.system.gain) and not GAIN_EFFECTS.isdisjoint(runs[0].effect_parameters)
         laws = runs[0].forces if self._has_force_equation else ()
-        outputs = self._run(self._get_program(active, has_factor, len(laws)), active, runs, context)[:, 0]
+        program = self._get_program(active, has_factor, len(laws))
+        if self.shots is None:
+            outputs = self._run(program, active, runs, context)[:, 0]
+        else:
+            outputs = self._fit_shots(self.shots, program, active, runs, context)
         if not self._has_force_equation and runs[0].forces:
             outputs = outputs + [add_output_forces(run.x, context, run.forces) for run in runs]
         return outputs
@@ -146,6 +154,29 @@ class OdeSimulator:
         nominal = np.array([each.nominal for each in self.parameters])
         program = generate_program(self.system, outputs)
         return self._run(program, (), [SimulationRun(nominal, context.u, {}, ())], context)[0]
+
+    def _fit_shots(
+        self,
+        shots: Shots,
+        program: OdeProgram,
+        active: tuple[OdeEffect, ...],
+        runs: Sequence[SimulationRun],
+        context: SimulationContext,
+    ) -> Signal:
+        """Simulate runs with fitted states at each shooting interval; between samples outputs are held."""
+        steps = runs[0].x.size // shots.measured.size
+        sizes = {each.name: self.sizes[each.name] for each in self.system.states if not each.fixed}
+
+        def simulate(asked: Sequence[tuple[int, Mapping[str, Signal]]]) -> Signal:
+            starts = [states for _, states in asked]
+            return self._run(program, active, [runs[run] for run, _ in asked], context, starts)[:, 0, ::steps]
+
+        fitted = shots.fit_states(simulate, len(runs), shots.get_starts(self.initial), sizes)
+        return np.repeat(fitted, steps, axis=1)
+
+    def for_samples(self, first: int, last: int) -> "OdeSimulator":
+        """Return the simulator of one recording."""
+        return replace(self, shots=self.shots.for_samples(first, last)) if self.shots else self
 
     def _get_program(self, active: tuple[OdeEffect, ...], has_factor: bool, laws: int) -> OdeProgram:
         key = active, has_factor, laws
@@ -162,12 +193,16 @@ class OdeSimulator:
         active: tuple[OdeEffect, ...],
         runs: Sequence[SimulationRun],
         context: SimulationContext,
+        starts: Sequence[Mapping[str, Signal]] | None = None,
     ) -> Signal:
-        steps = max(self.system.steps, 1)
+        steps, interval = max(self.system.steps, 1), 0
+        if self.shots is not None:
+            interval = self.shots.interval * steps * (runs[0].x.size // self.shots.measured.size)
+            starts = starts or [self.shots.get_starts(self.initial)] * len(runs)
         common = self._make_common_signals(program, runs[0].x.size, context)
         made: dict[bytes, SampledSignal] = {}
         lanes = []
-        for run in runs:
+        for index, run in enumerate(runs):
             effects = run.effect_parameters
             between = run.intersample_values
             between = context.get_intersample_values(run.x) if between is None else between
@@ -194,9 +229,10 @@ class OdeSimulator:
                     signals,
                     pack_force_laws(laws, context, balance=True) if laws else None,
                     *self._find_limits(effects),
+                    starts[index] if starts else None,
                 )
             )
-        return simulate_lanes(program, context.dt / steps, lanes)[:, :, ::steps]
+        return simulate_lanes(program, context.dt / steps, lanes, interval)[:, :, ::steps]
 
     def _make_common_signals(
         self, program: OdeProgram, samples: int, context: SimulationContext

@@ -9,6 +9,7 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.record_channels import find_channel, make_nominal_context
+from islands.discrepancy.simulators.shooting import make_shots
 from islands.errors import RecordError
 from islands.systems.ode.ode_expression import Symbol
 from islands.systems.ode.ode_system import OdeSystem
@@ -43,7 +44,9 @@ def make_ode_simulator(
     initial = {each.name: _find_initial(each, system, first) for each in system.states}
     initial |= estimated or {}
     sized = [*initial, *(f"d{name}/dt" for name in initial)]
-    rough = OdeSimulator(system, initial, dict.fromkeys(sized, 1.0), channels)
+    shots = make_shots(system, record) if system.shooting else None
+    rough = OdeSimulator(system, initial, dict.fromkeys(sized, 1.0), channels, shots)
+    rough = rough.for_samples(*max(record.bounds, key=lambda bounds: bounds[1] - bounds[0]))
     context = make_nominal_context(record)
     expressions = tuple(Symbol(name) for name in initial) + tuple(right for _, right in system.derivatives)
     for steps in (system.steps,) if system.steps else _STEPS:
@@ -56,7 +59,7 @@ def make_ode_simulator(
             f"the simulation {system.name} diverges on this input: check its equations, the values and units "
             "of its parameters, and the sampling time"
         )
-    return replace(rough, sizes=dict(zip(sized, sizes, strict=True)))
+    return replace(rough, sizes=dict(zip(sized, sizes, strict=True)), shots=shots)
 
 
 def _find_initial(state: OdeState, system: OdeSystem, measured: float) -> float:

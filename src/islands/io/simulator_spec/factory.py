@@ -84,11 +84,6 @@ def make_simulator(
         _check_parameters(entry, spec.parameters)
         if entry.estimated:
             _check_estimable(record)
-        if not entry.factory.endswith("make_built_in"):
-            old: Simulator = resolve_name(entry.factory)(
-                spec.parameters, record, estimation_part(record).samples
-            )
-            return old
     simulator: Simulator = resolve_name(entry.factory)(spec, record, columns or {})
     return simulator
 

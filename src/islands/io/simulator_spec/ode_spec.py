@@ -88,6 +88,7 @@ class OdeSpec(SimulatorSpec):
     input_unit: _Unit = ""
     output_unit: _Unit = ""
     steps: Annotated[int, Field(ge=0, le=MAX_STEPS)] = 0
+    shooting: Annotated[FiniteFloat, Field(ge=0.0)] = 0.0
     gain: Annotated[str, Field(max_length=100)] = ""
     contains: Annotated[tuple[_Name, ...], Field(max_length=20)] = ()
     effects: Annotated[dict[_Name, OdeEffectSpec], Field(max_length=50)] = Field(default_factory=dict)

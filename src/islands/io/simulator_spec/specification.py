@@ -122,7 +122,6 @@ class LocalExtendedSpec(ExtendedSpec):
     core: "LocalSpec"  # type: ignore[assignment]
 
 
-_PHYSICAL = "islands.discrepancy.simulators"
 _ESTIMATORS = "islands.discrepancy.simulators.built_in"
 _FACTORY = "islands.io.simulator_spec.factory"
 
@@ -152,7 +151,7 @@ _ENTRIES = (
         "Axis with friction: m x'' + c x' + F tanh(x' / vs) = u, y = x. It restarts every half second "
         "from a state fitted to the measured output (multiple shooting), because its free run drifts",
         PhysicalSpec,
-        f"{_PHYSICAL}.rigid_axis:make_rigid_axis",
+        f"{_FACTORY}:make_built_in",
         {
             "m": ParameterRange.POSITIVE,
             "c": ParameterRange.NONNEGATIVE,
@@ -160,6 +159,7 @@ _ENTRIES = (
             "vs": ParameterRange.POSITIVE,
         },
         estimated="m, c, F, vs",
+        estimator=f"{_ESTIMATORS}:estimate_axis",
     ),
     SimulatorEntry(
         "cascaded-tanks",

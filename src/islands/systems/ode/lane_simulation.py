@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from islands.kernels.simd import VECTOR, padded_size
 from islands.systems.mechanics import WIDTH, Elements
 from islands.systems.ode.equation_parser import TIME
+from islands.systems.ode.kernel_arguments import LaneForces, LaneLimits, LaneRestarts
 from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol
-from islands.systems.ode.ode_kernel import LaneForces, LaneLimits, integrate
+from islands.systems.ode.ode_kernel import integrate
 from islands.systems.ode.ode_program import OdeProgram
 
 Signal = NDArray[np.float64]
@@ -91,6 +92,8 @@ class LaneInput:
     spills : mapping
         For a state with an upper limit, the state that receives a part of what the limit cuts off, and that
         part. The receivers are the same in all lanes.
+    restarts : mapping
+        States at the first sample of each shooting interval by name, each of shape (intervals,).
     """
 
     parameters: Mapping[str, float]
@@ -99,9 +102,12 @@ class LaneInput:
     elements: Elements | None = None
     limits: Mapping[str, tuple[float, float]] | None = None
     spills: Mapping[str, tuple[str, float]] | None = None
+    restarts: Mapping[str, Signal] | None = None
 
 
-def simulate_lanes(program: OdeProgram, dt: float, lanes: Sequence[LaneInput]) -> NDArray[np.float64]:
+def simulate_lanes(
+    program: OdeProgram, dt: float, lanes: Sequence[LaneInput], interval: int = 0
+) -> NDArray[np.float64]:
     """Simulate a system, eight lanes at a time.
 
     Parameters
@@ -111,6 +117,8 @@ def simulate_lanes(program: OdeProgram, dt: float, lanes: Sequence[LaneInput]) -
         Step in seconds, one per sample.
     lanes : sequence of LaneInput
         All have the same force laws.
+    interval : int
+        Steps of a shooting interval; 0 for none.
 
     Returns
     -------
@@ -119,13 +127,15 @@ def simulate_lanes(program: OdeProgram, dt: float, lanes: Sequence[LaneInput]) -
     """
     return np.concatenate(
         [
-            _simulate_eight(program, dt, lanes[first : first + VECTOR])
+            _simulate_eight(program, dt, lanes[first : first + VECTOR], interval)
             for first in range(0, len(lanes), VECTOR)
         ]
     )
 
 
-def _simulate_eight(program: OdeProgram, dt: float, lanes: Sequence[LaneInput]) -> NDArray[np.float64]:
+def _simulate_eight(
+    program: OdeProgram, dt: float, lanes: Sequence[LaneInput], interval: int
+) -> NDArray[np.float64]:
     instructions = program.instructions
     full = [*lanes, *[lanes[0]] * (VECTOR - len(lanes))]
     arena = padded_size(VECTOR * instructions.rows)
@@ -148,7 +158,8 @@ def _simulate_eight(program: OdeProgram, dt: float, lanes: Sequence[LaneInput]) 
     out = np.empty((samples, instructions.outputs.size, VECTOR))
     instructions = instructions._replace(signals=instructions.signals[order])
     limits = _pack_limits(program.states, full)
-    integrate(instructions, arena, shared, own, dt, limits, _pack_elements(full), len(lanes), out)
+    restarts = _pack_restarts(program.states, full, samples, interval)
+    integrate(instructions, arena, shared, own, dt, limits, restarts, _pack_elements(full), len(lanes), out)
     return np.ascontiguousarray(out.transpose(2, 1, 0)[: len(lanes)])
 
 
@@ -215,6 +226,16 @@ def _pack_limits(states: Sequence[str], lanes: Sequence[LaneInput]) -> LaneLimit
         receivers[states.index(name)] = states.index(receiver)
     caught = [[(lane.spills or {}).get(name, ("", 0.0))[1] for lane in lanes] for name in states]
     return LaneLimits(lower, upper, receivers, np.array(caught).reshape(-1))
+
+
+def _pack_restarts(
+    states: Sequence[str], lanes: Sequence[LaneInput], samples: int, interval: int
+) -> LaneRestarts:
+    if not interval:
+        return LaneRestarts(np.empty(0, dtype=np.int64), np.empty((0, 0)))
+    values = [[(lane.restarts or {})[name] for lane in lanes] for name in states]
+    first = np.arange(0, samples, interval, dtype=np.int64)
+    return LaneRestarts(first, np.ascontiguousarray(np.array(values).reshape(-1, first.size).T))
 
 
 def _pack_elements(lanes: Sequence[LaneInput]) -> LaneForces:

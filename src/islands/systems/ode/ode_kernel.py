@@ -5,10 +5,8 @@ instruction combines lanes, so that no lane depends on another one, nor on the v
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from islands.kernels.interpreter import ADD, MULTIPLY, SIGN, SUBTRACT
 from islands.kernels.jit_cache import kernel
@@ -59,68 +57,6 @@ _CHECK = 16
 
 #: Bytes of a row.
 _ROW = 8 * VECTOR
-
-
-class Instructions(NamedTuple):
-    """Instructions over rows of one arena.
-
-    Attributes
-    ----------
-    code : ndarray of int64, shape (instructions, 5)
-        Operation, target row, and the rows of up to three operands.
-    ends : ndarray of int64, shape (4,)
-        End of each section of the code: what depends on parameters alone, on time and signals, on states, and
-        what only the outputs need.
-    signals : ndarray of int64, shape (signals,)
-        Rows of the signals.
-    states : int
-        Row of the first state; those of the force laws follow.
-    slopes : ndarray of int64, shape (states,)
-        Rows of the derivatives.
-    outputs : ndarray of int64, shape (outputs,)
-        Rows of the outputs.
-    rows : int
-        Number of rows.
-    """
-
-    code: NDArray[np.int64]
-    ends: NDArray[np.int64]
-    signals: NDArray[np.int64]
-    states: int
-    slopes: NDArray[np.int64]
-    outputs: NDArray[np.int64]
-    rows: int
-
-
-class LaneForces(NamedTuple):
-    """Force laws in every lane; addresses as in `islands.systems.mechanics.Elements`.
-
-    Attributes
-    ----------
-    forces, state_derivatives : ndarray of int64, shape (laws,)
-    numbers : ndarray, shape (laws, 8, WIDTH)
-    """
-
-    forces: NDArray[np.int64]
-    state_derivatives: NDArray[np.int64]
-    numbers: NDArray[np.float64]
-
-
-class LaneLimits(NamedTuple):
-    """Limits of the states in every lane; size 0 for none.
-
-    Attributes
-    ----------
-    lower, upper : ndarray, shape (states*8,)
-    receivers : ndarray of int64, shape (states,)
-        Index of the state that receives the part ``caught`` of what the upper limit of a state cuts off.
-    caught : ndarray, shape (states*8,)
-    """
-
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
-    receivers: NDArray[np.int64]
-    caught: NDArray[np.float64]
 
 
 @kernel(forceinline=True)
@@ -244,7 +180,7 @@ def _is_finite(before, lane):
 
 
 @kernel
-def integrate(instructions, arena, shared, own, dt, limits, laws, lanes, out):
+def integrate(instructions, arena, shared, own, dt, limits, restarts, laws, lanes, out):
     """Integrate a system from the states in the arena; write the outputs.
 
     ``arena`` (rows*8,) contains constants, parameters and initial states. ``shared`` (samples, 3, signals)
@@ -257,7 +193,13 @@ def integrate(instructions, arena, shared, own, dt, limits, laws, lanes, out):
     size = slopes.size * VECTOR
     before, total = arena[VECTOR * states : VECTOR * states + size].copy(), np.empty(size)
     base = arena.ctypes.data
+    restart = 0
     for k in range(out.shape[0]):
+        if restart < restarts.samples.size and restarts.samples[restart] == k:
+            for i in range(restarts.states.shape[1]):
+                before[i] = restarts.states[restart, i]
+                arena[VECTOR * states + i] = before[i]
+            restart += 1
         for stage in range(4):
             begin, end = ends[0], ends[3] if stage == 0 else ends[2]
             if stage == 2:

@@ -15,6 +15,7 @@ from islands.errors import ModelError
 from islands.kernels.interpreter import ADD, MULTIPLY, SIGN, SUBTRACT
 from islands.systems.ode import ode_kernel
 from islands.systems.ode.equation_parser import FORCE, TIME
+from islands.systems.ode.kernel_arguments import Instructions
 from islands.systems.ode.ode_expression import (
     SIGNAL_FUNCTIONS,
     Number,
@@ -82,7 +83,7 @@ class OdeProgram:
     states : tuple of str
     """
 
-    instructions: ode_kernel.Instructions
+    instructions: Instructions
     constants: NDArray[np.float64]
     parameters: tuple[str, ...]
     signals: tuple[OdeExpression, ...]
@@ -109,7 +110,6 @@ def generate_program(system: OdeSystem, outputs: Sequence[OdeExpression] = (), l
     outputs : sequence of expression
         Outputs instead of that of the system, for example states.
     laws : int
-        Number of force laws.
 
     Raises
     ------
@@ -166,7 +166,7 @@ class _Generator:
         code = [each for section in self._sections for each in section]
         if len(code) > MAX_INSTRUCTIONS:
             raise ModelError(f"the equations have {len(code)} operations, and {MAX_INSTRUCTIONS} is the most")
-        instructions = ode_kernel.Instructions(
+        instructions = Instructions(
             np.array(code, dtype=np.int64).reshape(-1, 5),
             np.cumsum([len(section) for section in self._sections]),
             np.arange(first_state - len(self.signals), first_state),

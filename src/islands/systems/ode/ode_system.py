@@ -83,6 +83,9 @@ class OdeSystem:
         Names of effects of the catalogue that the equations contain.
     effects : tuple of OdeEffect
         Effects in the equations; empty for an offset and a limit of each state.
+    shooting : float
+        Seconds after which a simulation restarts from states that are fitted to the measured output; 0 for a
+        free run.
     is_built_in : bool
         Whether these are the equations of the built-in simulator of this name.
     """
@@ -103,6 +106,7 @@ class OdeSystem:
     gain: str = ""
     contains: tuple[str, ...] = ()
     effects: tuple[OdeEffect, ...] = ()
+    shooting: float = 0.0
     is_built_in: bool = False
 
     @property

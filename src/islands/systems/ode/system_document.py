@@ -68,6 +68,7 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
         output_unit=document.get("output_unit", ""),
         steps=document.get("steps", 0),
         gain=document.get("gain", ""),
+        shooting=document.get("shooting", 0.0),
         contains=tuple(document.get("contains", ())),
         effects=tuple(_make_effect(name, entry) for name, entry in document.get("effects", {}).items()),
     )
@@ -223,6 +224,7 @@ def describe_system(system: OdeSystem) -> dict[str, Any]:
         "output_unit": system.output_unit,
         "steps": system.steps,
         "gain": system.gain,
+        "shooting": system.shooting,
         "contains": list(system.contains),
         "effects": {each.name: _describe_effect(each) for each in system.effects},
     }

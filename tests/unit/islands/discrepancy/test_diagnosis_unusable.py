@@ -164,7 +164,7 @@ def test_impossible_parameters_are_rejected(
 
 
 def test_rigid_axis_states_the_required_record_length(record: Dataset) -> None:
-    with pytest.raises(RecordError, match="an axis needs 80 samples, the record has 50"):
+    with pytest.raises(RecordError, match="shooting needs 80 samples, the record has 50"):
         islands.diagnose(record[:50], "rigid-axis")
 
 

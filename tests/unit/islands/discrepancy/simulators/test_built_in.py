@@ -9,6 +9,7 @@ import pytest
 import scipy
 from numpy.typing import NDArray
 
+import islands
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.preparation import make_context
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -208,3 +209,34 @@ def test_parameters_that_can_be_given_are_those_of_the_equations() -> None:
         simulator = made()[name].simulator
         names = {each.name for each in simulator.parameters if not each.initial}
         assert names == SIMULATORS[name].parameters.keys()
+
+
+def test_shooting_fits_the_states_of_every_interval() -> None:
+    """The equations are right, so that only the fitted positions and rates determine the output."""
+    case = made()["rigid-axis"]
+    position = simulate_oscillator(wave(), 2.0, 6.0, 0.0)
+    noisy = position + 1e-3 * np.random.default_rng(2).standard_normal(position.size)
+    record = recorded(wave(), noisy, units=("N", "m"))
+    spec = PhysicalSpec(kind="rigid-axis", parameters={"m": 2.0, "c": 6.0, "F": 0.0, "vs": 1.0})
+    simulator = make_simulator(spec, record)
+    assert [each.name for each in simulator.parameters] == ["m", "c", "F", "vs"]
+    assert simulator.built_in_effects == made()["rigid-axis"].simulator.built_in_effects
+    assert isinstance(case.simulator, OdeSimulator)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
+    found = simulation.simulate(simulation.nominal)
+    # Two states in 50 samples have a fifth of the noise; the smoothed guesses alone have more.
+    assert np.std(found - position) < 0.25e-3
+    jumps = np.abs(np.diff(found) - np.diff(position))
+    assert set(np.flatnonzero(jumps > 1e-4) % 50) <= {49}
+
+
+def test_recordings_begin_with_a_shooting_interval() -> None:
+    record = made()["rigid-axis"].record
+    both = islands.join((record[:330], record[330:]))
+    spec = made()["rigid-axis"].spec
+    simulator = make_simulator(spec, both)
+    joined = ExtendedSimulator(simulator, (), make_context(both, simulator, both.samples))
+    output = joined.simulate(joined.nominal)
+    part = make_simulator(spec, both).for_samples(330, 600)  # type: ignore[attr-defined]
+    alone = ExtendedSimulator(part, (), make_context(record[330:], part, 270))
+    assert np.array_equal(output[330:], alone.simulate(alone.nominal))

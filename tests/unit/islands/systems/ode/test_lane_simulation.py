@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from islands.discrepancy.effects import hysteresis
-from islands.systems.mechanics import WIDTH, Elements, compile_law, integrate_motion
 from islands.systems.ode.lane_simulation import (
     LaneInput,
     SampledSignal,
@@ -125,39 +123,6 @@ MOTION = {
 def motion(**changes: Any) -> LaneInput:
     parameters = {"m": 0.5, "c": 1.2, "k": 80.0}
     return LaneInput(parameters, {"x": 0.01, "v": 0.3}, {"F": interpolate_linearly(FORCE)}, **changes)
-
-
-def integrate_compiled(elements: Elements, mass: float = 0.5) -> Array:
-    signal = interpolate_linearly(FORCE)
-    starts, x = np.arange(SAMPLES) == 0, np.empty(SAMPLES)
-    integrate_motion(
-        *(FORCE, np.stack([signal.middle, signal.end]), DT, mass, 1.2, 80.0, elements, starts),
-        *(np.full(SAMPLES, 0.01), np.full(SAMPLES, 0.3), x),
-    )
-    return x
-
-
-def pack_hysteresis(k: float, z0: float) -> Elements:
-    form = hysteresis.SECOND_HYSTERESIS.form
-    numbers = np.zeros((1, WIDTH))
-    numbers[0, :4] = k, 40.0, -15.0, z0
-    addresses = [np.array([compile_law(law).address]) for law in (form.force, form.state_derivative)]
-    return Elements(*addresses, np.array([-1.0]), np.array([z0]), numbers)
-
-
-def test_equations_have_the_bits_of_the_compiled_kernel() -> None:
-    none = Elements(*np.empty((2, 0), dtype=np.int64), *np.empty((2, 0)), np.empty((0, WIDTH)))
-    program = generate_program(make_system(MOTION))
-    assert np.array_equal(simulate_lanes(program, DT, [motion()])[0, 0], integrate_compiled(none))
-
-
-def test_force_laws_with_a_state_act_in_every_lane() -> None:
-    program = generate_program(make_system(MOTION), laws=1)
-    given = [(60.0, 0.01), (30.0, 0.0), (-5.0, 0.02)]
-    found = simulate_lanes(program, DT, [motion(elements=pack_hysteresis(*each)) for each in given])[:, 0]
-    for each, values in zip(found, given, strict=True):
-        assert each == pytest.approx(integrate_compiled(pack_hysteresis(*values)), abs=1e-14)
-    assert np.max(np.abs(found[0] - found[1])) > 1e-3
 
 
 def test_halving_the_step_divides_the_error_by_sixteen() -> None:

@@ -1,0 +1,164 @@
+"""Multiple shooting: a simulation restarts at regular intervals from states that are fitted to the output.
+
+After Bock, with the states eliminated: they are fitted within each simulation by the Gauss-Newton method, all
+intervals at once, since the states of one interval do not affect the others.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.interfaces.context import Signal
+from islands.discrepancy.interfaces.segments import map_segments
+from islands.errors import RecordError
+from islands.systems.ode.ode_expression import Symbol
+from islands.systems.ode.ode_system import OdeSystem
+
+#: Smallest number of samples in a shooting interval.
+MIN_SAMPLES = 20
+
+#: Smallest number of intervals in a record.
+MIN_INTERVALS = 4
+
+#: Window of the Savitzky-Golay filter that smooths the measured output, in samples.
+SMOOTHING_WINDOW = 9
+
+#: Change of a state for its response, relative to its size.
+_STEP = 1e-4
+
+#: Number of Gauss-Newton steps.
+_ITERATIONS = 2
+
+#: Responses whose energy in other directions is a smaller part are not distinguished.
+_RANK_TOLERANCE = 1e-12
+
+#: Simulates one output, shape (samples,), for each index of a run and its states at the intervals by name.
+SimulateShots = Callable[[Sequence[tuple[int, Mapping[str, Signal]]]], Signal]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shots:
+    """Shooting intervals of a record.
+
+    Attributes
+    ----------
+    interval : int
+        Samples of an interval.
+    measured : ndarray, shape (samples,)
+        Measured output.
+    guesses : mapping
+        Estimates of states at every sample by name, each of shape (samples,).
+    """
+
+    interval: int
+    measured: Signal
+    guesses: Mapping[str, Signal]
+
+    def for_samples(self, first: int, last: int) -> "Shots":
+        """Return the intervals of one recording; one begins with it."""
+        guesses = {name: signal[first:last] for name, signal in self.guesses.items()}
+        return Shots(self.interval, self.measured[first:last], guesses)
+
+    def get_starts(self, initial: Mapping[str, float]) -> dict[str, Signal]:
+        """Return the states at the intervals before they are fitted; by default the initial ones."""
+        count = -(-self.measured.size // self.interval)
+        return {
+            name: self.guesses[name][:: self.interval] if name in self.guesses else np.full(count, value)
+            for name, value in initial.items()
+        }
+
+    def fit_states(
+        self, simulate: SimulateShots, runs: int, starts: Mapping[str, Signal], sizes: Mapping[str, float]
+    ) -> Signal:
+        """Fit the states of all intervals, and return the outputs, shape (runs, samples).
+
+        Parameters
+        ----------
+        simulate : callable
+        runs : int
+            Number of runs, each with other parameters.
+        starts : mapping
+            States at the intervals, before they are fitted.
+        sizes : mapping
+            Sizes of the states that are fitted.
+        """
+        moved = [{**starts, name: starts[name] + _STEP * size} for name, size in sizes.items()]
+        every = range(runs)
+        outputs = simulate([(run, states) for run in every for states in (starts, *moved)])
+        outputs = outputs.reshape(runs, 1 + len(sizes), -1)
+        y, responses = outputs[:, 0], np.nan_to_num(outputs[:, 1:] - outputs[:, :1])
+        place = np.arange(self.measured.size) // self.interval
+        inverse = _invert(_sum_intervals(responses[:, :, None] * responses[:, None], place))
+        states = np.array([[starts[name] for name in sizes]] * runs)
+        unit = _STEP * np.array(list(sizes.values()))[:, None]
+        for _ in range(_ITERATIONS):
+            errors = np.nan_to_num(self.measured - y)
+            slope = _sum_intervals(responses * errors[:, None], place)
+            trial = states + unit * np.einsum("krij,krj->rik", inverse, slope)
+            moved_y = simulate(
+                [(run, {**starts, **dict(zip(sizes, trial[run], strict=True))}) for run in every]
+            )
+            # While a mass sticks the response is nonlinear, and a full step may increase the error.
+            before, after = (_sum_intervals((self.measured - each) ** 2, place).T for each in (y, moved_y))
+            closer = after < before
+            states = np.where(closer[:, None], trial, states)
+            y = np.where(closer[:, place], moved_y, y)
+        return y
+
+
+def _sum_intervals(signals: Signal, place: NDArray[np.int64]) -> Signal:
+    """Sum signals of shape (..., samples) over each interval; the intervals come first in the result."""
+    first = np.flatnonzero(np.diff(place, prepend=-1))
+    return np.moveaxis(np.add.reduceat(signals, first, axis=-1), -1, 0)
+
+
+def _invert(squares: Signal) -> Signal:
+    """Return the pseudoinverses of scaled matrices, shape (intervals, runs, states, states)."""
+    scale = np.sqrt(np.maximum(np.diagonal(squares, axis1=-2, axis2=-1), np.finfo(float).tiny))
+    both = scale[..., :, None] * scale[..., None, :]
+    return np.asarray(np.linalg.pinv(squares / both, rcond=_RANK_TOLERANCE, hermitian=True) / both)
+
+
+def make_shots(system: OdeSystem, record: Dataset) -> Shots:
+    """Make the shooting intervals of a record.
+
+    A state that is the output starts at the measured output, its derivative at the smoothed rate.
+
+    Raises
+    ------
+    RecordError
+        The record is shorter than four intervals of the smallest size.
+    """
+    least = MIN_INTERVALS * MIN_SAMPLES
+    if record.samples < least:
+        raise RecordError(f"shooting needs {least} samples, the record has {record.samples}")
+    if (shortest := min(record.segments)) < MIN_SAMPLES:
+        raise RecordError(f"{system.name} needs {MIN_SAMPLES} samples of each recording, one has {shortest}")
+    guesses = {}
+    for name, right in system.derivatives:
+        if system.output == Symbol(name):
+            guesses[name] = record.y
+            if isinstance(right, Symbol):
+                guesses[right.name] = smooth(record.y, record, 1)
+    return Shots(max(MIN_SAMPLES, round(system.shooting / record.dt)), record.y, guesses)
+
+
+def smooth(signal: Signal, record: Dataset, order: int = 0) -> Signal:
+    """Smooth a signal of a record, or its derivative of the given order.
+
+    Raises
+    ------
+    RecordError
+        A recording is shorter than `MIN_SAMPLES`.
+    """
+    if (shortest := min(record.segments)) < MIN_SAMPLES:
+        raise RecordError(f"shooting needs {MIN_SAMPLES} samples of each recording, one has {shortest}")
+    return map_segments(
+        lambda part: scipy.signal.savgol_filter(part, SMOOTHING_WINDOW, 3, deriv=order, delta=record.dt),
+        signal,
+        record.segments,
+    )

@@ -1,0 +1,81 @@
+"""Arguments of the kernel that integrates a system eight lanes at a time: arrays that belong together."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Instructions(NamedTuple):
+    """Instructions over rows of one arena.
+
+    Attributes
+    ----------
+    code : ndarray of int64, shape (instructions, 5)
+        Operation, target row, and the rows of up to three operands.
+    ends : ndarray of int64, shape (4,)
+        End of each section of the code: what depends on parameters alone, on time and signals, on states, and
+        what only the outputs need.
+    signals : ndarray of int64, shape (signals,)
+        Rows of the signals.
+    states : int
+        Row of the first state; those of the force laws follow.
+    slopes : ndarray of int64, shape (states,)
+        Rows of the derivatives.
+    outputs : ndarray of int64, shape (outputs,)
+        Rows of the outputs.
+    rows : int
+        Number of rows.
+    """
+
+    code: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    signals: NDArray[np.int64]
+    states: int
+    slopes: NDArray[np.int64]
+    outputs: NDArray[np.int64]
+    rows: int
+
+
+class LaneForces(NamedTuple):
+    """Force laws in every lane; addresses as in `islands.systems.mechanics.Elements`.
+
+    Attributes
+    ----------
+    forces, state_derivatives : ndarray of int64, shape (laws,)
+    numbers : ndarray, shape (laws, 8, WIDTH)
+    """
+
+    forces: NDArray[np.int64]
+    state_derivatives: NDArray[np.int64]
+    numbers: NDArray[np.float64]
+
+
+class LaneLimits(NamedTuple):
+    """Limits of the states in every lane; size 0 for none.
+
+    Attributes
+    ----------
+    lower, upper : ndarray, shape (states*8,)
+    receivers : ndarray of int64, shape (states,)
+        Index of the state that receives the part ``caught`` of what the upper limit of a state cuts off.
+    caught : ndarray, shape (states*8,)
+    """
+
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    receivers: NDArray[np.int64]
+    caught: NDArray[np.float64]
+
+
+class LaneRestarts(NamedTuple):
+    """Samples at which states are set to given values; those of force laws are kept. Size 0 for none.
+
+    Attributes
+    ----------
+    samples : ndarray of int64, shape (restarts,)
+    states : ndarray, shape (restarts, states*8)
+    """
+
+    samples: NDArray[np.int64]
+    states: NDArray[np.float64]
