@@ -38,11 +38,18 @@ def make_ode_simulator(
         The record has not the channels or the units of the equations, or the simulation diverges on it.
     """
     _check_units(system, record)
+    estimated = estimated or {}
     system = _fill_units(system, record)
     channels = {name: find_channel(name, record, "the equations read") for name in system.channels}
     first = float(np.nan_to_num(record.y[0]))
     initial = {each.name: _find_initial(each, system, first) for each in system.states}
-    initial |= estimated or {}
+    initial |= estimated
+    # Extended equations start from the estimates on other records, except the state that is measured.
+    hidden = {name: value for name, value in estimated.items() if system.output != Symbol(name)}
+    system = replace(
+        system,
+        states=tuple(replace(each, initial=hidden.get(each.name, each.initial)) for each in system.states),
+    )
     sized = [*initial, *(f"d{name}/dt" for name in initial)]
     shots = make_shots(system, record) if system.shooting else None
     rough = OdeSimulator(system, initial, dict.fromkeys(sized, 1.0), channels, shots)

@@ -240,3 +240,16 @@ def test_recordings_begin_with_a_shooting_interval() -> None:
     part = make_simulator(spec, both).for_samples(330, 600)  # type: ignore[attr-defined]
     alone = ExtendedSimulator(part, (), make_context(record[330:], part, 270))
     assert np.array_equal(output[330:], alone.simulate(alone.nominal))
+
+
+def test_extended_tanks_start_from_estimated_levels_on_other_records() -> None:
+    """From an empty upper tank, whose outflow has no derivative there, its level would not be found."""
+    u = 3.0 + wave() / 25
+    levels = simulate_tanks(u, 0.5)
+    record = Dataset(u, levels, 0.5, ("u_V",), output_name="y_V", input_units=("V",), output_unit="V")
+    tanks = make_simulator(PhysicalSpec(kind="cascaded-tanks", parameters=TANKS), record)
+    assert isinstance(tanks, OdeSimulator)
+    extended = make_ode_simulator(tanks.system.with_term("lower", "0*u"), record)
+    values = np.array([each.nominal for each in extended.parameters])
+    spec = describe_extension(extended, values, ("u_V",), "y_V")
+    assert simulate_spec(spec, record) == pytest.approx(levels, abs=1e-3)
