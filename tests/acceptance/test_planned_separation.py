@@ -1,7 +1,7 @@
 """Plans agree with diagnoses of simulated records, on three simulations."""
 
 import pytest
-from benchmarks.planned_separation import EXPERIMENTS, compare
+from benchmarks.planned_separation import EXPERIMENTS, compare, count_decided
 
 SEEDS = range(10)
 
@@ -18,3 +18,11 @@ def test_diagnoses_separate_the_causes_that_the_plan_calls_separable(experiment:
     assert found.separable > 100
     assert found.separated >= 0.9 * found.separable
     assert found.equivalent >= 0.8 * found.inseparable
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(3000)
+def test_the_decisive_input_names_one_cause_where_the_given_one_names_two() -> None:
+    before, after = count_decided(("cubic-stiffness", "even-nonlinearity"), SEEDS)
+    assert before <= 2
+    assert after >= 9
