@@ -72,7 +72,8 @@ def estimate_tanks(system: OdeSystem, given: Mapping[str, float], record: Datase
     with np.errstate(over="ignore", invalid="ignore"):
         errors = np.mean((simulate_lanes(generate_program(system), part.dt, lanes)[:, 0] - y) ** 2, axis=1)
     values, levels = points[int(np.argmin(np.nan_to_num(errors, nan=np.inf)))]
-    return system.with_values(values), levels
+    bounds = {name: (0.02 * value, 50.0 * value) for name, value in values.items()}
+    return _set(system, values, bounds), levels
 
 
 def estimate_axis(system: OdeSystem, given: Mapping[str, float], record: Dataset) -> Estimate:
