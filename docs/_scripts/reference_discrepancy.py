@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from tables import code, codes, escape, page, section, table
 
-from islands.discrepancy.effects import CATALOGUE, OF_EACH
+from islands.discrepancy.effects import CATALOGUE, EFFECTS, OF_EACH
+from islands.discrepancy.effects.free_forms import FREE_FORMS
 from islands.discrepancy.inference.noise_detectors import DETECTORS, NoiseDetector
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
@@ -48,7 +49,12 @@ def effects() -> str:
         "Effects of one family resemble each other. Which effects a record cannot distinguish depends on the "
         "record: the analysis lists them as equivalents of each finding.\n",
         table(("Effect", "Family", "Meaning"), overview),
-        section("Effects", "", *map(_entry, CATALOGUE.values())),
+        section("Effects", "", *(_entry(each) for each in EFFECTS if not each.is_free)),
+        section(
+            "Free forms",
+            "Effects without an assumed shape, which are compared with the other effects.",
+            *map(_entry, FREE_FORMS),
+        ),
         section(
             "Effects on one state, parameter or model",
             "The name of the state or parameter follows the name of the effect: `state-clip:upper`.",

@@ -8,7 +8,7 @@ from benchmarks.measured_discrepancies import CASES, DATA, errors
 
 import islands
 from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.inference.verdict import Finding
+from islands.discrepancy.inference.finding import Finding
 
 pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]
 

@@ -7,9 +7,11 @@ from typing import Any
 from islands.discrepancy.detectability import NOTHING, SelfTest
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
-from islands.discrepancy.inference.verdict import Finding, Verdict
+from islands.discrepancy.inference.finding import Finding
+from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.surrogates import STRENGTHS
-from islands.figures.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.diagnosis.form_values import draw_free_forms, list_free_forms
 from islands.figures.style import save
 from islands_service.reports.identification_report import TEMPLATES
 
@@ -19,6 +21,7 @@ _VERDICTS = {
     Verdict.NAMED: "The simulation lacks known effects, which explain the discrepancy.",
     Verdict.REMAINDER: "The simulation lacks known effects, which explain most of the discrepancy.",
     Verdict.UNKNOWN: "The simulation is wrong, and no known effect explains the discrepancy.",
+    Verdict.FAMILY: "The simulation lacks an effect of this kind, whose shape is that of no known effect.",
     Verdict.DISCOVERED: "The equations lack terms, which were found. No known effect explains as much.",
     Verdict.GROSS_ERROR: "Record and simulation do not match as they are: correct the record first.",
 }
@@ -161,6 +164,8 @@ def diagnosis_report(
         for each, draw in DISCREPANCY_FIGURES.items()
         if found.candidates or each != "ladder"
     ]
+    if list_free_forms(found):
+        figures.insert(1, ("Shape of the missing effect", _inline(draw_free_forms(found))))
     text = TEMPLATES.get_template("diagnosis.html").render(
         name=name,
         found=found,

@@ -23,6 +23,7 @@ from islands.discrepancy.calibration.preparation import (
 )
 from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
 from islands.discrepancy.discovery.discovery import Discovery, describe_terms, discover_terms
+from islands.discrepancy.discovery.form_search import search_free_forms
 from islands.discrepancy.discovery.term_search import TermSearchResult
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.findings import describe_gross_errors, describe_noise, list_record_findings
@@ -32,6 +33,7 @@ from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.gross_errors.gross_error_search import explain_divergence, find_gross_errors
 from islands.discrepancy.gross_errors.record_finding import describe_gaps
 from islands.discrepancy.inference.experiment_design import suggest_experiment
+from islands.discrepancy.inference.finding import Finding, describe_effects
 from islands.discrepancy.inference.holdout import compute_rmse, measure_gain
 from islands.discrepancy.inference.residual_structure import find_residual_structure
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
@@ -42,12 +44,7 @@ from islands.discrepancy.inference.strategies import (
     search_with_ar_noise,
     search_with_model_error,
 )
-from islands.discrepancy.inference.verdict import (
-    Finding,
-    Verdict,
-    describe_effects,
-    explained_fraction,
-)
+from islands.discrepancy.inference.verdict import Verdict, choose_reference_fit, explained_fraction
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances
@@ -57,11 +54,6 @@ from islands.evolution.progress import ProgressCallback, ignore_progress
 
 #: Maximum number of searches, one after each change of the intersample behaviour or the step size.
 MAX_ROUNDS = 3
-
-#: Effects are rejected if they increase the RMSE of the hold-out part by more than this percentage, with a
-#: certainty of 97.5 %. It is not zero, since an effect that calibration absorbs changes the RMSE by almost
-#: nothing in either direction.
-MAX_HOLDOUT_LOSS_PERCENT = 0.5
 
 
 def diagnose(
@@ -93,7 +85,7 @@ def diagnose(
     parallel_map : ParallelMap
         Calibrates the effects. The result does not depend on it.
     catalogue : sequence of Effect
-        The effects that are searched for.
+        The effects that are searched for, and the free forms that they are compared with.
 
     Raises
     ------
@@ -146,6 +138,11 @@ def diagnose(
         model_error = search_with_model_error(base, target, effects, progress, parallel_map)
         second = assess_evidence(model_error, fitted, effects, rng)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome
+    if outcome.verdict != Verdict.NOTHING:
+        progress("comparing with free forms", 0.9)
+        forms = select_effects(simulator, context, prior_std, catalogue, free=True)
+        outcome = _compare_with_free_forms(outcome, forms, fitted, (*effects, *forms), rng, parallel_map)
+        effects = [*effects, *(form for form in forms if form in outcome.hypothesis.effects)]
     found = _make_diagnosis(record, outcome, base, effects, fitted, rng, progress, parallel_map)
     if outcome.verdict != Verdict.NOTHING or outcome.hypothesis.fit.noise.order:
         progress("searching for missing terms", 0.95)
@@ -154,6 +151,23 @@ def diagnose(
             found = _extend_equations(found, *discovered, target, rng)
     closed_loop = find_closed_loop(found.best, record.y, fitted, record.input_names[0])
     return replace(found, record_findings=(*record_findings, *closed_loop))
+
+
+def _compare_with_free_forms(
+    outcome: SearchOutcome,
+    forms: Sequence[Effect],
+    fitted: int,
+    effects: Sequence[Effect],
+    rng: np.random.Generator,
+    parallel_map: ParallelMap,
+) -> SearchOutcome:
+    """Return the outcome with free forms if they explain clearly more and withstand the same tests."""
+    freer = search_free_forms(outcome, forms, parallel_map)
+    if freer is None:
+        return outcome
+    assessed = assess_evidence(freer, fitted, effects, rng)
+    has_forms = any(effect.is_free for effect in assessed.hypothesis.effects)
+    return assessed if has_forms and assessed.verdict != Verdict.UNKNOWN else outcome
 
 
 def _make_gross_diagnosis(
@@ -186,13 +200,16 @@ def _extend_equations(
     target: Target,
     rng: np.random.Generator,
 ) -> Diagnosis:
-    """Return the diagnosis with discovered terms in place of effects, if they gain on the hold-out part."""
+    """Return the diagnosis with discovered terms in place of effects, if the hold-out part confirms them.
+
+    Its error has to be smaller with them than without, and not larger than with the effects.
+    """
     record, fitted = found.record, found.estimation_samples
     fit = fit_initial_states(search.fit, target, fitted)
     holdout = slice(fitted, record.samples)
     floor = min(found.noise_floor, float(np.sqrt(fit.mean_square)))
     gain = measure_gain(record, found.base.output, fit.output, holdout, floor, rng)
-    if gain.ci95[0] <= 0.0:
+    if gain.ci95[0] <= 0.0 or (found.gain is not None and gain.after.rmse > found.gain.after.rmse):
         return found
     residual, output = (record.y - fit.output)[:fitted], fit.output[:fitted]
     context = fit.simulation.context
@@ -232,10 +249,12 @@ def _make_diagnosis(
     hypothesis = replace(outcome.hypothesis, fit=fit_initial_states(outcome.hypothesis.fit, target, fitted))
     holdout = slice(fitted, record.samples)
     gain = None
-    if verdict in (Verdict.NAMED, Verdict.REMAINDER):
-        gain = measure_gain(record, base.output, hypothesis.fit.output, holdout, floor**0.5, rng)
-        if hypothesis.effects and gain.ci95[1] < -MAX_HOLDOUT_LOSS_PERCENT:
-            # The hold-out part contradicts the effects: there is a discrepancy, but its cause is another.
+    if verdict in (Verdict.NAMED, Verdict.REMAINDER, Verdict.FAMILY):
+        reference = choose_reference_fit(hypothesis, base, target)
+        before = fit_initial_states(reference, target, fitted).output
+        gain = measure_gain(record, before, hypothesis.fit.output, holdout, floor**0.5, rng)
+        if hypothesis.effects and gain.ci95[0] <= 0.0:
+            # The hold-out part does not confirm the effects: there is a discrepancy of another cause.
             gain, verdict = None, Verdict.UNKNOWN
     findings: tuple[Finding, ...] = ()
     equivalents: tuple[ScreenedEffect, ...] = ()

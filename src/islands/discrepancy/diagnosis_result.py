@@ -7,8 +7,9 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.discovery.discovery import Discovery
 from islands.discrepancy.gross_errors.record_finding import RecordFinding
+from islands.discrepancy.inference.finding import Finding
 from islands.discrepancy.inference.holdout import HoldoutGain
-from islands.discrepancy.inference.verdict import Finding, Verdict
+from islands.discrepancy.inference.verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True)

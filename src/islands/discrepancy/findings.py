@@ -7,9 +7,9 @@ import numpy as np
 
 from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.gross_errors.record_finding import FAMILY, RecordFinding
+from islands.discrepancy.inference.finding import CONFIDENCE_TEMPERATURE, Finding, Value
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
-from islands.discrepancy.inference.verdict import CONFIDENCE_TEMPERATURE, Finding, Value
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 from islands.discrepancy.interfaces.segments import count_runs
 

@@ -7,7 +7,7 @@ from typing import Any
 from islands.discrepancy.detectability import SelfTest
 from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
 from islands.discrepancy.findings import ResidualFormula
-from islands.discrepancy.inference.verdict import Finding
+from islands.discrepancy.inference.finding import Finding
 from islands.io.result_folder import record_document
 
 SCHEMA = "islands.discrepancy/1"

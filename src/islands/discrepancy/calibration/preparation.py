@@ -35,13 +35,19 @@ def select_effects(
     context: SimulationContext,
     tolerance: Mapping[str, float],
     catalogue: Sequence[Effect] = EFFECTS,
+    free: bool = False,
 ) -> list[Effect]:
-    """Return the effects to search for.
+    """Return the effects to search for, or the free forms that they are compared with.
 
     They are the effects of the catalogue that the simulator supports and the record can show, the effects on
     the states of the simulator, and a wrong value of each parameter with a tolerance. Effects already
     modelled by the simulator are left out, as are gains unless every parameter except initial states has a
     tolerance.
+
+    Parameters
+    ----------
+    free : bool
+        Whether to return the free forms of the catalogue instead of all other effects.
 
     Raises
     ------
@@ -58,13 +64,16 @@ def select_effects(
     effects = [
         effect
         for effect in catalogue
-        if effect.site in simulator.sites
+        if effect.is_free == free
+        and effect.site in simulator.sites
         and (effect.site != Site.CORE or effect.name in simulator.supported_effects)
         and effect.name not in simulator.built_in_effects
         and (has_full_prior or not effect.is_gain)
         and effect.is_applicable(context)
         and is_visible(effect)
     ]
+    if free:
+        return effects
     effects += [effect for effect in simulator.state_effects if effect.is_applicable(context)]
     return effects + [wrong_parameter(each) for each in simulator.parameters if each.name in tolerance]
 

@@ -12,16 +12,16 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     evaluate_fit,
 )
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
-from islands.discrepancy.inference.holdout import cross_validate_gain
-from islands.discrepancy.inference.hypothesis import Hypothesis
-from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
-from islands.discrepancy.inference.verdict import (
+from islands.discrepancy.inference.finding import (
     CONFIDENCE_TEMPERATURE,
     EQUIVALENCE_MARGIN,
     Finding,
     Value,
-    explained_fraction,
 )
+from islands.discrepancy.inference.holdout import cross_validate_gain
+from islands.discrepancy.inference.hypothesis import Hypothesis
+from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
+from islands.discrepancy.inference.verdict import explained_fraction
 
 #: Part of the gain of the terms by which they have to be better than effects. The catalogue has one form of
 #: each effect, and another one, such as a sign for a smoothed sign, is no other cause.

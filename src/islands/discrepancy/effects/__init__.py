@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from islands.discrepancy.effects.baseline import INPUT_OFFSET, JUMP, LINEAR_DRIFT, OFFSET, THERMAL_DRIFT
 from islands.discrepancy.effects.creep import EXPONENTIAL_CREEP, LOGARITHMIC_CREEP
 from islands.discrepancy.effects.disturbance import CROSS_COUPLING, PERIODIC_DISTURBANCE
+from islands.discrepancy.effects.free_forms import FREE_FORMS
 from islands.discrepancy.effects.friction import (
     COULOMB_FRICTION,
     QUADRATIC_DRAG,
@@ -38,8 +39,8 @@ from islands.discrepancy.effects.time_variation import AGEING, GAIN_STEP
 from islands.discrepancy.effects.timing import CLOCK_SKEW, DELAY, RESONANCE, SENSOR_LAG
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
 
-#: All effects, in the order in which maps act on a signal. The order also breaks ties between scores: another
-#: order changes results.
+#: All effects and free forms, in the order in which maps act on a signal. The order also breaks ties between
+#: scores: another order changes results.
 EFFECTS: tuple[Effect, ...] = (
     DELAY,
     CLOCK_SKEW,
@@ -73,9 +74,10 @@ EFFECTS: tuple[Effect, ...] = (
     THERMAL_DRIFT,
     CROSS_COUPLING,
     PERIODIC_DISTURBANCE,
+    *FREE_FORMS,
 )
 
-#: Effects by name.
+#: Effects and free forms by name.
 CATALOGUE: Mapping[str, Effect] = {effect.name: effect for effect in EFFECTS}
 
 #: Templates of the effects that exist once for each state, parameter or model of a simulation, by name.

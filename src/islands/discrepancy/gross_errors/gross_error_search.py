@@ -119,7 +119,8 @@ def find_gross_errors(
             fit,
             error,
             error_before,
-            2.0 * samples * float(np.log(error / error_before)) + fit.penalty,
+            # A column of the simulation may be a column of the record: no error remains.
+            2.0 * samples * float(np.log(max(error, np.finfo(float).tiny) / error_before)) + fit.penalty,
         )
         for correction, fit, _, error in found
     ]

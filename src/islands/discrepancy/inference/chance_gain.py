@@ -18,9 +18,8 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
 )
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.noise_surrogates import Randomisation, draw_surrogates
-from islands.discrepancy.inference.screening import Projection, get_starting_points, transfer_parameters
+from islands.discrepancy.inference.screening import DEPENDENCE, Projection, simulate_starting_points
 from islands.discrepancy.interfaces.effect import Effect, Signal
-from islands.discrepancy.interfaces.segments import fill_gaps
 
 #: Number of surrogates of each kind.
 SURROGATES = 300
@@ -30,9 +29,6 @@ FALSE_ALARM_PROBABILITY = 0.01
 
 #: Fraction of the largest gains from which the tail of their distribution is extrapolated.
 TAIL_FRACTION = 0.1
-
-#: Singular values of responses below this fraction of the largest one are linear dependences.
-RANK_TOLERANCE = 1e-6
 
 #: Seed of the surrogates. It is fixed, so that the same fit has the same threshold in every search.
 SEED = 20
@@ -153,24 +149,17 @@ def _insert(signal: Signal, part: NDArray[np.bool_]) -> Signal:
     return whole
 
 
-def _simulate_starting_points(base: CalibrationResult, effect: Effect, target: Target) -> list[Signal]:
-    """Return the responses to an effect at its starting points that are finite."""
+def _simulate_starting_points(base: CalibrationResult, effect: Effect, target: Target) -> Signal:
+    """Return the responses to an effect at its starting points, shape (points, samples)."""
     simulation = base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
-    start = transfer_parameters(base.values, base.simulation, simulation)
-    given = get_starting_points(effect, simulation, fill_gaps(target.y - base.output))
-    if not given:
-        return []
-    points = np.tile(start, (len(given), 1))
-    points[:, simulation.get_slice(effect)] = [simulation.expand(effect, point) for point in given]
-    responses = simulation.simulate_batch(points) - base.output
-    return [response for response in responses if np.isfinite(response).all()]
+    return simulate_starting_points(base, simulation, effect, target)[1]
 
 
 def _orthonormalise(responses: Sequence[Signal], projection: Projection) -> Signal:
     """Return an orthonormal basis of the part of responses that calibration does not absorb."""
     projected = [projection(response) for response in responses if np.isfinite(response).all()]
     unit = [response / size for response in projected if (size := float(np.linalg.norm(response)))]
-    return scipy.linalg.orth(np.column_stack(unit), rcond=RANK_TOLERANCE) if unit else np.empty((0, 0))
+    return scipy.linalg.orth(np.column_stack(unit), rcond=DEPENDENCE) if unit else np.empty((0, 0))
 
 
 def _pursue(gram: Signal, products: Signal, steps: int) -> Signal:
@@ -180,7 +169,7 @@ def _pursue(gram: Signal, products: Signal, steps: int) -> Signal:
     correlations = products
     for _ in range(min(steps, products.size)):
         selected.append(int(np.argmax(np.abs(correlations))))
-        found = np.linalg.lstsq(gram[np.ix_(selected, selected)], products[selected], rcond=RANK_TOLERANCE)[0]
+        found = np.linalg.lstsq(gram[np.ix_(selected, selected)], products[selected], rcond=DEPENDENCE)[0]
         correlations = products - gram[:, selected] @ found
         weights[:] = 0.0
         weights[selected] = found

@@ -79,11 +79,7 @@ def measure_gain(
     y = record.y[holdout][is_known]
     output_range = float(np.ptp(y)) or 1.0
     errors = [np.array(y - simulated[holdout][is_known]) for simulated in (before, after)]
-    blocks = min(BLOCKS, y.size)
-    squares = [_sum_by_block(each**2, blocks) for each in errors]
-    drawn = rng.integers(0, blocks, (BOOTSTRAP_SAMPLES, blocks))
-    reductions = 100 * (1 - np.sqrt(squares[1][drawn].sum(axis=1) / squares[0][drawn].sum(axis=1)))
-    low, high = np.quantile(reductions, [0.025, 0.975])
+    low, high = bound_reduction(errors[0], errors[1], rng)
     rmse = [float(np.sqrt(np.mean(each**2))) for each in errors]
     mape = [100 * float(np.mean(np.abs(each))) / output_range for each in errors]
     # The mean absolute value of normal noise is sqrt(2 / pi) of its standard deviation.
@@ -93,8 +89,24 @@ def measure_gain(
         ErrorMetrics(rmse[1], mape[1]),
         noise_floor,
         100 * (1 - rmse[1] / rmse[0]),
-        (float(low), float(high)),
+        (low, high),
     )
+
+
+def bound_reduction(before: Signal, after: Signal, rng: np.random.Generator) -> tuple[float, float]:
+    """Return the 95 % confidence interval of the reduction of an RMS error in percent.
+
+    Parameters
+    ----------
+    before, after : ndarray, shape (samples,)
+        Errors.
+    """
+    blocks = min(BLOCKS, before.size)
+    squares = [_sum_by_block(each**2, blocks) for each in (before, after)]
+    drawn = rng.integers(0, blocks, (BOOTSTRAP_SAMPLES, blocks))
+    reductions = 100 * (1 - np.sqrt(squares[1][drawn].sum(axis=1) / squares[0][drawn].sum(axis=1)))
+    low, high = np.quantile(reductions, [0.025, 0.975])
+    return float(low), float(high)
 
 
 def compute_rmse(residual: Signal) -> float:

@@ -13,8 +13,8 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     evaluate_fit,
     prior_precision,
 )
+from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator
 from islands.discrepancy.effects import catalogue_order
-from islands.discrepancy.inference.starts_calibrator import StartsCalibrator
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.segments import fill_gaps
@@ -29,6 +29,9 @@ MAX_SCALING = 5.0
 #: Scores that differ by less than this are ties. Ties keep the catalogue order, in which effects that belong
 #: to one simulator come last.
 SCORE_TIE = 0.5
+
+#: Singular values below this fraction of the largest one are linear dependences of responses.
+DEPENDENCE = 1e-6
 
 #: Minimum number of effects that are calibrated in addition to others, even if their linear responses promise
 #: no gain.
@@ -185,6 +188,33 @@ def get_starting_points(
     return points
 
 
+def simulate_starting_points(
+    base: CalibrationResult, simulation: ExtendedSimulator, effect: Effect, target: Target
+) -> tuple[Signal, Signal]:
+    """Simulate the starting points of an effect, at once if possible; those that diverge are left out.
+
+    Parameters
+    ----------
+    simulation : ExtendedSimulator
+        The simulation of ``base``, extended by the effect.
+
+    Returns
+    -------
+    ndarray, shape (points, parameters)
+        Values.
+    ndarray, shape (points, samples)
+        Changes of the output of ``base``.
+    """
+    given = get_starting_points(effect, simulation, fill_gaps(target.y - base.output))
+    points = np.tile(transfer_parameters(base.values, base.simulation, simulation), (len(given), 1))
+    if not given:
+        return points, np.empty((0, base.output.size))
+    points[:, simulation.get_slice(effect)] = [simulation.expand(effect, point) for point in given]
+    responses = simulation.simulate_batch(points) - base.output
+    is_finite = np.isfinite(responses).all(axis=1)
+    return points[is_finite], responses[is_finite]
+
+
 def _find_starts(
     base: CalibrationResult,
     simulation: ExtendedSimulator,
@@ -194,6 +224,8 @@ def _find_starts(
 ) -> list[tuple[float, Signal]]:
     """Return the starting points that explain most, each with its strength scaled if that explains more.
 
+    The starting points of a free form are combined to the one that explains most.
+
     Returns
     -------
     list of (float, ndarray)
@@ -201,17 +233,17 @@ def _find_starts(
     """
     part = simulation.get_slice(effect)
     lower, upper = simulation.bounds
-    without_effect = transfer_parameters(base.values, base.simulation, simulation)
-    given = get_starting_points(effect, simulation, fill_gaps(target.y - base.output))
-    points = np.tile(without_effect, (len(given), 1))
-    for values, point in zip(points, given, strict=True):
-        values[part] = simulation.expand(effect, point)
-    responses = _simulate_responses(simulation, points, base, projection)
-    with np.errstate(over="ignore", invalid="ignore"):  # a point that diverges is no start
-        sizes = np.array([float(response @ response) for response in responses])
+    points, changes = simulate_starting_points(base, simulation, effect, target)
+    responses = [projection(change) for change in changes]
+    if effect.is_free and responses:
+        weights = np.linalg.lstsq(np.column_stack(responses), projection.residual, rcond=DEPENDENCE)[0]
+        combined = points[:1].copy()
+        combined[0, part] = weights @ points[:, part]
+        points, responses = combined, [projection(simulation.simulate(combined[0]) - base.output)]
+    sizes = np.array([_sum_squares(response) for response in responses])
     usable = np.flatnonzero(np.isfinite(sizes) & (sizes > 0.0))
     starts = [(_sum_squares(projection.residual - responses[index]), points[index]) for index in usable]
-    if effect.linear_parameters:
+    if effect.linear_parameters and usable.size:
         scaled = points[usable]
         for values, index in zip(scaled, usable, strict=True):
             factor = float(responses[index] @ projection.residual) / sizes[index]
@@ -219,20 +251,12 @@ def _find_starts(
                 factor, -MAX_SCALING, MAX_SCALING
             )
         scaled = np.clip(scaled, lower, upper)
-        others = _simulate_responses(simulation, scaled, base, projection)
+        others = simulation.simulate_batch(scaled) - base.output
         starts = [
-            min(start, (_sum_squares(projection.residual - response), values), key=itemgetter(0))
-            for start, response, values in zip(starts, others, scaled, strict=True)
+            min(start, (_sum_squares(projection.residual - projection(other)), values), key=itemgetter(0))
+            for start, other, values in zip(starts, others, scaled, strict=True)
         ]
     return sorted((each for each in starts if np.isfinite(each[0])), key=itemgetter(0))[:MAX_STARTS]
-
-
-def _simulate_responses(
-    simulation: ExtendedSimulator, points: Signal, base: CalibrationResult, projection: Projection
-) -> list[Signal]:
-    """Return the projected changes of the output of the base at the given points, at once if possible."""
-    outputs = simulation.simulate_batch(points) if points.size else points
-    return [projection(output - base.output) for output in outputs]
 
 
 def _sum_squares(signal: Signal) -> float:

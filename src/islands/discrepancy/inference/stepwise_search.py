@@ -86,7 +86,7 @@ def stepwise_search(
                 if is_accepted and (key not in extended or found.cost < extended[key].cost):
                     extended[key] = found
         beam = sorted(extended.values(), key=attrgetter("rank"))[:width]
-        beam, new_target = _refit_with_ar_noise(beam, target)
+        beam, new_target = refit_with_ar_noise(beam, target)
         if beam and beam[0].cost < best.cost - min_gain:
             best, target = beam[0], new_target
         elif not (is_first and pairs):
@@ -99,7 +99,7 @@ def _count_causes(hypothesis: Hypothesis) -> int:
     return sum(effect.cause != model_form.CORE_SHAPE for effect in hypothesis.effects)
 
 
-def _refit_with_ar_noise(beam: list[Hypothesis], target: Target) -> tuple[list[Hypothesis], Target]:
+def refit_with_ar_noise(beam: list[Hypothesis], target: Target) -> tuple[list[Hypothesis], Target]:
     """Refit hypotheses, whitened by the noise model of the best one, until its cost stops decreasing."""
     for _ in range(MAX_REFITS if beam and target.effective_samples is None else 0):
         before = beam[0].cost
@@ -130,7 +130,7 @@ def refine_by_swaps(
     """
     complete = hypothesis.effects
     min_gain = _get_min_further_gain(target, effects)
-    hypothesis = _eliminate_backward(hypothesis, target, min_gain)
+    hypothesis = eliminate_backward(hypothesis, target, min_gain)
     while hypothesis.effects:
         alternatives: tuple[Alternatives, ...] = ()
         candidates = []
@@ -155,7 +155,7 @@ def refine_by_swaps(
             refined = replace(hypothesis, fit=best.fit, cost=best.cost, alternatives=alternatives)
             return refined, target
         complete = best.effects
-        (hypothesis,), target = _refit_with_ar_noise([_eliminate_backward(best, target, min_gain)], target)
+        (hypothesis,), target = refit_with_ar_noise([eliminate_backward(best, target, min_gain)], target)
     return hypothesis, target
 
 
@@ -172,7 +172,7 @@ def _get_min_further_gain(target: Target, effects: Sequence[Effect]) -> float:
     )
 
 
-def _eliminate_backward(hypothesis: Hypothesis, target: Target, min_gain: float) -> Hypothesis:
+def eliminate_backward(hypothesis: Hypothesis, target: Target, min_gain: float) -> Hypothesis:
     """Remove effects that are redundant given the others, and sort the rest, the most important first.
 
     The last effect may be removed too: refitted values and the noise model estimated with it may make it

@@ -18,6 +18,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     whiten_target,
 )
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
+from islands.discrepancy.calibration.starts_calibrator import make_task_key
 from islands.discrepancy.inference.chance_gain import ForwardSelection
 from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.noise_floor import (
@@ -27,7 +28,6 @@ from islands.discrepancy.inference.noise_floor import (
 )
 from islands.discrepancy.inference.residual_structure import find_residual_structure
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
-from islands.discrepancy.inference.starts_calibrator import make_task_key
 from islands.discrepancy.inference.stepwise_search import MAX_EFFECTS, MIN_GAIN, stepwise_search
 from islands.discrepancy.inference.verdict import (
     Verdict,
@@ -36,6 +36,7 @@ from islands.discrepancy.inference.verdict import (
     explained_fraction,
     remove_chance_effects,
     validate_out_of_sample,
+    withdraw_effects,
 )
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap, memoised_map
@@ -144,7 +145,7 @@ def search_with_model_error(
 def assess_evidence(
     outcome: SearchOutcome, fitted: int, effects: Sequence[Effect], rng: np.random.Generator
 ) -> SearchOutcome:
-    """Remove effects that fail cross-validation, analyse the residual, and classify the outcome.
+    """Remove effects that fail on other samples, analyse the residual, and classify the outcome.
 
     Parameters
     ----------
@@ -156,6 +157,7 @@ def assess_evidence(
     base, target = outcome.base, outcome.target
     hypothesis = remove_chance_effects(outcome.hypothesis, base, target, effects)
     hypothesis = validate_out_of_sample(hypothesis, base, target, fitted, rng)
+    hypothesis = withdraw_effects(hypothesis, target, fitted, rng)
     context, output = hypothesis.fit.simulation.context, hypothesis.fit.output[:fitted]
     residual = target.y[:fitted] - output
     explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
@@ -173,6 +175,8 @@ def assess_evidence(
     verdict = classify(
         explained, bool(hypothesis.effects), has_remainder, target.effective_samples is not None
     )
+    if hypothesis.effects and hypothesis.effects[0].is_free and verdict != Verdict.UNKNOWN:
+        verdict = Verdict.FAMILY
     return replace(
         outcome,
         hypothesis=hypothesis,

@@ -1,30 +1,23 @@
-"""Verdict: whether effects explain a residual, with which confidence, and which others explain it as well."""
+"""Verdict: whether effects explain a residual, more than chance does and on blocks that were left out."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from enum import StrEnum
 
 import numpy as np
 
+from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
     Target,
-    estimate_covariance,
     evaluate_fit,
 )
 from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain
-from islands.discrepancy.inference.confounders import Confounder, find_confounder
-from islands.discrepancy.inference.holdout import cross_validate_gain
-from islands.discrepancy.inference.hypothesis import (
-    Alternatives,
-    Hypothesis,
-    find_alternatives,
-    without_effect,
-)
-from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
+from islands.discrepancy.inference.confounders import find_confounder
+from islands.discrepancy.inference.holdout import bound_reduction, cross_validate_gain
+from islands.discrepancy.inference.hypothesis import Hypothesis, without_effect
+from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
-from islands.discrepancy.interfaces.effect import Effect, Signal
-from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.discrepancy.interfaces.effect import Effect
 
 #: Minimum fraction of the explainable misfit that the effects have to explain.
 MIN_EXPLAINED_FRACTION = 0.5
@@ -32,12 +25,8 @@ MIN_EXPLAINED_FRACTION = 0.5
 #: The same if the residual still has structure: the rest is then small enough to be called a remainder.
 MIN_EXPLAINED_FRACTION_WITH_REMAINDER = 0.9
 
-#: Effects whose scores are within this margin of the named one cannot be distinguished from it.
-EQUIVALENCE_MARGIN = 9.0
-
-#: Temperature of the softmax from scores to confidences: without it, a confidence of 0.97 is right in 0.72 of
-#: the cases.
-CONFIDENCE_TEMPERATURE = 2.0
+#: Change of the output in the hold-out part, relative to the error, below which that part says nothing.
+MIN_VISIBLE_FRACTION = 0.02
 
 #: Minimum decrease of the mean square by each further effect, relative to the part of a confounder's response
 #: that no simulation reproduces.
@@ -51,53 +40,9 @@ class Verdict(StrEnum):
     NAMED = "named"
     REMAINDER = "named with remainder"
     UNKNOWN = "unknown"
+    FAMILY = "family"
     DISCOVERED = "discovered"
     GROSS_ERROR = "gross error"
-
-
-@dataclass(frozen=True, slots=True)
-class Value:
-    """An estimated parameter of an effect.
-
-    Attributes
-    ----------
-    value : float
-    unit : str
-    ci95 : tuple of float or None
-        95 % confidence interval, given that the extended simulation is right; None if it is unknown.
-    """
-
-    value: float
-    unit: str
-    ci95: tuple[float, float] | None
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """A named cause of the discrepancy.
-
-    Attributes
-    ----------
-    name, family : str
-        Name and family in the catalogue.
-    confidence : float
-        Confidence among the alternative causes, from 0 to 1.
-    equivalents : tuple of str
-        Names of the causes that the record cannot distinguish from this one.
-    parameters : mapping of str to Value
-    score : float
-        Score gain in minus twice the log-likelihood, less the BIC penalty.
-    explained_fraction : float or None
-        Fraction of the explainable misfit that the cause explains; None for a property of the noise.
-    """
-
-    name: str
-    family: str
-    confidence: float
-    equivalents: tuple[str, ...]
-    parameters: Mapping[str, Value]
-    score: float
-    explained_fraction: float | None
 
 
 def remove_chance_effects(
@@ -145,6 +90,32 @@ def validate_out_of_sample(
         without = without_effect(hypothesis, effect, target)
         decrease = without.fit.mean_square - hypothesis.fit.mean_square
         if decrease < MIN_CONFOUNDED_FRACTION * excess and effect.family != "scale":
+            hypothesis = without
+    return hypothesis
+
+
+def withdraw_effects(
+    hypothesis: Hypothesis, target: Target, fitted: int, rng: np.random.Generator
+) -> Hypothesis:
+    """Remove further effects, the least important first, that do not reduce the error of the hold-out part.
+
+    An effect is kept if the hold-out part cannot show it, as a state that does not reach its limit there, and
+    if it is a gain or a parameter, which calibration replaces.
+
+    Parameters
+    ----------
+    fitted : int
+        Number of samples used for estimation.
+    """
+    is_judged = ~np.isnan(target.y[fitted:])
+    for effect in hypothesis.effects[:0:-1]:
+        if effect.family == "scale":
+            continue
+        without = without_effect(hypothesis, effect, target)
+        outputs = [fit_initial_states(each.fit, target, fitted).output for each in (without, hypothesis)]
+        before, after = (np.array((target.y - each)[fitted:][is_judged]) for each in outputs)
+        is_visible = np.std(after - before) > MIN_VISIBLE_FRACTION * np.std(before)
+        if is_visible and bound_reduction(before, after, rng)[0] <= 0.0:
             hypothesis = without
     return hypothesis
 
@@ -198,94 +169,3 @@ def classify(explained: float, has_effects: bool, has_remainder: bool, is_model_
     if explained < required:
         return Verdict.UNKNOWN
     return Verdict.REMAINDER if has_remainder else Verdict.NAMED
-
-
-def describe_effects(
-    hypothesis: Hypothesis,
-    base: CalibrationResult,
-    screened: Sequence[ScreenedEffect],
-    target: Target,
-    effects: Sequence[Effect],
-    floor: float,
-    parallel_map: ParallelMap = map,
-) -> tuple[tuple[Finding, ...], tuple[ScreenedEffect, ...]]:
-    """Return the findings of a hypothesis, and the alternatives that the record cannot distinguish from them.
-
-    The alternatives of each effect are those that were screened without it.
-
-    Parameters
-    ----------
-    base, screened : CalibrationResult, sequence of ScreenedEffect
-        The simulation without effects and the effects screened on it; they are the alternatives if the
-        hypothesis has a single effect.
-    floor : float
-        Mean square of the noise.
-    """
-    findings, equivalents = [], []
-    deviations = np.sqrt(np.maximum(np.diag(estimate_covariance(hypothesis.fit, target)), 0.0))
-    if len(hypothesis.effects) == 1:
-        alternatives: Sequence[Alternatives] = (Alternatives(Hypothesis(base, base.score, ()), screened),)
-    else:
-        alternatives = hypothesis.alternatives or find_alternatives(hypothesis, target, effects, parallel_map)
-    for effect, alternative in zip(hypothesis.effects, alternatives, strict=True):
-        without = alternative.without
-        scores = {each.effect.cause: each.score_gain(without.fit) for each in reversed(alternative.screened)}
-        score = max(scores.get(effect.cause, 0.0), without.cost - hypothesis.cost)
-        scores[effect.cause] = score
-        name, family, values = effect.cause, effect.family, _get_values(hypothesis.fit, effect, deviations)
-        if (confounder := find_confounder(hypothesis.fit, effect, target)) is not None:
-            scores[confounder.effect.cause] = score + confounder.score_gain
-            if confounder.score_gain > 0.0:
-                name, family = confounder.effect.cause, confounder.effect.family
-                values = _scale_values(confounder, values, hypothesis.fit)
-        equal = {each for each, score in scores.items() if score > scores[name] - EQUIVALENCE_MARGIN} - {name}
-        equivalents += [each for each in alternative.screened if each.effect.cause in equal]
-        reference = choose_reference_fit(hypothesis, without.fit, target)
-        findings.append(
-            Finding(
-                name,
-                family,
-                _compute_confidence(scores[name], scores),
-                tuple(sorted(equal, key=lambda name: -scores[name])),
-                values,
-                scores[name],
-                explained_fraction(reference, hypothesis.fit, floor),
-            )
-        )
-    return tuple(findings), tuple(equivalents)
-
-
-def _compute_confidence(score: float, scores: Mapping[str, float]) -> float:
-    alternatives = (*scores.values(), 0.0)  # 0: no effect at all
-    return 1.0 / sum(
-        float(np.exp(min(other - score, 0.0) / (2 * CONFIDENCE_TEMPERATURE))) for other in alternatives
-    )
-
-
-def _scale_values(
-    confounder: Confounder, values: Mapping[str, Value], fit: CalibrationResult
-) -> Mapping[str, Value]:
-    """Return the values of a confounder, given those of the effect that it replaces."""
-    parameters = confounder.effect.parameters(fit.simulation.context)
-    scaled = {}
-    for parameter, each in zip(parameters, values.values(), strict=True):
-        low, high = each.ci95 or (each.value, each.value)
-        ci95 = None if each.ci95 is None else (confounder.factor * low, confounder.factor * high)
-        scaled[parameter.name] = Value(confounder.factor * each.value, parameter.unit, ci95)
-    return scaled
-
-
-def _get_values(fit: CalibrationResult, effect: Effect, deviations: Signal) -> Mapping[str, Value]:
-    """Return the values of an effect with their confidence intervals, given all standard deviations.
-
-    Initial states of recordings after the first are left out.
-    """
-    part = fit.simulation.get_slice(effect)
-    values = {}
-    for index in range(part.start, part.stop):
-        if fit.simulation.is_copy[index]:
-            continue
-        parameter, value = fit.simulation.parameters[index], float(fit.values[index])
-        half_width = 1.96 * float(deviations[index])
-        values[parameter.name] = Value(value, parameter.unit, (value - half_width, value + half_width))
-    return values

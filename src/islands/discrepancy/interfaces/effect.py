@@ -54,6 +54,9 @@ class Effect:
     is_gain : bool
         Whether the effect is a gain. Gains are searched for only if every parameter except initial states has
         a tolerance; otherwise calibration absorbs them.
+    is_free : bool
+        Whether the effect is a free form, which has any shape of its family. It has one starting point for
+        each coefficient, and its calibration starts from their best combination.
     extra_degrees_of_freedom : int
         Degrees of freedom added to the number of parameters in the information criterion, for example for an
         instant or a frequency that is selected among all samples.
@@ -77,6 +80,7 @@ class Effect:
     is_applicable: Callable[[SimulationContext], bool] = lambda _: True
     linear_parameters: int = 1
     is_gain: bool = False
+    is_free: bool = False
     extra_degrees_of_freedom: int = 0
     confounded_with: "tuple[Effect, float] | None" = None
     similar_to: str = ""

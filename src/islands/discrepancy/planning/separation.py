@@ -9,8 +9,8 @@ from math import log, sqrt
 
 import scipy
 
+from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
-from islands.discrepancy.inference.verdict import EQUIVALENCE_MARGIN
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.planning.experiment import Experiment
 

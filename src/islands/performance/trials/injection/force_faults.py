@@ -59,3 +59,34 @@ def parallel(rng: np.random.Generator, strength: float) -> Force:
 def hysteresis(_rng: np.random.Generator, strength: float) -> Force:
     """Restoring Bouc-Wen element: its force always opposes the motion."""
     return lambda _q, w, z: (-strength * z, 1.0 - 2.4 * copysign(1.0, w) * z - 0.4 * abs(z))
+
+
+def position_damping(_rng: np.random.Generator, strength: float) -> Force:
+    """Damping that grows with the square of the coordinate (van der Pol)."""
+    return lambda q, w, _z: (-strength * q * q * w, 0.0)
+
+
+def tanh_spring(_rng: np.random.Generator, strength: float) -> Force:
+    """Spring that saturates at a third of the typical coordinate."""
+    return lambda q, _w, _z: (-strength * tanh(3.0 * q), 0.0)
+
+
+def product(rng: np.random.Generator, strength: float) -> Force:
+    """Product of coordinate and rate."""
+    c = random_sign(rng) * strength
+    return lambda q, w, _z: (c * q * w, 0.0)
+
+
+def fifth_power(_rng: np.random.Generator, strength: float) -> Force:
+    """Stiffness by the fifth power of the coordinate."""
+    return lambda q, _w, _z: (-strength * q * q * q * q * q, 0.0)
+
+
+def cubic_damping(_rng: np.random.Generator, strength: float) -> Force:
+    """Damping by the third power of the rate."""
+    return lambda _q, w, _z: (-strength * w**3, 0.0)
+
+
+def position_friction(_rng: np.random.Generator, strength: float) -> Force:
+    """Dry friction that grows with the distance from the origin."""
+    return lambda q, w, _z: (-strength * abs(q) * tanh(30.0 * w), 0.0)

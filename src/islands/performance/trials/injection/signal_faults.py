@@ -215,3 +215,20 @@ def ripple(lower: float, upper: float) -> Make:
         return lambda drive, y: y + strength * drive.peak_output * np.sin(2 * np.pi * y / period)
 
     return make
+
+
+def power_law(rng: np.random.Generator, strength: float) -> Map:
+    """Characteristic of a pump: a power of the signal, relative to its peak."""
+    exponent = float(np.exp(random_sign(rng) * strength))
+    return lambda drive, u: drive.peak_input * np.sign(u) * np.abs(u / drive.peak_input) ** exponent
+
+
+def slow_modulation(rng: np.random.Generator, strength: float) -> Map:
+    """Gain that oscillates slowly, one and a half to four periods over the record."""
+    periods, phase = float(rng.uniform(1.5, 4.0)), float(rng.uniform(0.0, 2 * np.pi))
+
+    def modulate(drive: Excitation, y: Signal) -> Signal:
+        angle = 2 * np.pi * periods * drive.time / drive.time[-1] + phase
+        return y * (1.0 + strength * np.sin(angle))
+
+    return modulate

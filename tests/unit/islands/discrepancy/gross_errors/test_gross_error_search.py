@@ -13,7 +13,7 @@ from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.gross_errors.gross_error_search import limit_to_tolerances
 from islands.discrepancy.inference.verdict import Verdict
 from islands.errors import RecordError
-from islands.figures.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import PhysicalSpec

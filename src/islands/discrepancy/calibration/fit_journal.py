@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from islands.discrepancy.inference.starts_calibrator import CalibrationTask, StartsCalibrator
+from islands.discrepancy.calibration.starts_calibrator import CalibrationTask, StartsCalibrator
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 

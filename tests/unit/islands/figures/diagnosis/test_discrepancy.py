@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.figures.discrepancy import DISCREPANCY_FIGURES, draw_residual, draw_screening
+from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES, draw_residual, draw_screening
 from islands.figures.style import save
 
 pytestmark = pytest.mark.usefixtures("without_layout")

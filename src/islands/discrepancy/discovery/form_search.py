@@ -1,0 +1,89 @@
+"""Search for free forms that explain a record clearly better than named effects.
+
+A named effect is claimed only if its shape is that of the record: a free form of the same or another family,
+in its place or in addition, must not explain much more.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from operator import attrgetter
+
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN
+from islands.discrepancy.inference.hypothesis import Hypothesis, with_effect, without_effect
+from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
+from islands.discrepancy.inference.stepwise_search import eliminate_backward, refit_with_ar_noise
+from islands.discrepancy.inference.strategies import SearchOutcome
+from islands.discrepancy.interfaces.effect import Effect
+from islands.discrepancy.interfaces.parallel import ParallelMap
+
+#: Fraction of the misfit that free forms explain, from which named effects are claimed. A form of the
+#: catalogue is an idealisation, such as a smoothed sign for dry friction.
+MIN_NAMED_FRACTION = 0.9
+
+#: Maximum number of free forms of a hypothesis.
+MAX_FORMS = 2
+
+
+def search_free_forms(
+    outcome: SearchOutcome, forms: Sequence[Effect], parallel_map: ParallelMap = map
+) -> SearchOutcome | None:
+    """Replace effects by free forms, or add free forms, as long as these explain clearly more.
+
+    Parameters
+    ----------
+    outcome : SearchOutcome
+        Result of a search for named effects.
+    forms : sequence of Effect
+        Free forms that apply to the simulation.
+    parallel_map : ParallelMap
+        Calibrates the extended simulations.
+
+    Returns
+    -------
+    SearchOutcome or None
+        Outcome with free forms, not assessed yet; their screening is added to that of the effects. None if
+        the named effects explain as much.
+    """
+    base, target, found = outcome.base, outcome.target, outcome.hypothesis
+    alone = Hypothesis(base, base.score, ())
+    screened = screen_effects(base, target, forms, parallel_map)
+    for _ in range(MAX_FORMS):
+        starts = [(alone, screened)]
+        others = [found] if found.effects else []
+        if len(found.effects) > 1:
+            others += [
+                without_effect(found, effect, target) for effect in found.effects if not effect.is_free
+            ]
+        for hypothesis in others:
+            unused = [form for form in forms if form not in hypothesis.effects]
+            starts.append((hypothesis, screen_effects(hypothesis.fit, target, unused, parallel_map)))
+        extended = [
+            eliminate_backward(with_effect(hypothesis, ranked[0]), target, EQUIVALENCE_MARGIN)
+            for hypothesis, ranked in starts
+            if ranked
+        ]
+        beam, refitted = refit_with_ar_noise(sorted(extended, key=attrgetter("rank")), target)
+        if not beam or not _explains_more(beam[0], found, outcome):
+            break
+        found, target = beam[0], refitted
+    if found is outcome.hypothesis:
+        return None
+    return replace(
+        outcome, hypothesis=found, target=target, screened=_merge(base, outcome.screened, screened)
+    )
+
+
+def _explains_more(new: Hypothesis, old: Hypothesis, outcome: SearchOutcome) -> bool:
+    """Return whether a hypothesis is better than another one by the margin of equivalents and in size."""
+    before = outcome.base.mean_square
+    explained = before - old.fit.mean_square
+    is_larger = explained < MIN_NAMED_FRACTION * (before - new.fit.mean_square)
+    return new.cost < old.cost - EQUIVALENCE_MARGIN and is_larger
+
+
+def _merge(
+    base: CalibrationResult, one: Sequence[ScreenedEffect], other: Sequence[ScreenedEffect]
+) -> list[ScreenedEffect]:
+    """Return screened effects and forms, the best first."""
+    return sorted((*one, *other), key=lambda each: -each.score_gain(base))

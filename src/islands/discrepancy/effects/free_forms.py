@@ -1,0 +1,277 @@
+"""Free forms: effects whose shape is not assumed, with one coefficient for each part of the shape.
+
+A named effect assumes a shape with one or two parameters. The free form of the same family at the same place
+contains that shape approximately. It fits better only if the measured shape is another one.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from islands.discrepancy.effects.filters import low_pass
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Map, Signal, SimulationContext, Site
+from islands.systems.curve import VALUES, interpolate, interpolate_curve
+from islands.systems.hysteresis_operators import play_from
+
+#: Places of the values of a curve, relative to the peak of its signal. The straight line through its ends is
+#: a gain and an offset, which are not part of the curve (terminal-based linearity).
+PLACES = np.linspace(-1.0, 1.0, VALUES + 2)[1:-1]
+
+#: Range of the rates of a damping curve, relative to the typical rate.
+RATE_RANGE = 3.0
+
+#: Time constants of a free filter: from the sampling time to this fraction of the estimation part.
+TIME_CONSTANTS, LONGEST = 6, 0.1
+
+#: Half widths of the plays of a free memory, relative to the peak of the signal.
+HALF_WIDTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
+
+#: Starting value and typical change of a coefficient, relative to the signal that the form is added to.
+START, CHANGE = 0.02, 0.01
+
+_Text = Callable[[SimulationContext], str]
+_Number = Callable[[SimulationContext], float]
+
+
+def _make_free_form(
+    name: str,
+    summary: str,
+    family: str,
+    site: Site,
+    form: Map | ForceLaw,
+    source: str,
+    similar_to: str,
+    distinguished_by: str,
+    labels: Callable[[SimulationContext], Sequence[str]],
+    unit: _Text = lambda _: "",
+    size: _Number = lambda _: 1.0,
+) -> Effect:
+    """Return an effect with a coefficient for each label, whose typical value is a fraction of ``size``."""
+
+    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+        change = CHANGE * size(context)
+        return tuple(Parameter(label, unit(context), 0.0, change) for label in labels(context))
+
+    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        starts = START * size(context) * np.eye(len(labels(context)))
+        return tuple(tuple(start) for start in starts.tolist())
+
+    return Effect(
+        name=name,
+        summary=summary,
+        family=family,
+        site=site,
+        parameters=parameters,
+        starting_points=starting_points,
+        form=form,
+        source=source,
+        linear_parameters=0,
+        is_free=True,
+        similar_to=similar_to,
+        distinguished_by=distinguished_by,
+    )
+
+
+def _label_places(_context: SimulationContext) -> list[str]:
+    return [f"at {place:g}" for place in PLACES]
+
+
+def _label_times(context: SimulationContext) -> list[str]:
+    return [f"at {time:.3g} s" for time in _times(context)[1:]]
+
+
+def _label_half_widths(_context: SimulationContext) -> list[str]:
+    return [f"play {half_width:g}" for half_width in HALF_WIDTHS]
+
+
+def _label_time_constants(context: SimulationContext) -> list[str]:
+    return [f"tau {tau:.3g} s" for tau in _time_constants(context)]
+
+
+def _times(context: SimulationContext) -> Signal:
+    return np.linspace(0.0, context.fit_end_time, VALUES + 2)
+
+
+def _time_constants(context: SimulationContext) -> Signal:
+    return np.geomspace(context.dt, LONGEST * context.fit_end_time, TIME_CONSTANTS)
+
+
+def _input_curve(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return u + interpolate_curve(u / context.input_peak, values)
+
+
+def _output_curve(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + interpolate_curve(y / context.output_peak, values)
+
+
+def _stiffness_force(x: float, _rate: float, _z: float, numbers: Any) -> float:
+    return interpolate(x / numbers[VALUES], numbers)
+
+
+def _damping_force(_x: float, rate: float, _z: float, numbers: Any) -> float:
+    return interpolate(rate / numbers[VALUES], numbers)
+
+
+def _add_low_passes(signal: Signal, values: Signal, context: SimulationContext) -> Signal:
+    parts = [low_pass(signal, tau, context.dt) - signal for tau in _time_constants(context)]
+    return signal + values @ np.array(parts)
+
+
+def _add_plays(signal: Signal, values: Signal, peak: float) -> Signal:
+    return signal + values @ np.array([play_from(signal, part * peak) - signal for part in HALF_WIDTHS])
+
+
+def _interpolate_time(values: Signal, context: SimulationContext) -> Signal:
+    """Return a curve over time that is zero at the start; the last value is held in the hold-out part."""
+    return np.interp(context.time, _times(context), [0.0, *values])
+
+
+def _multiply_over_time(signal: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return signal * (1.0 + _interpolate_time(values, context))
+
+
+_CURVE = "IEC 61298-2, terminal-based linearity"
+_FILTER = "Ljung, System Identification, section 4"
+_MEMORY = "Kuhnen, Modeling, identification and compensation of complex hysteretic nonlinearities, 2003"
+_CHANGE = "Niedzwiecki, Identification of Time-Varying Processes"
+
+#: The free forms, in the order in which maps act on a signal.
+FREE_FORMS: tuple[Effect, ...] = (
+    _make_free_form(
+        "input-filter",
+        "Any slow linear dynamics of the input: a sum of low-passes with six time constants",
+        "timing",
+        Site.INPUT,
+        _add_low_passes,
+        _FILTER,
+        "delay, output-filter",
+        "amplitude and phase that change with the frequency, also at small amplitudes",
+        _label_time_constants,
+    ),
+    _make_free_form(
+        "input-memory",
+        "Any hysteresis of the input: a sum of plays with five half widths",
+        "memory",
+        Site.INPUT,
+        lambda u, values, context: _add_plays(u, values, context.input_peak),
+        _MEMORY,
+        "backlash, stiction, output-memory",
+        "loops that do not become thinner when the input is slower",
+        _label_half_widths,
+    ),
+    _make_free_form(
+        "input-curve",
+        "Any static characteristic of the input: a curve through seven values",
+        "shape",
+        Site.INPUT,
+        _input_curve,
+        _CURVE,
+        "dead-zone, input-saturation, output-curve",
+        "a curve of the residual over the input, the same in both directions",
+        _label_places,
+        lambda context: context.input_unit,
+        lambda context: context.input_peak,
+    ),
+    _make_free_form(
+        "input-gain-curve",
+        "Any change of the gain of the input over time: a curve through eight values",
+        "change",
+        Site.INPUT,
+        _multiply_over_time,
+        _CHANGE,
+        "gain-step, ageing, output-gain-curve",
+        "a residual proportional to the input, with a factor that changes over time",
+        _label_times,
+    ),
+    _make_free_form(
+        "damping-curve",
+        "Any force that depends on the rate: a curve through seven values",
+        "memory",
+        Site.FORCE,
+        ForceLaw(
+            _damping_force,
+            constants=lambda context: (RATE_RANGE * context.force_coordinate.rate,),
+            is_dissipative=True,
+        ),
+        _CURVE,
+        "viscous, coulomb-friction, quadratic-drag",
+        "a curve of the residual over the rate, the same at all places",
+        _label_places,
+        lambda context: context.force_coordinate.force_unit,
+        lambda context: context.force_coordinate.force,
+    ),
+    _make_free_form(
+        "stiffness-curve",
+        "Any force that depends on the coordinate: a curve through seven values",
+        "shape",
+        Site.FORCE,
+        ForceLaw(_stiffness_force, constants=lambda context: (context.force_coordinate.peak,)),
+        _CURVE,
+        "cubic-stiffness, even-nonlinearity, input-curve",
+        "a curve of the residual over the coordinate, the same at all rates",
+        _label_places,
+        lambda context: context.force_coordinate.force_unit,
+        lambda context: context.force_coordinate.force,
+    ),
+    _make_free_form(
+        "output-filter",
+        "Any slow linear dynamics of the output: a sum of low-passes with six time constants",
+        "timing",
+        Site.OUTPUT,
+        _add_low_passes,
+        _FILTER,
+        "sensor-lag, exponential-creep, input-filter",
+        "amplitude and phase that change with the frequency, also at small amplitudes",
+        _label_time_constants,
+    ),
+    _make_free_form(
+        "output-memory",
+        "Any hysteresis of the output: a sum of plays with five half widths",
+        "memory",
+        Site.OUTPUT,
+        lambda y, values, context: _add_plays(y, values, context.output_peak),
+        _MEMORY,
+        "second-hysteresis, input-memory",
+        "loops that do not become thinner when the input is slower",
+        _label_half_widths,
+    ),
+    _make_free_form(
+        "output-curve",
+        "Any static characteristic of the output: a curve through seven values",
+        "shape",
+        Site.OUTPUT,
+        _output_curve,
+        _CURVE,
+        "output-saturation, absolute-value-sensor, input-curve",
+        "a curve of the residual over the output, the same in both directions",
+        _label_places,
+        lambda context: context.output_unit,
+        lambda context: context.output_peak,
+    ),
+    _make_free_form(
+        "output-gain-curve",
+        "Any change of the gain of the output over time: a curve through eight values",
+        "change",
+        Site.OUTPUT,
+        _multiply_over_time,
+        _CHANGE,
+        "gain-step, ageing, input-gain-curve",
+        "a residual proportional to the output, with a factor that changes over time",
+        _label_times,
+    ),
+    _make_free_form(
+        "baseline-curve",
+        "Any drift of the output: a curve over time through eight values",
+        "baseline",
+        Site.OUTPUT,
+        lambda y, values, context: y + _interpolate_time(values, context),
+        _CHANGE,
+        "linear-drift, jump, thermal-drift",
+        "a slow residual that depends on the time alone",
+        _label_times,
+        lambda context: context.output_unit,
+        lambda context: context.output_peak,
+    ),
+)

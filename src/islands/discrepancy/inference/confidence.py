@@ -1,0 +1,81 @@
+"""Confidence of a named cause among its alternatives, from the differences in the blocks of the record.
+
+A likelihood that treats the residual as noise is too certain if the form of the simulation is wrong: scores
+then differ by hundreds where the blocks of the record contradict each other. Weights of the alternatives are
+therefore averaged over a Bayesian bootstrap of the blocks (pseudo-BMA+: Yao, Vehtari, Simpson and Gelman,
+Using stacking to average Bayesian predictive distributions, 2018).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
+from islands.discrepancy.interfaces.effect import Signal
+
+#: Number of blocks of equal length into which the estimation part is divided.
+BLOCKS = 36
+
+#: Number of draws of the weights of the blocks.
+DRAWS = 2000
+
+#: Temperature of a difference of scores without blocks. Without it, a confidence of 0.97 is right in 0.72 of
+#: the cases.
+TEMPERATURE = 2.0
+
+#: Seed of the draws. It is fixed, so that the same fits have the same confidence.
+SEED = 36
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScoredAlternative:
+    """A cause, with its differences to others in the blocks of the record.
+
+    Attributes
+    ----------
+    score : float
+        Score gain in minus twice the log-likelihood, less the BIC penalty.
+    squares : ndarray, shape (BLOCKS,), or None
+        Sums of the squared residuals in the blocks, whitened, in units of their variance. None if the
+        simulation is that of the named cause.
+    """
+
+    score: float
+    squares: Signal | None
+
+
+def sum_squares_by_block(fit: CalibrationResult, reference: CalibrationResult, target: Target) -> Signal:
+    """Return the sums of squares of the residual of a fit, whitened by the noise model of another one.
+
+    Returns
+    -------
+    ndarray, shape (BLOCKS,)
+    """
+    noise = reference.noise
+    squares = noise.whiten(target.y - fit.output, target.segments)[target.estimation_part] ** 2
+    edges = np.linspace(0, squares.size, BLOCKS + 1).astype(int)[:-1]
+    weight = noise.effective_samples / squares.size
+    sums: Signal = weight * np.add.reduceat(squares, edges) / noise.variance
+    return sums
+
+
+def compute_confidence(named: ScoredAlternative, others: Sequence[ScoredAlternative]) -> float:
+    """Return the mean weight of a cause among its alternatives over bootstrapped blocks, from 0 to 1.
+
+    The noise model of an alternative explains a part of its misfit as colour. Differences in the blocks have
+    therefore a larger sum than the scores have, and are scaled down to it.
+    """
+    draws = np.random.default_rng(SEED).dirichlet(np.ones(BLOCKS), DRAWS) * BLOCKS - 1.0
+    leads = []
+    for other in others:
+        lead = named.score - other.score
+        if named.squares is None or other.squares is None:
+            leads.append(np.full(DRAWS, lead / TEMPERATURE))
+            continue
+        losses = other.squares - named.squares
+        total = abs(float(losses.sum()))
+        scale = min(1.0, abs(lead) / total) if total else 0.0
+        leads.append(lead + scale * (draws @ losses))
+    return float(np.mean(scipy.special.expit(-scipy.special.logsumexp(-np.array(leads) / 2, axis=0))))

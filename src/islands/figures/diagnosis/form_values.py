@@ -1,0 +1,34 @@
+"""Figure of free forms: the coefficients that describe the shape of an effect without a name."""
+
+from matplotlib.figure import Figure
+
+from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.inference.finding import Finding
+from islands.figures.style import FRAME, SIMULATED, blank, finish, house_style, label
+
+
+def list_free_forms(diagnosis: Diagnosis) -> list[Finding]:
+    """Return the findings of a diagnosis that are free forms."""
+    return [each for each in diagnosis.effects if each.name in CATALOGUE and CATALOGUE[each.name].is_free]
+
+
+@house_style()
+def draw_free_forms(diagnosis: Diagnosis) -> Figure:
+    """Draw the coefficients of each free form with their 95 % intervals, one panel for each form."""
+    forms = list_free_forms(diagnosis)
+    figure = blank(0.4 + 2.4 * len(forms), "Free forms: values with 95 % intervals")
+    panels = figure.subplots(len(forms), 1, squeeze=False)[:, 0]
+    for axes, form in zip(panels, forms, strict=True):
+        values = list(form.parameters.values())
+        middle = [each.value for each in values]
+        bounds = [each.ci95 or (each.value, each.value) for each in values]
+        errors = [
+            [value - low for value, (low, _) in zip(middle, bounds, strict=True)],
+            [high - value for value, (_, high) in zip(middle, bounds, strict=True)],
+        ]
+        axes.errorbar(range(len(values)), middle, errors, color=SIMULATED, marker="o", ms=4, capsize=3)
+        axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
+        axes.set_xticks(range(len(values)), list(form.parameters))
+        axes.set_ylabel(label(form.name, values[0].unit))
+    return finish(figure)

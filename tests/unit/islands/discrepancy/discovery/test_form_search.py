@@ -1,0 +1,66 @@
+"""Free forms: the shape of a record is found, and known shapes keep their names."""
+
+import numpy as np
+import pytest
+
+import islands
+from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.effects.filters import low_pass
+from islands.discrepancy.effects.free_forms import FREE_FORMS, PLACES
+from islands.discrepancy.interfaces.context import SimulationContext
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.recorded_output import RecordedOutput
+from islands.figures.diagnosis.form_values import draw_free_forms
+from islands.io.simulator_spec.document import extended_document
+from islands.io.simulator_spec.factory import simulate_spec
+from support.simulated_records import recorded, wave
+
+U = wave(2000) / 20.0
+THEIRS = low_pass(U, 0.05, 0.01)
+NOISE = 0.01 * np.random.default_rng(4).standard_normal(U.size)
+
+
+def diagnose(y: np.ndarray) -> islands.discrepancy.diagnosis_result.Diagnosis:
+    return islands.diagnose(recorded(U, y + NOISE), "column:theirs", columns={"theirs": THEIRS})
+
+
+@pytest.mark.ci
+def test_curve_of_no_listed_form_is_a_family_with_its_shape() -> None:
+    peak = float(np.max(np.abs(THEIRS)))
+
+    def characteristic(place: np.ndarray) -> np.ndarray:
+        return 0.1 * np.sin(2 * np.pi * place) * (1.0 - place**2) + 0.1 * np.cos(np.pi * place / 2) ** 4
+
+    found = diagnose(THEIRS + characteristic(THEIRS / peak))
+    assert str(found.verdict) == "family"
+    (form, *_) = found.effects
+    assert (form.name, form.family) == ("output-curve", "shape")
+    values = [each.value for each in form.parameters.values()]
+    np.testing.assert_allclose(values, characteristic(PLACES), atol=0.01)
+    assert found.gain is not None
+    assert found.gain.after.rmse == pytest.approx(0.01, rel=0.2)
+    assert len(draw_free_forms(found).axes) == 1
+    # The extended simulation contains the shape.
+    document = extended_document(found.best, found.record)
+    saved = simulate_spec(document, found.record, columns={"theirs": THEIRS})
+    np.testing.assert_allclose(saved, found.best.output, rtol=1e-9)
+
+
+@pytest.mark.ci
+def test_listed_shape_keeps_its_name() -> None:
+    found = diagnose(THEIRS + 0.02 * U**2)
+    assert str(found.verdict) == "named"
+    assert [each.name for each in found.effects] == ["even-nonlinearity"]
+
+
+@pytest.mark.parametrize("form", FREE_FORMS, ids=lambda form: form.name)
+def test_free_form_vanishes_at_its_nominal_values(form: islands.Effect) -> None:
+    assert CATALOGUE[form.name] is form
+    context = SimulationContext(U, 0.01, {}, {}, 2.0, 2.0, "V", "V", 15.0)
+    simulation = ExtendedSimulator(RecordedOutput("theirs", U), (form,), context)
+    np.testing.assert_allclose(simulation.simulate(simulation.nominal), U, atol=1e-12)
+    moved = simulation.nominal + 0.02 * np.eye(simulation.nominal.size)
+    assert (
+        np.linalg.matrix_rank(simulation.simulate_batch(moved) - U)
+        >= simulation.nominal.size - (form.site == "input map") * simulation.nominal.size
+    )
