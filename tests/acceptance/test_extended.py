@@ -114,6 +114,7 @@ def test_equations_are_simulated_without_a_diagnosis(tmp_path: Path) -> None:
     assert "free runs only" in fail("simulate", path, tmp_path / "record.csv", "--mode", "one-step")
 
 
+@pytest.mark.ci
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 def test_an_fmu_is_simulated_without_a_diagnosis(tmp_path: Path) -> None:
     case = made()["fmu"]

@@ -39,8 +39,16 @@ def sample_channel(context: SimulationContext, name: str, samples: int) -> Signa
 
 
 def make_nominal_context(record: Dataset) -> SimulationContext:
-    """Return the context of a simulation that determines scales: that of the longest recording."""
+    """Return the context of a simulation that determines scales: that of the longest recording.
+
+    Raises
+    ------
+    RecordError
+        The recording has one sample.
+    """
     part = record.longest_segment
+    if part.samples < 2:
+        raise RecordError(f"the record has {part.samples} sample, and a simulation needs two: give more rows")
     names, units = part.input_names, part.input_units
     signals = {name: np.ascontiguousarray(u) for name, u in zip(names, part.u.T, strict=True)}
     return SimulationContext(

@@ -60,6 +60,7 @@ def draw_separability(isolability: Isolability, title: str = "") -> Figure:
         norm=LogNorm(*_RANGE),
         edgecolor="white",
         lw=0.4,
+        rasterized=True,  # a path for each cell makes the file three times as large
     )
     for down, row in enumerate(isolability.rows):
         for across, misfit in enumerate(row.misfits):

@@ -16,6 +16,7 @@ from islands.errors import RecordError
 from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.simulator_spec.factory import make_simulator
+from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import PhysicalSpec
 from support.simulated_records import DT, recorded, simulate_oscillator, wave
 
@@ -130,8 +131,17 @@ def test_record_without_a_gross_error_has_no_finding() -> None:
 
 
 def test_sampling_time_at_which_the_simulation_diverges_is_advised() -> None:
+    document = {
+        "name": "oscillator",
+        "input": "F",
+        "output": "x",
+        "equations": "dx/dt = v\ndv/dt = (F - c*v - k*x)/m\n",
+        "parameters": {"m": {"value": 0.5}, "c": {"value": 4.0}, "k": {"value": 200.0}},
+        "steps": 1,
+    }
+    simulator = make_simulator(OdeSpec.model_validate({"kind": "ode", **document}), RECORD)
     with pytest.raises(RecordError, match=r"diverges on this input.* Give --dt 0.01 "):
-        run(replace(RECORD, dt=1000 * DT))
+        diagnose(replace(RECORD, dt=1000 * DT), simulator, TOLERANCE, catalogue=())
 
 
 def test_free_parameters_absorb_a_unit_but_not_the_sign() -> None:
