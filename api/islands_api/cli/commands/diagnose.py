@@ -30,6 +30,7 @@ from islands_api.cli.console import Display, compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
+from islands_api.cli.runs.diagnosis_fits import keep_fits
 from islands_api.cli.runs.plan_run import (
     PLAN,
     PlanOptions,
@@ -113,7 +114,8 @@ def diagnose(
         tolerances = options.tolerances(tolerance or [])
         with _parallel_map(workers, tested) as parallel:
             began = perf_counter()
-            diagnosis = run_diagnosis(data, simulator, tolerances, seed, show, parallel)
+            with keep_fits(out) as fits:
+                diagnosis = run_diagnosis(data, simulator, tolerances, seed, show, fits.record(parallel))
             show("a formula for the unexplained residual", 0.8)
             formula = explain_residual(diagnosis, seed)
             wall = perf_counter() - began

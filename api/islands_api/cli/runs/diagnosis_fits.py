@@ -1,0 +1,41 @@
+"""Fits of an interrupted diagnosis in its output folder, from which the same command continues."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from islands.discrepancy.calibration.fit_journal import FitJournal, journal_from_document
+from islands_api.cli.console import errors
+
+#: File of the fits in the output folder.
+FITS = "fits.json"
+
+
+@contextmanager
+def keep_fits(folder: Path) -> Iterator[FitJournal]:
+    """Yield the fits of an interrupted diagnosis; write them again if this one is interrupted as well.
+
+    They are deleted when the diagnosis has ended. Fits of another diagnosis, or a damaged file, cost only
+    time.
+    """
+    path = folder / FITS
+    journal = _read(path)
+    try:
+        yield journal
+    except KeyboardInterrupt:
+        folder.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(journal.to_document()))
+        errors.print(f"interrupted; {path} keeps what is known: the same command continues", markup=False)
+        raise
+    path.unlink(missing_ok=True)
+
+
+def _read(path: Path) -> FitJournal:
+    if not path.exists():
+        return FitJournal()
+    try:
+        return journal_from_document(json.loads(path.read_text()))
+    except (ValueError, TypeError):
+        errors.print(f"{path} is damaged: the diagnosis starts again", markup=False)
+        return FitJournal()
