@@ -43,6 +43,9 @@ MIN_PERIOD = 16
 #: Largest accepted difference between two periods, in standard deviations of the input.
 PERIOD_TOLERANCE = 1e-3
 
+#: The same for lags that are examined, since the rounding of sums of squares is larger.
+CANDIDATE_TOLERANCE = 0.1
+
 
 def explainable_variance(
     residual: Signal,
@@ -158,9 +161,12 @@ def detect_period(u: Signal) -> int | None:
     n = u.size
     centred = u - u.mean()
     std = float(np.std(u))
-    products = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * n)) ** 2)[: n // 2 + 1]
-    correlation = products / (n - np.arange(products.size)) / max(std**2, np.finfo(float).tiny)
-    for lag in np.flatnonzero(correlation > 0.9):
+    lags = np.arange(n // 2 + 1)
+    products = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * n)) ** 2)[: lags.size]
+    # The sum of (u[k + lag] - u[k])^2: the squares of all but the last and all but the first samples.
+    energy = np.concatenate([[0.0], np.cumsum(centred**2)])
+    differences = (energy[n - lags] + energy[n] - energy[lags] - 2.0 * products) / (n - lags)
+    for lag in np.flatnonzero(differences < (CANDIDATE_TOLERANCE * std) ** 2):
         if lag < MIN_PERIOD:
             continue
         if float(np.std(u[lag:] - u[:-lag])) < PERIOD_TOLERANCE * std:
