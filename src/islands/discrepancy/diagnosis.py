@@ -44,7 +44,7 @@ from islands.discrepancy.inference.strategies import (
     search_with_ar_noise,
     search_with_model_error,
 )
-from islands.discrepancy.inference.verdict import Verdict, choose_reference_fit, explained_fraction
+from islands.discrepancy.inference.verdict import Verdict, choose_reference_fit, classify, explained_fraction
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances
@@ -202,7 +202,8 @@ def _extend_equations(
 ) -> Diagnosis:
     """Return the diagnosis with discovered terms in place of effects, if the hold-out part confirms them.
 
-    Its error has to be smaller with them than without, and not larger than with the effects.
+    Its error has to be smaller with them than without, and not larger than with the effects. The terms have
+    to explain as much as effects would have to.
     """
     record, fitted = found.record, found.estimation_samples
     fit = fit_initial_states(search.fit, target, fitted)
@@ -213,6 +214,13 @@ def _extend_equations(
         return found
     residual, output = (record.y - fit.output)[:fitted], fit.output[:fitted]
     context = fit.simulation.context
+    structure = find_residual_structure(residual, output, context, rng)
+    explained = explained_fraction(found.base, fit, floor**2)
+    if (
+        classify(explained, has_effects=True, has_remainder=bool(structure), is_model_error=False)
+        == Verdict.UNKNOWN
+    ):
+        return found
     return replace(
         found,
         verdict=Verdict.DISCOVERED,
@@ -221,7 +229,7 @@ def _extend_equations(
             *describe_noise(record.y[:fitted], residual, context),
         ),
         gain=gain,
-        residual_structure=find_residual_structure(residual, output, context, rng),
+        residual_structure=structure,
         suggested_experiment="",
         best=fit,
         noise_floor=floor,
