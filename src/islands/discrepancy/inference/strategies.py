@@ -157,7 +157,8 @@ def assess_evidence(
     base, target = outcome.base, outcome.target
     hypothesis = remove_chance_effects(outcome.hypothesis, base, target, effects)
     hypothesis = validate_out_of_sample(hypothesis, base, target, fitted, rng)
-    hypothesis = withdraw_effects(hypothesis, target, fitted, rng)
+    if target.effective_samples is not None:
+        hypothesis = withdraw_effects(hypothesis, target, fitted, rng)
     context, output = hypothesis.fit.simulation.context, hypothesis.fit.output[:fitted]
     residual = target.y[:fitted] - output
     explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
