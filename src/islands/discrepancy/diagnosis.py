@@ -23,7 +23,7 @@ from islands.discrepancy.calibration.preparation import (
 )
 from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
 from islands.discrepancy.discovery.discovery import Discovery, describe_terms, discover_terms
-from islands.discrepancy.discovery.form_search import search_free_forms
+from islands.discrepancy.discovery.form_search import compare_with_free_forms
 from islands.discrepancy.discovery.term_search import TermSearchResult
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.findings import describe_gross_errors, describe_noise, list_record_findings
@@ -146,7 +146,7 @@ def diagnose(
     if outcome.verdict != Verdict.NOTHING:
         progress("comparing with free forms", 0.9)
         forms = select_effects(simulator, context, prior_std, catalogue, free=True)
-        outcome = _compare_with_free_forms(outcome, forms, fitted, (*effects, *forms), rng, parallel_map)
+        outcome = compare_with_free_forms(outcome, forms, fitted, (*effects, *forms), rng, parallel_map)
         effects = [*effects, *(form for form in forms if form in outcome.hypothesis.effects)]
     found = _make_diagnosis(record, outcome, base, effects, fitted, rng, progress, parallel_map)
     if outcome.verdict != Verdict.NOTHING or outcome.hypothesis.fit.noise.order:
@@ -156,23 +156,6 @@ def diagnose(
             found = _extend_equations(found, *discovered, target, rng)
     closed_loop = find_closed_loop(found.best, record.y, fitted, record.input_names[0])
     return replace(found, record_findings=(*record_findings, *closed_loop))
-
-
-def _compare_with_free_forms(
-    outcome: SearchOutcome,
-    forms: Sequence[Effect],
-    fitted: int,
-    effects: Sequence[Effect],
-    rng: np.random.Generator,
-    parallel_map: ParallelMap,
-) -> SearchOutcome:
-    """Return the outcome with free forms if they explain clearly more and withstand the same tests."""
-    freer = search_free_forms(outcome, forms, parallel_map)
-    if freer is None:
-        return outcome
-    assessed = assess_evidence(freer, fitted, effects, rng)
-    has_forms = any(effect.is_free for effect in assessed.hypothesis.effects)
-    return assessed if has_forms and assessed.verdict != Verdict.UNKNOWN else outcome
 
 
 def _make_gross_diagnosis(

@@ -8,12 +8,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from operator import attrgetter
 
+import numpy as np
+
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN
 from islands.discrepancy.inference.hypothesis import Hypothesis, with_effect, without_effect
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.stepwise_search import eliminate_backward, refit_with_ar_noise
-from islands.discrepancy.inference.strategies import SearchOutcome
+from islands.discrepancy.inference.strategies import SearchOutcome, assess_evidence
+from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 
@@ -23,6 +26,23 @@ MIN_NAMED_FRACTION = 0.9
 
 #: Maximum number of free forms of a hypothesis.
 MAX_FORMS = 2
+
+
+def compare_with_free_forms(
+    outcome: SearchOutcome,
+    forms: Sequence[Effect],
+    fitted: int,
+    effects: Sequence[Effect],
+    rng: np.random.Generator,
+    parallel_map: ParallelMap,
+) -> SearchOutcome:
+    """Return the outcome with free forms if they explain clearly more and withstand the same tests."""
+    freer = search_free_forms(outcome, forms, parallel_map)
+    if freer is None:
+        return outcome
+    assessed = assess_evidence(freer, fitted, effects, rng)
+    has_forms = any(effect.is_free for effect in assessed.hypothesis.effects)
+    return assessed if has_forms and assessed.verdict != Verdict.UNKNOWN else outcome
 
 
 def search_free_forms(
