@@ -7,7 +7,8 @@ import numpy as np
 
 from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.gross_errors.record_finding import FAMILY, RecordFinding
-from islands.discrepancy.inference.finding import CONFIDENCE_TEMPERATURE, Finding, Value
+from islands.discrepancy.inference.confidence import CONFIDENCE_TEMPERATURE
+from islands.discrepancy.inference.finding import Finding, Value
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext

@@ -12,12 +12,8 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     evaluate_fit,
 )
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
-from islands.discrepancy.inference.finding import (
-    CONFIDENCE_TEMPERATURE,
-    EQUIVALENCE_MARGIN,
-    Finding,
-    Value,
-)
+from islands.discrepancy.inference.confidence import CONFIDENCE_TEMPERATURE
+from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, Finding, Value
 from islands.discrepancy.inference.holdout import cross_validate_gain
 from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty

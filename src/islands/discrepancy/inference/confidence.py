@@ -13,17 +13,15 @@ import numpy as np
 import scipy
 
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
+from islands.discrepancy.inference.holdout import BLOCKS, sum_by_block
 from islands.discrepancy.interfaces.effect import Signal
-
-#: Number of blocks of equal length into which the estimation part is divided.
-BLOCKS = 36
 
 #: Number of draws of the weights of the blocks.
 DRAWS = 2000
 
 #: Temperature of a difference of scores without blocks. Without it, a confidence of 0.97 is right in 0.72 of
 #: the cases.
-TEMPERATURE = 2.0
+CONFIDENCE_TEMPERATURE = 2.0
 
 #: Seed of the draws. It is fixed, so that the same fits have the same confidence.
 SEED = 36
@@ -55,9 +53,8 @@ def sum_squares_by_block(fit: CalibrationResult, reference: CalibrationResult, t
     """
     noise = reference.noise
     squares = noise.whiten(target.y - fit.output, target.segments)[target.estimation_part] ** 2
-    edges = np.linspace(0, squares.size, BLOCKS + 1).astype(int)[:-1]
     weight = noise.effective_samples / squares.size
-    sums: Signal = weight * np.add.reduceat(squares, edges) / noise.variance
+    sums: Signal = weight * sum_by_block(squares, BLOCKS) / noise.variance
     return sums
 
 
@@ -72,7 +69,7 @@ def compute_confidence(named: ScoredAlternative, others: Sequence[ScoredAlternat
     for other in others:
         lead = named.score - other.score
         if named.squares is None or other.squares is None:
-            leads.append(np.full(DRAWS, lead / TEMPERATURE))
+            leads.append(np.full(DRAWS, lead / CONFIDENCE_TEMPERATURE))
             continue
         losses = other.squares - named.squares
         total = abs(float(losses.sum()))

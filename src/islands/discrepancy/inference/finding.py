@@ -25,10 +25,6 @@ from islands.discrepancy.interfaces.parallel import ParallelMap
 #: Effects whose scores are within this margin of the named one cannot be distinguished from it.
 EQUIVALENCE_MARGIN = 9.0
 
-#: Temperature of the softmax from scores to confidences: without it, a confidence of 0.97 is right in 0.72 of
-#: the cases.
-CONFIDENCE_TEMPERATURE = 2.0
-
 
 @dataclass(frozen=True, slots=True)
 class Value:

@@ -102,7 +102,7 @@ def bound_reduction(before: Signal, after: Signal, rng: np.random.Generator) -> 
         Errors.
     """
     blocks = min(BLOCKS, before.size)
-    squares = [_sum_by_block(each**2, blocks) for each in (before, after)]
+    squares = [sum_by_block(each**2, blocks) for each in (before, after)]
     drawn = rng.integers(0, blocks, (BOOTSTRAP_SAMPLES, blocks))
     reductions = 100 * (1 - np.sqrt(squares[1][drawn].sum(axis=1) / squares[0][drawn].sum(axis=1)))
     low, high = np.quantile(reductions, [0.025, 0.975])
@@ -163,6 +163,7 @@ def _bound_gain(gains: Signal, rng: np.random.Generator) -> float:
     return float(np.quantile(gains[drawn].sum(axis=1), LOWER_QUANTILE))
 
 
-def _sum_by_block(squares: Signal, blocks: int) -> Signal:
+def sum_by_block(squares: Signal, blocks: int) -> Signal:
+    """Return the sums over blocks of equal length, shape (blocks,)."""
     edges = np.linspace(0, squares.size, blocks + 1).astype(int)
     return np.add.reduceat(squares, edges[:-1])

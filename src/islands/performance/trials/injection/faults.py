@@ -1,11 +1,12 @@
 """Faults and the ways to inject them: at the input, in the equation, at the output."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from islands.performance.trials.injection import force_faults, signal_faults
 from islands.performance.trials.injection.excitation import random_sign
 from islands.performance.trials.injection.plant import Force, Map, Plant
 
@@ -86,3 +87,20 @@ def ageing(rng: np.random.Generator, strength: float, plant: Plant) -> Plant:
     """Change the gain linearly over the record."""
     k = random_sign(rng) * strength
     return replace(plant, gain_profile=lambda time: 1.0 + k * time / time[-1])
+
+
+#: Forces that the catalogue has no name for.
+NAMELESS_FORCES: Mapping[str, Fault] = {
+    "position-damping": Fault("", 0.01, 1.0, (add_force(force_faults.position_damping),)),
+    "tanh-spring": Fault("", 0.01, 0.5, (add_force(force_faults.tanh_spring),)),
+    "product": Fault("", 0.01, 0.5, (add_force(force_faults.product),)),
+    "fifth-power": Fault("", 0.01, 1.0, (add_force(force_faults.fifth_power),)),
+    "cubic-damping": Fault("", 0.005, 0.5, (add_force(force_faults.cubic_damping),)),
+    "position-friction": Fault("", 0.005, 0.5, (add_force(force_faults.position_friction),)),
+}
+
+#: Maps of input and output that the catalogue has no name for.
+NAMELESS_MAPS: Mapping[str, Fault] = {
+    "power-law": Fault("", 0.01, 0.5, (before_plant(signal_faults.power_law),)),
+    "slow-modulation": Fault("", 0.005, 0.2, (after_plant(signal_faults.slow_modulation),)),
+}

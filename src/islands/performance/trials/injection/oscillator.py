@@ -14,6 +14,8 @@ from islands.performance.trials.injection.excitation import (
     random_noise,
 )
 from islands.performance.trials.injection.faults import (
+    NAMELESS_FORCES,
+    NAMELESS_MAPS,
     Fault,
     add_force,
     after_plant,
@@ -160,14 +162,8 @@ OSCILLATOR = Rig(
         Fault("cross-coupling", 0.002, 0.1, (after_plant(signal_faults.cross_coupling),)),
     ),
     unknown={
-        "position-damping": Fault("", 0.01, 1.0, (add_force(force_faults.position_damping),)),
-        "tanh-spring": Fault("", 0.01, 0.5, (add_force(force_faults.tanh_spring),)),
-        "product": Fault("", 0.01, 0.5, (add_force(force_faults.product),)),
-        "fifth-power": Fault("", 0.01, 1.0, (add_force(force_faults.fifth_power),)),
-        "cubic-damping": Fault("", 0.005, 0.5, (add_force(force_faults.cubic_damping),)),
-        "position-friction": Fault("", 0.005, 0.5, (add_force(force_faults.position_friction),)),
-        "power-law": Fault("", 0.01, 0.5, (before_plant(signal_faults.power_law),)),
-        "slow-modulation": Fault("", 0.005, 0.2, (after_plant(signal_faults.slow_modulation),)),
+        **NAMELESS_FORCES,
+        **NAMELESS_MAPS,
         "slew-rate": Fault("", 150.0, 500.0, (before_plant(signal_faults.slew_rate_limit),)),
         "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(2.0, 5.0)),)),
     },

@@ -8,6 +8,8 @@ import numpy as np
 from islands.performance.trials.injection import force_faults, signal_faults
 from islands.performance.trials.injection.excitation import Excitation, Signal, make_excitation, random_noise
 from islands.performance.trials.injection.faults import (
+    NAMELESS_FORCES,
+    NAMELESS_MAPS,
     Fault,
     add_force,
     after_plant,
@@ -181,14 +183,8 @@ PIEZO = Rig(
         Fault("cross-coupling", 0.002, 0.1, (after_plant(signal_faults.cross_coupling),)),
     ),
     unknown={
-        "position-damping": Fault("", 0.01, 1.0, (add_force(force_faults.position_damping),)),
-        "tanh-spring": Fault("", 0.01, 0.5, (add_force(force_faults.tanh_spring),)),
-        "product": Fault("", 0.01, 0.5, (add_force(force_faults.product),)),
-        "fifth-power": Fault("", 0.01, 1.0, (add_force(force_faults.fifth_power),)),
-        "cubic-damping": Fault("", 0.005, 0.5, (add_force(force_faults.cubic_damping),)),
-        "position-friction": Fault("", 0.005, 0.5, (add_force(force_faults.position_friction),)),
-        "power-law": Fault("", 0.01, 0.5, (before_plant(signal_faults.power_law),)),
-        "slow-modulation": Fault("", 0.005, 0.2, (after_plant(signal_faults.slow_modulation),)),
+        **NAMELESS_FORCES,
+        **NAMELESS_MAPS,
         "slew-rate": Fault("", 40.0, 90.0, (before_plant(signal_faults.slew_rate_limit),)),
         "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(3.0, 8.0)),)),
     },

@@ -15,6 +15,7 @@ from islands.performance.trials.injection.excitation import (
     random_sign,
 )
 from islands.performance.trials.injection.faults import (
+    NAMELESS_MAPS,
     Fault,
     Inject,
     after_plant,
@@ -218,8 +219,7 @@ TANKS = Rig(
         Fault("cross-coupling", 0.005, 0.2, (after_plant(signal_faults.cross_coupling),)),
     ),
     unknown={
-        "power-law": Fault("", 0.01, 0.5, (before_plant(signal_faults.power_law),)),
-        "slow-modulation": Fault("", 0.005, 0.2, (after_plant(signal_faults.slow_modulation),)),
+        **NAMELESS_MAPS,
         "slew-rate": Fault("", 0.002, 0.01, (before_plant(signal_faults.slew_rate_limit),)),
         "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(1.0, 3.0)),)),
     },
