@@ -176,6 +176,7 @@ def test_exchanged_names_in_the_catalogue_fail_the_checks(name: str, monkeypatch
         checks.test_injected_effect_is_named_in_a_short_record(name)
 
 
+@pytest.mark.ci
 def test_empty_catalogue_fails_the_checks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trials_module, "diagnose", partial(trials_module.diagnose, catalogue=()))
     with pytest.raises(AssertionError):

@@ -50,6 +50,7 @@ def measured(folder: Path) -> np.ndarray:
     return np.asarray(table["y_um"])
 
 
+@pytest.mark.ci
 def test_extended_simulation_reproduces_the_record(folder: Path) -> None:
     out = folder / "simulated.csv"
     printed = succeed("simulate", folder / "extended.json", folder / "record.csv", "--out", out)

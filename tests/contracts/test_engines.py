@@ -52,10 +52,18 @@ GENERATIONS = [0, 2, 4, 6, 7]
 RESUMED = [pytest.mark.nightly, pytest.mark.ci, pytest.mark.nightly, pytest.mark.nightly]
 
 
+def on_engines(mark):
+    """Return the engines as parameters, all except the serial one with a mark."""
+    return [pytest.param(name, marks=() if name == "serial" else mark) for name in ENGINES]
+
+
 def separate_actors(mark):
     """Mark a test that starts separate actors (two seconds of CPU) on all engines except the serial one."""
-    engines = [pytest.param(name, marks=() if name == "serial" else mark) for name in ENGINES]
-    return pytest.mark.parametrize("name", engines, indirect=True, scope="module")
+    return pytest.mark.parametrize("name", on_engines(mark), indirect=True, scope="module")
+
+
+#: A Ray takes seven seconds of CPU to start and to end.
+ON_ENGINES = on_engines(pytest.mark.ci)
 
 
 def never_stop():
@@ -67,7 +75,7 @@ def search_problem():
     return make_problem(record(300), SETTINGS)
 
 
-@pytest.fixture(params=ENGINES, scope="module")
+@pytest.fixture(params=ON_ENGINES, scope="module")
 def name(request):
     return request.param
 

@@ -99,7 +99,7 @@ def test_a_discrepancy_job_counts_towards_the_quota(tmp_path):
     [
         {"simulation": {"kind": "bouc-wen-piezo", "parameters": {"dp": 1.5}}, "tolerance": {"dp": 0.01}},
         {"input": "u_V+1"},
-        {"seed": 2**63 - 1, "channels": ["t_s"], "output": "y_um"},
+        pytest.param({"seed": 2**63 - 1, "channels": ["t_s"], "output": "y_um"}, marks=pytest.mark.ci),
         make_model_simulation(),
     ],
 )
@@ -268,6 +268,7 @@ def test_the_events_of_a_diagnosis_show_its_phases(finished):
     assert events[-1][2]["verdict"] == "named"
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "resource",
     [

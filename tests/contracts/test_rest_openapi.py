@@ -101,6 +101,7 @@ def test_every_example_of_the_openapi_document_is_valid(document):
     assert count >= 3
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "path",
     [

@@ -79,6 +79,7 @@ def test_accepted_job_is_visible_at_once_to_other_stores(database):
             assert [event.number for event in other.jobs.events(job.id)] == [1]
 
 
+@pytest.mark.ci
 def test_accepted_job_is_visible_to_another_process(store, database):
     job = submitted(store)
     with child(LOOK, database, ALICE, job.id) as other:

@@ -168,6 +168,7 @@ def test_single_job_goes_to_one_of_many_claimers(database):
             assert [lease.job.id for lease in answers if lease is not None] == [job.id]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "database", ["sqlite", pytest.param("postgresql", marks=pytest.mark.ci)], indirect=True
 )

@@ -148,6 +148,7 @@ def test_killed_coordinator_leaves_complete_reports(database, reports):
     intact(database)
 
 
+@pytest.mark.ci
 def test_process_killed_during_a_write_blocks_no_other(database):
     with Store(database) as store:
         job = submitted(store)

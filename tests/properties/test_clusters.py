@@ -91,6 +91,7 @@ def test_clusters_partition_the_regressors_that_do_not_vanish(found, rng):
     assert [cluster.steady_state for cluster in shuffled] == [cluster.steady_state for cluster in partition]
 
 
+@pytest.mark.ci
 @given(
     st.lists(regressors(height=2), min_size=1, max_size=6), st.lists(grid, min_size=6, max_size=6), signals()
 )

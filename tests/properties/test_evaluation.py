@@ -99,6 +99,7 @@ thresholds_by_size = st.none() | st.lists(
 )
 
 
+@pytest.mark.ci
 def test_pool_has_all_outcomes():
     for name, others in (
         ("free", {"OK", "SINGULAR", "INFEASIBLE", "DIVERGED"}),

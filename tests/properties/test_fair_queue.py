@@ -68,6 +68,7 @@ def claims(store, count):
     return [claimed(store).job.owner for _ in range(count)]
 
 
+@pytest.mark.ci
 @few
 @given(weights, st.integers(5, 25))
 def test_claims_of_backlogged_owners_are_in_proportion_to_their_weights(fair, weighted, count):
@@ -96,6 +97,7 @@ def test_backlogged_owners_of_equal_weight_are_served_in_turn(fair, several, wei
             assert max(got) - min(got) <= 1
 
 
+@pytest.mark.ci
 @few
 @given(weights, st.lists(st.sampled_from(OWNERS), max_size=20), st.data())
 def test_no_owner_waits_longer_than_its_bound(fair, weighted, earlier, data):

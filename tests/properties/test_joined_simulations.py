@@ -14,7 +14,7 @@ from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.io.simulator_spec.factory import make_simulator
-from support.simulated_records import SAMPLES, made
+from support.simulated_records import SAMPLES, made, names
 
 #: First sample of every recording, and the sample after the last.
 EDGES = (0, 250, 330, SAMPLES)
@@ -51,7 +51,7 @@ SLOW = ("second-order", "held", "extended")
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.ci) if name in SLOW else name for name in made()]
+    "name", [pytest.param(name, marks=pytest.mark.ci) if name in SLOW else name for name in names()]
 )
 def test_simulation_of_joined_recordings_is_that_of_each(name: str) -> None:
     record, columns = made()[name].record, made()[name].columns
@@ -85,7 +85,7 @@ def test_simulation_of_joined_recordings_is_that_of_each(name: str) -> None:
     assert whole.simulate(values).tolist() == np.concatenate(expected).tolist()
 
 
-@pytest.mark.parametrize("name", made())
+@pytest.mark.parametrize("name", names())
 def test_one_segment_is_a_single_recording(name: str) -> None:
     alone = make_simulation(name, slice(0, SAMPLES))
     given = replace(alone, context=replace(alone.context, segments=(SAMPLES,)))

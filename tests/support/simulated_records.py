@@ -17,6 +17,7 @@ from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import (
+    SIMULATORS,
     ColumnSpec,
     LinearSpec,
     LocalExtendedSpec,
@@ -53,6 +54,10 @@ MODEL = {
     ],
 }
 
+MODEL_SPEC = ModelSpec(kind="model", model=MODEL, name="m")
+
+PROGRAM_SPEC = ProgramSpec(kind="python", path=str(PROGRAM), function="force", parameters={"c": 0.1})
+
 
 @dataclass(frozen=True)
 class SpecAndRecord:
@@ -65,6 +70,11 @@ class SpecAndRecord:
     @cached_property
     def simulator(self) -> Simulator:
         return make_simulator(self.spec, self.record, self.columns)
+
+
+def names() -> list[str]:
+    """Return the names of all specifications, which are made on demand; an FMU requires a C compiler."""
+    return [name for name in (*SIMULATORS, "held", "extended") if name != "fmu" or find_compiler()]
 
 
 def wave(samples: int = SAMPLES, dt: float = DT) -> NDArray[np.float64]:
@@ -103,7 +113,7 @@ def write_fmu() -> str:
 
 @cache
 def made() -> Mapping[str, SpecAndRecord]:
-    """Return the specifications and their records by name; FMUs require a C compiler."""
+    """Return the specifications and their records by name."""
     u = wave()
     rng = np.random.default_rng(11)
     oscillation = simulate_oscillator(u, 0.5, 4.0, 200.0)
@@ -112,8 +122,9 @@ def made() -> Mapping[str, SpecAndRecord]:
     plain = recorded(u, 0.8 * u + 0.01 * rng.standard_normal(u.size))
     oscillator = recorded(u, oscillation, units=("N", "m"))
     spring = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})
-    can_compile = find_compiler() is not None
-    fmus = {"fmu": SpecAndRecord(FmuSpec(kind="fmu", file=write_fmu()), oscillator)} if can_compile else {}
+    fmus = {}
+    if "fmu" in names():
+        fmus["fmu"] = SpecAndRecord(FmuSpec(kind="fmu", file=write_fmu()), oscillator)
     return {
         **fmus,
         "bouc-wen-piezo": SpecAndRecord(PhysicalSpec(kind="bouc-wen-piezo"), plain),
@@ -133,11 +144,9 @@ def made() -> Mapping[str, SpecAndRecord]:
             ),
             plain,
         ),
-        "model": SpecAndRecord(ModelSpec(kind="model", model=MODEL, name="m"), plain),
+        "model": SpecAndRecord(MODEL_SPEC, plain),
         "column": SpecAndRecord(ColumnSpec(kind="column", column="theirs"), plain, {"theirs": 0.8 * u}),
-        "python": SpecAndRecord(
-            ProgramSpec(kind="python", path=str(PROGRAM), function="force", parameters={"c": 0.1}), plain
-        ),
+        "python": SpecAndRecord(PROGRAM_SPEC, plain),
         "held": SpecAndRecord(
             LocalExtendedSpec.model_validate({**extension(spring), "hold": "zero-order", "times": 4}),
             oscillator,

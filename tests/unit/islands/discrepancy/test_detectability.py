@@ -113,6 +113,7 @@ def test_clean_surrogates_do_not_contain_the_named_effect(diagnosis: Diagnosis) 
     assert diagnose_surrogate(surrogates, SurrogateCase(None, 1)).named == NOTHING
 
 
+@pytest.mark.ci
 def test_injection_at_nominal_values_does_not_change_the_surrogate(
     surrogates: Surrogates, effects: Sequence[Effect]
 ) -> None:
@@ -123,6 +124,7 @@ def test_injection_at_nominal_values_does_not_change_the_surrogate(
         assert np.array_equal(surrogates.draw_record(SurrogateCase(nothing, 7)).y, clean), effect.name
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.ci)])
 def test_stronger_injection_has_a_larger_misfit(
     surrogates: Surrogates, effects: Sequence[Effect], seed: int
@@ -144,6 +146,7 @@ def test_stronger_injection_has_a_larger_misfit(
             assert np.sqrt(np.mean(changed**2)) == pytest.approx(each.misfit * surrogates.sigma), effect.name
 
 
+@pytest.mark.ci
 def test_misfits_of_a_continuous_response_are_the_given_ones(
     surrogates: Surrogates, effects: Sequence[Effect]
 ) -> None:
@@ -153,6 +156,7 @@ def test_misfits_of_a_continuous_response_are_the_given_ones(
     )
 
 
+@pytest.mark.ci
 def test_misfits_that_a_response_jumps_over_are_skipped(
     surrogates: Surrogates, effects: Sequence[Effect]
 ) -> None:
@@ -245,6 +249,7 @@ def test_false_alarm_is_a_named_cause(diagnosis: Diagnosis, named: str, value: f
     assert found.confusion == {(NOTHING, named): 20}
 
 
+@pytest.mark.ci
 def test_detection_limit_is_the_smallest_recognised_strength(
     diagnosis: Diagnosis, surrogates: Surrogates
 ) -> None:
@@ -274,6 +279,7 @@ def test_detection_limit_is_the_smallest_recognised_strength(
         assert len(evaluated) <= 4
 
 
+@pytest.mark.ci
 def test_progress_counts_the_completed_analyses(diagnosis: Diagnosis) -> None:
     reports: list[tuple[str, float | None]] = []
     self_test(

@@ -86,6 +86,7 @@ def clean() -> Dataset:
 DETUNED = make_piezo(dp=1.3, A=0.7)
 
 
+@pytest.mark.ci
 def test_parameter_without_a_tolerance_is_calibrated(clean: Dataset) -> None:
     assert diagnose(clean, DETUNED).verdict == Verdict.NOTHING
 

@@ -53,6 +53,7 @@ def test_resting_output_without_motion_has_no_discrepancy() -> None:
     assert (found.verdict, found.effects) == (Verdict.NOTHING, ())
 
 
+@pytest.mark.ci
 def test_effects_that_are_offsets_at_rest_are_not_searched_for() -> None:
     found = islands.diagnose(rest(50.0, CREEP), islands.function_simulator(static))
     assert {each.name for each in found.candidates} >= {"exponential-creep", "linear-drift", "jump"}

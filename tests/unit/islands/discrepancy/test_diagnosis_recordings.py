@@ -57,6 +57,7 @@ def test_every_recording_has_its_own_initial_state(found: Diagnosis) -> None:
     assert get_initial_states(found) == pytest.approx(np.ravel(STATES), abs=0.01)
 
 
+@pytest.mark.ci
 def test_held_out_recordings_do_not_change_the_estimate(stiffened: Dataset, found: Diagnosis) -> None:
     y = np.array(stiffened.y)
     y[found.estimation_samples :] *= 1.01
@@ -81,6 +82,7 @@ def test_clean_recordings_have_no_discrepancy() -> None:
     assert found.best.mean_square == pytest.approx(SIGMA**2, rel=0.1)
 
 
+@pytest.mark.ci
 def test_many_short_recordings_are_diagnosed() -> None:
     rng = np.random.default_rng(6)
     recordings = []

@@ -13,14 +13,14 @@ from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.verdict import Verdict
 from islands.errors import IslandsError, RecordError, SettingsError
 from islands.io.simulator_spec.specification import LocalSpec, PhysicalSpec
-from support.simulated_records import made, recorded, wave
+from support.simulated_records import MODEL_SPEC, PROGRAM_SPEC, recorded, wave
 
 #: Simulations whose parameters come from the record, and simulations that are given completely.
 SIMULATIONS: dict[str, str | LocalSpec] = {
     **{name: name for name in ("bouc-wen-piezo", "second-order", "rigid-axis", "cascaded-tanks", "linear:1")},
     "column": "column:theirs",
-    "python": made()["python"].spec,
-    "model": made()["model"].spec,
+    "python": PROGRAM_SPEC,
+    "model": MODEL_SPEC,
 }
 
 

@@ -58,6 +58,7 @@ def test_user_defined_effect_is_named(record: tuple[islands.Dataset, Signal]) ->
     assert finding.parameters["a"].value == pytest.approx(0.15, rel=0.05)
 
 
+@pytest.mark.ci
 def test_catalogue_is_the_default_and_is_not_changed(record: tuple[islands.Dataset, Signal]) -> None:
     data, simulated = record
     found = islands.diagnose(data, "column:theirs", columns={"theirs": simulated})

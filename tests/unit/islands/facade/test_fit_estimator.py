@@ -17,6 +17,7 @@ def coefficients(model):
     return dict(zip((item.text for item in model.regressors), model.theta, strict=True))
 
 
+@pytest.mark.ci
 def test_fit_estimates_with_the_chosen_estimator():
     record = make_noisy_record("output", 0, 1500)
     poles = {}

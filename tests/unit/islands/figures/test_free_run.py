@@ -168,6 +168,7 @@ def test_divergence_is_annotated_and_does_not_flatten_other_lines(tmp_path):
     save(figure, tmp_path / "diverged.svg")
 
 
+@pytest.mark.ci
 def test_annotation_is_only_in_the_diverged_segment():
     record = sine(3, segments=(200, 200))
     simulated = np.where(np.arange(400) < 200, record.y, np.nan)

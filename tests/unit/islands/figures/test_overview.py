@@ -20,6 +20,7 @@ def record():
     return measure(u, delay(lag(u, 4.0), 3), 0.02, dt=0.1)
 
 
+@pytest.mark.ci
 def test_themes_draw_the_same_lines(record):
     light, dark = (draw(record, theme) for theme in THEMES)
     assert len(light.axes) == len(dark.axes) == 6
@@ -36,6 +37,7 @@ def test_dead_time_is_marked_in_the_impulse_response(record):
     assert np.argmax(response > 0.5 * response.max()) == 4
 
 
+@pytest.mark.ci
 def test_equal_records_give_equal_files(record):
     files = []
     for _ in range(2):

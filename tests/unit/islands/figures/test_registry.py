@@ -18,6 +18,7 @@ from support.searches import record
 MODEL = make_model([(parse("y(k-1)"), 0.999), (parse("u(k-1)"), 0.3)], ("u",))
 
 
+@pytest.mark.ci
 def test_the_figure_of_the_residual_gives_its_verdict_before_the_tests():
     split = Split(record(400), record(300, seed=1))
     entry = RankedModel(MODEL, assess(MODEL, split, 50))

@@ -200,6 +200,7 @@ def test_coordinator_keeps_the_quotas_of_its_settings(
     assert {claimed for _, claimed in claims} == {job.id, second.id}
 
 
+@pytest.mark.ci
 def test_unreferenced_blobs_are_swept_after_an_hour(
     store: Store, blobs: Blobs, job: Job, coordinator: Callable[..., Thread]
 ) -> None:

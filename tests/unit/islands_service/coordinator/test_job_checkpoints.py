@@ -84,6 +84,7 @@ def test_job_without_its_checkpoint_starts_again_with_the_same_result(
     assert outcome.summary["words"].endswith(f"Note: {RESTARTED}.")
 
 
+@pytest.mark.ci
 def test_checkpoint_of_a_newer_version_is_left_to_its_coordinators(
     store: Store, blobs: Blobs, job: Job
 ) -> None:

@@ -67,6 +67,7 @@ def pass_on(u: np.ndarray, _dt: float) -> np.ndarray:
     return u
 
 
+@pytest.mark.ci
 def test_closed_loop_is_said_and_changes_no_verdict() -> None:
     def plant(u: np.ndarray, _dt: float, b: float = 0.1) -> np.ndarray:
         return simulate(u, b=b)

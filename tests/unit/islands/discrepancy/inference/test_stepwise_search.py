@@ -153,6 +153,7 @@ def test_pure_noise_yields_no_pair() -> None:
     assert found.fit is base
 
 
+@pytest.mark.ci
 def test_noise_model_is_white_once_both_causes_are_found() -> None:
     """The search begins with the coloured residual of the first cause and ends with white noise."""
     u = wave(3000)
@@ -194,6 +195,7 @@ def test_deviation_from_the_prior_is_part_of_the_residual() -> None:
     assert gains[0].score_gain(with_offset) > MIN_GAIN
 
 
+@pytest.mark.ci
 def test_refinement_replaces_a_wrong_effect_by_a_better_one() -> None:
     u = wave(3000)
     core = RecordedOutput("theirs", u)
@@ -211,6 +213,7 @@ def test_refinement_replaces_a_wrong_effect_by_a_better_one() -> None:
     assert [each.without.effects for each in found.alternatives] == [(found.effects[1],), (found.effects[0],)]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2, 3))])
 def test_equivalent_effects_keep_the_catalogue_order(seed: int) -> None:
     """Rounding does not decide: a sensor offset and a constant force are not distinguishable."""

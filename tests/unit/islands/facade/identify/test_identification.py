@@ -231,6 +231,7 @@ def test_simulations_of_the_parts_have_the_reported_errors(result):
 # Stages.
 
 
+@pytest.mark.ci
 def test_stages_before_and_after_the_epochs_are_reported_and_have_no_effect():
     small = BUDGET | {"generations": 1, "population": 10, "max_terms": 3, "initial_terms": (1, 3)}
     search = small | {"library_degree": 1, "swap_search": True, "refine": True}

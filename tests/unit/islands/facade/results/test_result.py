@@ -106,6 +106,7 @@ def test_the_table_of_models_has_their_errors_by_rank(result):
     assert table.loc[1, "equation"] == result.models[0].equation
 
 
+@pytest.mark.ci
 def test_a_figure_of_another_record_is_that_of_its_simulation(result):
     other = record(200, seed=5)
     drawn = result.best.plot(record=other).axes[0].get_lines()[1].get_ydata()

@@ -41,11 +41,13 @@ def true_error(result, seed=1):
     return np.sqrt(np.nanmean(error**2))
 
 
+@pytest.mark.ci
 def test_averaging_a_noisy_oversampled_record_reduces_the_error(averaged):
     assert averaged.search_result.average > 1
     assert true_error(averaged) < true_error(islands.fit(lag(), average=1, **LIBRARY)) / 3
 
 
+@pytest.mark.ci
 def test_a_record_without_noise_keeps_its_sampling_time():
     record = lag(noise=0.0)
     found, plain = (islands.fit(record, average=average, **LIBRARY) for average in ("auto", 1))

@@ -69,6 +69,7 @@ def divide(samples: int, boundary: int):
     return replace(found, record=replace(found.record, u=u, segments=(boundary, samples - boundary)))
 
 
+@pytest.mark.ci
 def test_lines_are_interrupted_between_recordings() -> None:
     divided = divide(900, 600)
     for name, panels in (("over-time", 2), ("loops", 2)):

@@ -176,6 +176,7 @@ def test_an_archive_with_too_many_unpacked_bytes_is_refused_at_once(tmp_path, mo
     assert open_record(path).names == ("u", "y")
 
 
+@pytest.mark.ci
 def test_too_many_paths_through_the_groups_of_a_file_are_refused(tmp_path):
     import h5py
 

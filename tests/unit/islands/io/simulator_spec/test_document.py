@@ -19,9 +19,9 @@ from islands.io.export.extension import as_json
 from islands.io.simulator_spec.document import describe_extension, extended_document, extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.io.simulator_spec.specification import LocalExtendedSpec, ModelSpec, innermost, parse_spec
-from support.simulated_records import SpecAndRecord, made
+from support.simulated_records import SpecAndRecord, made, names
 
-NAMES = list(made())
+NAMES = names()
 
 #: Simulators whose effects are tested one by one at the fast level.
 FAST = ("bouc-wen-piezo", "column", "extended")

@@ -57,6 +57,7 @@ def test_one_thread_is_accepted():
     assert not refused(1)
 
 
+@pytest.mark.ci
 @pytest.mark.skipif(multiprocessing.cpu_count() < 2, reason="one core has no use for two threads")
 def test_two_threads_are_refused():
     assert refused(2)

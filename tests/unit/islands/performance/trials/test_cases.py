@@ -48,16 +48,19 @@ def found() -> Diagnosis:
     return diagnose(faulty.record, CASES["column"].make(faulty))
 
 
+@pytest.mark.ci
 def test_a_correct_diagnosis_improves_as_much_as_the_oracle(found: Diagnosis) -> None:
     assert [effect.name for effect in found.effects] == ["even-nonlinearity"]
     assert compute_gain_share(found, ["even-nonlinearity"], {}) == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.ci
 def test_an_empty_diagnosis_has_no_improvement(found: Diagnosis) -> None:
     empty = replace(found, best=found.base)
     assert compute_gain_share(empty, ["even-nonlinearity"], {}) == 0.0
 
 
+@pytest.mark.ci
 def test_the_oracle_ratio_is_none_without_a_name_or_an_improvement(found: Diagnosis) -> None:
     assert compute_gain_share(found, ["delay"], {}) is None
     assert compute_gain_share(found, ["periodic-disturbance"], {}) is None

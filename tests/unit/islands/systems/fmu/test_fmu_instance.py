@@ -128,6 +128,7 @@ def test_a_divergent_simulation_is_nan_after_it_overflows(tmp_path: Path) -> Non
     assert "ends the simulation after" in found.failure
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("resources", [False, True])
 def test_a_folder_exists_only_for_resources_and_as_long_as_the_instance(
     resources: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -76,6 +76,7 @@ class Requests:
         assert len(self.held) == self.total or not self.below_maximum()
 
 
+@pytest.mark.ci
 @settings(max_examples=100, deadline=None)
 @given(EVENTS, st.integers(1, 4), st.integers(1, 3))
 def test_no_owner_is_served_twice_while_another_could_be_served(events, total, per_owner):

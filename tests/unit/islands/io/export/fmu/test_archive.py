@@ -56,9 +56,9 @@ def test_fmpy_simulates_like_the_free_run(name, kind, tmp_path):
 class Session:
     """An instance of an FMU whose communication steps the test takes."""
 
-    def __init__(self, kind, path):
+    def __init__(self, kind, path, folder):
         description = fmpy.read_model_description(str(path))
-        folder = fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
+        folder = fmpy.extract(str(path), unzipdir=str(folder))
         three = kind == "fmu"
         self.fmu = (FMU3Slave if three else FMU2Slave)(
             guid=description.guid,
@@ -97,11 +97,19 @@ class Session:
         return self.get([1])[0]
 
 
-@pytest.fixture(params=FORMATS)
-def session(request, tmp_path):
+@pytest.fixture(params=FORMATS, scope="module")
+def compiled(request, tmp_path_factory):
+    """Kind and path of an FMU that tests extract; it takes a quarter of a second to compile."""
+    path = tmp_path_factory.mktemp("compiled") / "model.fmu"
     exported = replace(model({"y(k-1)": 0.5, "y(k-2)": -0.25, "u(k-2)": 1.0}), dt=0.125)
-    write_export(exported, request.param, tmp_path / "model.fmu")
-    found = Session(request.param, tmp_path / "model.fmu")
+    write_export(exported, request.param, path)
+    return request.param, path
+
+
+@pytest.fixture
+def session(compiled, tmp_path):
+    kind, path = compiled
+    found = Session(kind, path, tmp_path)
     yield found
     found.fmu.freeInstance()
 

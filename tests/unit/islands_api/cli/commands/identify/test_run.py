@@ -53,6 +53,7 @@ def test_stopped_run_keeps_the_best_and_resumes_to_the_same_result(
     assert one == other
 
 
+@pytest.mark.ci
 def test_ctrl_c_in_the_last_generation_has_no_effect(run, interrupted):
     interrupted(3)
     code, _, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out")

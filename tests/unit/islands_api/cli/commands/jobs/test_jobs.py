@@ -152,6 +152,7 @@ def test_interrupting_watch_does_not_cancel_the_job(service: Service, owner: str
 # Results.
 
 
+@pytest.mark.ci
 def test_result_is_shown_and_downloaded(run: Run, done: str, found: JobOutcome) -> None:
     code, out, err = run("result", done, "--out", "out")
     assert code == 0, err
