@@ -43,8 +43,19 @@ def run(path: Path, *arguments: object, **environment: str) -> str:
     return done.stdout
 
 
+#: Examples that take five seconds of CPU and more and have a shorter one of the same kind.
+SLOW = ("02_", "04_", "05_", "07_", "09_")
+
+
 @pytest.mark.ci
-@pytest.mark.parametrize("path", EXAMPLES, ids=IDS)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=pytest.mark.nightly) if path.name.startswith(SLOW) else path
+        for path in EXAMPLES
+    ],
+    ids=IDS,
+)
 def test_example_runs_and_its_checks_pass(path: Path, tmp_path: Path) -> None:
     printed = run(path, "--out", tmp_path / "out")
     assert printed.splitlines()[-1] == f"results in {tmp_path / 'out'}"
@@ -59,7 +70,7 @@ def test_example_without_out_names_a_temporary_folder(tmp_path: Path) -> None:
     assert (folder / "free-run.svg").exists()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_cluster_example_gives_the_same_models_on_a_cluster(ray_address: str, tmp_path: Path) -> None:
     path = tutorials.ROOT / "examples" / "05_cluster.py"
     by_option = run(path, "--out", tmp_path / "a", "--address", ray_address)

@@ -121,19 +121,22 @@ def are_both_named(found: TrialOutcome) -> bool:
     return len(named) == 2 and all(any(name in each for each in named) for name in found.trial.effects)
 
 
+#: Pairs of effects, the first two for every change.
+PAIRS = [
+    ("offset", "sensor-lag"),
+    ("thermal-drift", "dead-zone"),
+    ("coulomb-friction", "exponential-creep"),
+    ("delay", "thermal-drift"),
+    ("even-nonlinearity", "loop-asymmetry"),
+    ("gain-step", "periodic-disturbance"),
+    ("input-gain", "viscous"),
+    ("delay", "coulomb-friction"),
+]
+
+
 @pytest.mark.ci
 @pytest.mark.parametrize(
-    "pair",
-    [
-        ("coulomb-friction", "exponential-creep"),
-        ("delay", "thermal-drift"),
-        ("even-nonlinearity", "loop-asymmetry"),
-        ("gain-step", "periodic-disturbance"),
-        ("input-gain", "viscous"),
-        ("offset", "sensor-lag"),
-        ("thermal-drift", "dead-zone"),
-        ("delay", "coulomb-friction"),
-    ],
+    "pair", [*PAIRS[:2], *(pytest.param(pair, marks=pytest.mark.nightly) for pair in PAIRS[2:])]
 )
 def test_two_effects_are_both_named(pair: tuple[str, str]) -> None:
     found = run(*pair, band=(1.0, 4.0))

@@ -77,7 +77,7 @@ def test_isolated_islands_are_at_least_as_good_as_a_single_island(folder: Path) 
     assert any(together[size] < fitness for size, fitness in alone.items())
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_run_on_a_local_ray_resumes_with_another_engine(folder: Path) -> None:
     out = folder / "moved"
     printed = identify(folder, "moved", *ISLANDS, "--max-evaluations", 250, "--engine", "ray")

@@ -105,7 +105,13 @@ def forwarded(start: Proxy, upstream: int, folder: Path) -> Iterator[str]:
         process.wait(20)
 
 
-@pytest.fixture(scope="module", params=PROXIES)
+#: Proxies of the level ci: the one with the recommended settings, and one that removes a prefix.
+ESSENTIAL = ("nginx", "nginx that removes a prefix")
+
+MARKED = [name if name in ESSENTIAL else pytest.param(name, marks=pytest.mark.nightly) for name in PROXIES]
+
+
+@pytest.fixture(scope="module", params=MARKED)
 def proxied(request, serve, tmp_path_factory) -> Iterator[tuple[Service, httpx.Client, str]]:
     """Provide a service with keys, a client of a proxy in front of it, and the prefix of the proxy."""
     program, start, prefix = PROXIES[request.param]

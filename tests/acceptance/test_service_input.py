@@ -242,12 +242,8 @@ DEFECTIVE = {
 }
 
 
-#: Records that are tested at the fast test level.
-FAST = ("NaN",)
-
-
 @pytest.mark.parametrize(
-    "case", [case if case in FAST else pytest.param(case, marks=pytest.mark.ci) for case in DEFECTIVE]
+    "case", [case if case == "NaN" else pytest.param(case, marks=pytest.mark.ci) for case in DEFECTIVE]
 )
 def test_defect_of_a_record_is_reported_and_rejects_its_jobs(service, case):
     content, words = DEFECTIVE[case]

@@ -87,7 +87,7 @@ FAMILIES = (
 )
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_effect_of_each_family_is_found(tmp_path: Path) -> None:
     """The trials run in parallel processes, as usual."""
     assert {CATALOGUE[name].family for name in FAMILIES} == {each.family for each in CATALOGUE.values()}

@@ -51,7 +51,7 @@ def test_the_list_shows_an_outage_and_recovers(
     expect(page.get_by_role("status")).to_have_text("The service is available again.")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_the_page_of_a_job_continues_after_a_broken_stream(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:

@@ -64,7 +64,7 @@ def test_a_full_disk_rejects_writes_until_space_is_freed(disk, serve):
         assert not list(service.settings.blobs.glob("*.part"))
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_full_disk_while_drawing_is_reported_as_such(disk, serve):
     with serve(disk) as service:
         path = f"/v1/jobs/{run_identification(service)}/models/1/figures/hold.svg"
@@ -95,7 +95,7 @@ def test_a_full_disk_during_an_upload_is_reported_as_such(disk, serve, monkeypat
         assert service.submit(**spec(dataset)).status_code == 202
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_read_only_data_folder_rejects_writes_until_it_is_writable(disk, serve, tmp_path):
     """As after an error of the disk; SQLite is on another one, as PostgreSQL would be."""
     folder = tmp_path / "data"

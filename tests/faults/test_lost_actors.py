@@ -86,7 +86,7 @@ def test_frozen_actor_is_replaced_and_does_not_change_the_result(posed, undistur
     eventually(lambda: not alive([frozen]))
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_actor_that_is_frozen_during_its_preparation_is_replaced(
     posed, engine, messages, monkeypatch, tmp_path
 ):
@@ -198,7 +198,7 @@ def test_existing_ray_connection_is_left_alone(engine):
     assert ray.is_initialized()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_cluster_with_an_autoscaler_is_asked_for_a_cpu_for_each_island(
     posed, undisturbed, ray_address, engine, monkeypatch
 ):

@@ -62,7 +62,7 @@ def coordinators():
     return [pid for pid, line in descendants(os.getpid()).items() if "RegionActor" in line]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_killed_coordinator_of_a_region_changes_neither_result_nor_checkpoint(posed, whole, messages, path):
     found, texts = [], []
     for epoch in run_regions(posed, empty_archipelago(6, SEED), never, 2, messages.append):

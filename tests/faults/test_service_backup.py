@@ -10,7 +10,7 @@ from support.command_line import ISLANDS
 from support.processes import alive, descendants, eventually, kill
 from support.service_processes import serving
 
-pytestmark = [pytest.mark.ci, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.nightly, pytest.mark.timeout(300)]
 
 #: Generations of a job of some seconds.
 GENERATIONS = 300

@@ -22,8 +22,8 @@ LONG = 300
 #: Generations of a job that is queued behind it.
 SHORT = 5
 
-#: Roles that are killed on every change: API, coordinator, Ray, and an island on it.
-ESSENTIAL = ("api", "coordinator", "head", "island")
+#: Roles that are killed on every change: the coordinator, and an island.
+ESSENTIAL = ("coordinator", "island")
 
 #: Allowed numbers of attempts. A coordinator that loses Ray exits, unless the job ends before it notices. The
 #: loss of the API or of an island does not affect the coordinator.
@@ -63,7 +63,7 @@ def kinds(service: Service, job: str) -> list[str]:
     return [event["event"] for event in events]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_service_finds_the_models_of_one_process(service: Service, undisturbed: tuple[bytes, bytes]) -> None:
     record = read_record(service.folder.with_suffix(".csv"), SPEC["inputs"], SPEC["output"])
     settings = {**SPEC["settings"], "generations": SHORT}

@@ -289,6 +289,7 @@ def test_progress_counts_the_completed_analyses(diagnosis: Diagnosis) -> None:
     assert reports == [(f"{ended} of 6 analyses", ended / 6) for ended in range(1, 7)]
 
 
+@pytest.mark.ci
 def test_noise_model_fitted_to_a_drift_is_stable(diagnosis: Diagnosis) -> None:
     drift = np.concatenate(
         [1e-3 * 1.02 ** np.arange(diagnosis.estimation_samples), np.zeros(diagnosis.record.samples)]

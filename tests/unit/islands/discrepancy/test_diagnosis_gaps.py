@@ -44,7 +44,9 @@ def name_causes(found: Diagnosis) -> list[str]:
 
 @pytest.mark.ci
 @pytest.mark.parametrize("case", LOST)
-@pytest.mark.parametrize("noise", [WHITE, COLOURED], ids=["white", "coloured"])
+@pytest.mark.parametrize(
+    "noise", [WHITE, pytest.param(COLOURED, marks=pytest.mark.nightly)], ids=["white", "coloured"]
+)
 def test_record_with_gaps_gives_the_names_of_the_complete_record(noise: np.ndarray, case: str) -> None:
     for motion in (np.zeros(SAMPLES), DRIFT):
         complete, holed = (

@@ -108,7 +108,7 @@ def test_change_between_two_recordings_is_a_jump_at_the_boundary() -> None:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.nightly)])
 def test_complete_catalogue_names_friction_only_if_there_is_some(seed: int) -> None:
     with_friction = islands.join(oscillator_recordings(seed, effect="coulomb-friction", value=0.5))
     found = islands.diagnose(with_friction, "second-order")

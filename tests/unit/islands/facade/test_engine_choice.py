@@ -48,7 +48,7 @@ def installed(monkeypatch):
     OPENED.clear()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_an_engine_is_found_by_name_and_closed_after_the_search(installed):
     settings = {"preset": "narx", "population": 20, "generations": 2, "shooting": 50}
     serial = islands.identify(record(300), **settings)

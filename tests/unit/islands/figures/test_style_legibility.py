@@ -85,22 +85,22 @@ FIGURES: dict[str, "Callable[[], Figure]"] = {
 }
 
 
-#: All figures of the diagnosis of one record. The fast level checks one of them.
+#: All figures of the diagnosis of one record. The level ci checks one of them.
 DIAGNOSED = tuple(f"{name} of a diagnosis, 400 samples of 0.001 s" for name in DISCREPANCY_FIGURES)
 
-#: Figures that are saved twice at the fast level.
+#: Figures that are saved twice at the level ci.
 SAVED = ("a run of two segments", "a loop of two inputs", DIAGNOSED[1])
 
 
 def fast(names: Iterable[str]) -> pytest.MarkDecorator:
-    """Parametrise a test by all figures; those not in ``names`` belong to the level ci."""
+    """Parametrise a test by all figures; those not in ``names`` belong to the nightly level."""
     kept = set(names)
     return pytest.mark.parametrize(
-        "name", [name if name in kept else pytest.param(name, marks=pytest.mark.ci) for name in FIGURES]
+        "name", [name if name in kept else pytest.param(name, marks=pytest.mark.nightly) for name in FIGURES]
     )
 
 
-#: Figures whose layout is checked at the fast level: one of each kind, with the longest texts.
+#: Figures whose layout is checked at the level ci: one of each kind, with the longest texts.
 LAID_OUT = (
     *("a long run", "a run of two segments", "a loop of four inputs", "a diverging hold"),
     *("residuals of two inputs", DIAGNOSED[1]),

@@ -39,8 +39,8 @@ def choose(data, delays=None):
     ("name", "kind"),
     [
         ("first order", "smooth"),
-        ("Coulomb friction", "friction"),
-        ("tank", "magnitude"),
+        pytest.param("Coulomb friction", "friction", marks=pytest.mark.nightly),
+        pytest.param("tank", "magnitude", marks=pytest.mark.nightly),
         ("Bouc-Wen", "hysteresis"),
     ],
 )
@@ -53,7 +53,7 @@ def test_record_gets_the_library_of_its_kind(name, kind):
     assert compared[kind] <= 1.15 * min(compared.values())
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_dead_time_is_added_to_the_lags():
     choice, result = choose(record("dead time"))
     assert choice.delays == result.settings["delays"] == (7,)
@@ -70,7 +70,7 @@ def test_reasons_are_two_sentences():
     assert choice.reasons[0].startswith("Preset auto chose smooth (library polynomial of degree 2")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_choice_is_the_same_again_and_survives_json():
     data = record("first order", 300)
     choice, _ = choose(data)
