@@ -26,6 +26,7 @@ PROBLEM_TYPES: Mapping[str, str] = MappingProxyType(
         "JobMemoryError": "insufficient-memory",
         "ModelError": "invalid-model",
         "DatasetNotFoundError": "no-such-dataset",
+        "MonitorNotFoundError": "no-such-monitor",
         "BlobNotFoundError": "no-such-blob",
     }
 )

@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
 from islands_service.coordinator.job_notes import JobNotes
-from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, JobOutcome, Lease
+from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, MONITORING, JobOutcome, Lease
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 
@@ -53,7 +53,13 @@ def _run_diagnosis(*arguments: Any) -> JobOutcome:
     return run_diagnosis_job(*arguments)
 
 
+def _run_monitoring(*arguments: Any) -> JobOutcome:
+    from islands_service.coordinator.monitoring_job import run_monitoring_job  # noqa: PLC0415
+
+    return run_monitoring_job(*arguments)
+
+
 #: Runner of each kind of job.
 JOB_RUNNERS: Mapping[str, JobRunner] = MappingProxyType(
-    {IDENTIFICATION: _run_identification, DISCREPANCY: _run_diagnosis}
+    {IDENTIFICATION: _run_identification, DISCREPANCY: _run_diagnosis, MONITORING: _run_monitoring}
 )

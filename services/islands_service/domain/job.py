@@ -25,6 +25,7 @@ from importlib.metadata import version
 from typing import Any
 
 from islands.errors import IslandsError
+from islands_service.domain.monitoring import MonitorUpdate
 
 #: Version of islands of this process.
 ISLANDS_VERSION = version("islands")
@@ -55,6 +56,9 @@ IDENTIFICATION = "identification"
 
 #: Kind of a job that diagnoses a simulation.
 DISCREPANCY = "discrepancy"
+
+#: Kind of a job that analyses a record of a monitor.
+MONITORING = "monitoring"
 
 #: Artefact with the HTML report of a result.
 REPORT = "report.html"
@@ -121,7 +125,7 @@ class Submission:
     spec : mapping
         Specification that determines the result: see `islands_service.domain.job_spec`.
     kind : str
-        `IDENTIFICATION` or `DISCREPANCY`.
+        `IDENTIFICATION`, `DISCREPANCY` or `MONITORING`.
     name : str
         Display name.
     priority : int
@@ -130,6 +134,8 @@ class Submission:
         A repeated request with the same key returns the same job.
     islands : int
         Islands that run at once, which count towards the quota of the owner.
+    monitor : str, optional
+        Monitor whose record the job analyses, after the records that were submitted before.
     """
 
     owner: str
@@ -139,6 +145,7 @@ class Submission:
     priority: int = 0
     idempotency_key: str | None = None
     islands: int = 1
+    monitor: str | None = None
 
     @property
     def request(self) -> str:
@@ -245,6 +252,8 @@ class JobOutcome:
         Entry in the result document, and model file, of each model.
     artefacts : mapping of str to str
         Further files of the result: blobs by name.
+    monitor : MonitorUpdate, optional
+        Change of the monitor whose record the job has analysed.
     summary, problem : mapping, optional
         See `Job`.
     """
@@ -255,6 +264,7 @@ class JobOutcome:
     summary: Mapping[str, Any] | None = None
     problem: Mapping[str, Any] | None = None
     artefacts: Mapping[str, str] = field(default_factory=dict)
+    monitor: MonitorUpdate | None = None
 
 
 @dataclass(frozen=True, slots=True)

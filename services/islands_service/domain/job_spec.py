@@ -170,7 +170,8 @@ class Identification(BaseModel):
         return (*self.estimation, *([self.validation] if isinstance(self.validation, Part) else []))
 
 
-def _check_single(given: Any) -> Any:
+def check_single(given: Any) -> Any:
+    """Refuse several inputs of a simulation."""
     if isinstance(given, list | tuple):
         raise ValueError("a simulation is driven by one input: give the others as channels")
     return given
@@ -182,7 +183,7 @@ class Discrepancy(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     dataset: DatasetId = Field(description="The record: the id of an uploaded data set.")
-    input: Annotated[Name, BeforeValidator(_check_single)] = Field(
+    input: Annotated[Name, BeforeValidator(check_single)] = Field(
         description="Column that drives the simulation.", examples=["u_V"]
     )
     output: Name = Field(description="Column that was measured.", examples=["y_um"])
@@ -224,7 +225,7 @@ def parse_identification(document: Mapping[str, Any]) -> Identification:
     SettingsError
         The job was written by another version of islands.
     """
-    return _parse(Identification, document)
+    return parse_document(Identification, document)
 
 
 def parse_discrepancy(document: Mapping[str, Any]) -> Discrepancy:
@@ -235,10 +236,11 @@ def parse_discrepancy(document: Mapping[str, Any]) -> Discrepancy:
     SettingsError
         The job was written by another version of islands.
     """
-    return _parse(Discrepancy, document)
+    return parse_document(Discrepancy, document)
 
 
-def _parse(form: type[S], document: Mapping[str, Any]) -> S:
+def parse_document(form: type[S], document: Mapping[str, Any]) -> S:
+    """Parse a stored specification; an error asks to submit it again."""
     try:
         return form.model_validate(document)
     except ValidationError as error:

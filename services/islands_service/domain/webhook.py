@@ -1,4 +1,4 @@
-"""Webhooks: URLs that receive the events of an owner's jobs, and the deliveries of these events."""
+"""Webhooks: URLs that receive the events of an owner's jobs and monitors, and the deliveries of events."""
 
 import json
 from collections.abc import Mapping
@@ -7,10 +7,16 @@ from datetime import UTC, datetime
 from typing import Any
 
 from islands.errors import IslandsError
-from islands_service.domain.job import TERMINAL
+from islands_service.domain.job import MONITORING, TERMINAL
 
 #: Event by the state that a job has reached.
 EVENTS: Mapping[str, str] = {state: f"job.{state}" for state in TERMINAL}
+
+#: Event of a record that raised an alarm of its monitor.
+ALARM_EVENT = "monitor.alarm"
+
+#: All events.
+EVENT_NAMES = (*EVENTS.values(), ALARM_EVENT)
 
 #: Seconds between the first two attempts; each further interval is `RETRY_FACTOR` times as long.
 FIRST_RETRY = 5.0
@@ -34,7 +40,7 @@ class Webhook:
     Attributes
     ----------
     events : tuple of str
-        Some of `EVENTS`.
+        Some of `EVENT_NAMES`.
     created : float
         Seconds since 1970.
     """
@@ -107,15 +113,25 @@ def retry_delay(attempt: int) -> float | None:
 def make_body(event: str, job: str, kind: str, name: str, state: str, at: float) -> str:
     """Return the body of a delivery: which job has reached which state, and paths to read more. No data."""
     path = f"/v1/jobs/{job}"
-    document: dict[str, Any] = {
-        "type": event,
-        "timestamp": datetime.fromtimestamp(at, UTC).isoformat(timespec="milliseconds"),
-        "data": {
-            "job": job,
-            "kind": kind,
-            "name": name,
-            "state": state,
-            "links": {"job": path, "result": f"{path}/result", "report": f"{path}/report"},
-        },
+    links = {"job": path, "result": f"{path}/result"}
+    if kind != MONITORING:
+        links["report"] = f"{path}/report"
+    data = {"job": job, "kind": kind, "name": name, "state": state, "links": links}
+    return _make_document(event, at, data)
+
+
+def make_alarm_body(monitor: str, name: str, job: str, at: float) -> str:
+    """Return the body of the delivery of an alarm: the monitor, and the job of the record. No data."""
+    links = {
+        "monitor": f"/v1/monitors/{monitor}",
+        "job": f"/v1/jobs/{job}",
+        "result": f"/v1/jobs/{job}/result",
     }
+    data = {"monitor": monitor, "name": name, "job": job, "links": links}
+    return _make_document(ALARM_EVENT, at, data)
+
+
+def _make_document(event: str, at: float, data: Mapping[str, Any]) -> str:
+    timestamp = datetime.fromtimestamp(at, UTC).isoformat(timespec="milliseconds")
+    document = {"type": event, "timestamp": timestamp, "data": data}
     return json.dumps(document, ensure_ascii=False, separators=(",", ":"))

@@ -88,7 +88,7 @@ def validate_job(
 def _check_spec(spec: Identification | Discrepancy, settings: ServiceSettings) -> int:
     """Check a job without its data; return the number of its islands, 1 for a diagnosis."""
     if isinstance(spec, Discrepancy):
-        _check_discrepancy(spec)
+        check_discrepancy(spec)
         return 1
     resolved = resolve_job_settings(spec, settings.max_islands, settings.max_evaluations)
     limit = settings.max_job_memory or int(DEFAULT_SHARE * machine_memory())
@@ -119,8 +119,14 @@ def _check_sampling(datasets: list[StoredDataset]) -> None:
             )
 
 
-def _check_discrepancy(spec: Discrepancy) -> None:
-    """Check the simulation and the columns of a discrepancy job."""
+def check_discrepancy(spec: Discrepancy) -> None:
+    """Check the simulation and the columns of a discrepancy job without its data.
+
+    Raises
+    ------
+    SettingsError, RecordError, ModelError
+        See `validate_job`.
+    """
     _check_simulation(spec)
     if spec.input in spec.channels:
         raise RecordError(f"channel {spec.input} is the input itself: leave it out")

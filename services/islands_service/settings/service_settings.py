@@ -130,8 +130,8 @@ class ServiceSettings(BaseSettings):
         Tolerated difference of the clocks of the issuer and of this machine.
     tls_certificate, tls_key
         PEM files for HTTPS.
-    max_webhooks
-        Webhooks of one owner. 0 disables webhooks.
+    max_webhooks, max_monitors
+        Webhooks and monitors of one owner. 0 disables them.
     private_hosts
         Hosts to which the service may send requests for its clients though their addresses are private,
         separated by commas, each with an optional port: ``hooks.lan:8443, 10.0.0.7``. None by default.
@@ -204,6 +204,7 @@ class ServiceSettings(BaseSettings):
     tls_certificate: Path | None = None
     tls_key: Path | None = None
     max_webhooks: Annotated[int, Field(ge=0)] = 10
+    max_monitors: Annotated[int, Field(ge=0)] = 100
     private_hosts: Hosts = ""
     http_hosts: Hosts = ""
     metrics_host: str = "127.0.0.1"

@@ -30,6 +30,8 @@ class Action(StrEnum):
     CHANGE_OWNER = "change-owner"
     CREATE_WEBHOOK = "create-webhook"
     DELETE_WEBHOOK = "delete-webhook"
+    CREATE_MONITOR = "create-monitor"
+    DELETE_MONITOR = "delete-monitor"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +45,8 @@ class AuditEntry:
     action : str
         One of `Action`; a newer version may have others.
     owner, subject : str
-        Owner, and id, of the job, the data set, the key or the webhook; the owner is its own subject.
+        Owner, and id, of the job, the data set, the monitor, the key or the webhook; the owner is its own
+        subject.
     key_id : str or None
         Key of the request; None if it needed none.
     address : str

@@ -28,7 +28,8 @@ from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
 from islands_service.store.job_rows.job_deletion import delete_job
-from islands_service.store.job_rows.job_events import append_event, job_from_row, update_job
+from islands_service.store.job_rows.job_events import append_event, cancel_job, job_from_row, update_job
+from islands_service.store.job_rows.monitor_records import count_record
 from islands_service.store.job_rows.queue_statistics import QueueStatistics, read_queue_statistics
 from islands_service.store.job_rows.submission_checks import (
     check_datasets,
@@ -88,6 +89,8 @@ class Jobs:
             The job of the key was deleted.
         QuotaError
             The owner has as many unfinished jobs as its quota.
+        MonitorNotFoundError
+            The owner has no such monitor.
         SettingsError
             The job has more islands than the running jobs of the owner may have together.
         StoreUnavailableError, StorageFullError
@@ -100,6 +103,8 @@ class Jobs:
             if (existing := find_accepted_job(connection, submission)) is not None:
                 return existing, False
             check_quotas(connection, submission.owner, most_active, submission.islands, most_islands)
+            monitor = submission.monitor
+            number = None if monitor is None else count_record(connection, submission.owner, monitor)
             values = {
                 "id": uuid4().hex,
                 "owner": submission.owner,
@@ -110,6 +115,8 @@ class Jobs:
                 "idempotency_key": submission.idempotency_key,
                 "priority": submission.priority,
                 "islands": submission.islands,
+                "monitor_id": monitor,
+                "record_number": number,
             }
             row = connection.execute(_INSERT_JOB, values).one()
             append_event(connection, row, "queued")
@@ -177,15 +184,7 @@ class Jobs:
                 raise JobStateError(f"job {job} is {current.state}: there is nothing to cancel")
             if current.cancel_requested:
                 return job_from_row(current)
-            waiting = current.state == JobState.QUEUED
-            row = update_job(
-                connection,
-                job,
-                cancel_requested=True,
-                state=JobState.CANCELLED if waiting else current.state,
-                finished=now() if waiting else None,
-            )
-            append_event(connection, row, "cancelled" if waiting else "cancelling")
+            row = cancel_job(connection, current)
             record_change(connection, Action.CANCEL, owner, job, by)
             return job_from_row(row)
 

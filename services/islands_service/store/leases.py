@@ -24,8 +24,9 @@ from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
 from islands_service.store.job_rows.job_claims import claim_job
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document
+from islands_service.store.job_rows.job_results import store_result, to_text
 from islands_service.store.job_rows.queue_places import QueuePlace, find_places
-from islands_service.store.tables import artefacts, events, jobs, models, points, results
+from islands_service.store.tables import events, jobs, points
 
 #: Progress events that are kept per job. A client that was away longer reads the job itself.
 KEPT = 500
@@ -188,11 +189,12 @@ class Leases:
         )
 
     def finish(self, lease: Lease, outcome: JobOutcome) -> None:
-        """Store the outcome of a job together with its result.
+        """Store the outcome of a job together with its result, and with the state of its monitor.
 
         Raises
         ------
         LeaseLostError
+            The lease is no longer valid, or the monitor has changed since the job has read it.
         """
 
         def operation(connection: Connection) -> None:
@@ -204,21 +206,12 @@ class Leases:
                 lease_owner=None,
                 # A job that has succeeded never continues: allow a sweep of its checkpoint.
                 checkpoint=None if outcome.state == JobState.SUCCEEDED else jobs.c.checkpoint,
-                summary=_text(outcome.summary),
-                problem=_text(outcome.problem),
+                summary=to_text(outcome.summary),
+                problem=to_text(outcome.problem),
                 result_version=jobs.c.result_version if outcome.document is None else ISLANDS_VERSION,
             )
-            if outcome.document is not None:
-                # Also delete the artefacts, which belong to the previous result.
-                for table in (results, models, artefacts):
-                    connection.execute(delete(table).where(table.c.job_id == row.id))
-                connection.execute(insert(results).values(job_id=row.id, document=_text(outcome.document)))
-                for rank, (document, file) in enumerate(outcome.models, start=1):
-                    values = {"job_id": row.id, "rank": rank, "document": _text(document), "file": file}
-                    connection.execute(insert(models).values(values))
-                for name, blob in outcome.artefacts.items():
-                    connection.execute(insert(artefacts).values(job_id=row.id, name=name, blob=blob))
-            append_event(connection, row, outcome.state, _text(outcome.problem or outcome.summary) or "{}")
+            store_result(connection, row.id, outcome)
+            append_event(connection, row, outcome.state, to_text(outcome.problem or outcome.summary) or "{}")
 
         self._database.write(operation)
 
@@ -226,7 +219,7 @@ class Leases:
 def _release(connection: Connection, lease: Lease, attempted: bool, reason: str = "", **values: Any) -> None:
     if reason:
         reached = connection.execute(select(jobs.c.progress).where(jobs.c.id == lease.job.id)).scalar()
-        values["progress"] = _text({**(read_document(reached) or {}), "phase": "waiting", "note": reason})
+        values["progress"] = to_text({**(read_document(reached) or {}), "phase": "waiting", "note": reason})
     row = _update_fenced(
         connection,
         lease,
@@ -241,7 +234,7 @@ def _release(connection: Connection, lease: Lease, attempted: bool, reason: str 
 
 
 def _report(connection: Connection, lease: Lease, report: ProgressReport) -> Job:
-    values: dict[str, Any] = {"progress": _text(report.progress)}
+    values: dict[str, Any] = {"progress": to_text(report.progress)}
     if report.checkpoint is not None:
         values |= {"checkpoint": report.checkpoint, "checkpoint_version": ISLANDS_VERSION, "stalled": 0}
     row = _update_fenced(connection, lease, **values)
@@ -294,7 +287,3 @@ def _update_fenced(connection: Connection, lease: Lease, **values: Any) -> Row[A
 
 def _make_lease_lost_error(lease: Lease) -> LeaseLostError:
     return LeaseLostError(f"the lease of job {lease.job.id} is lost (epoch {lease.epoch})")
-
-
-def _text(document: Any) -> str | None:
-    return None if document is None else json.dumps(document)

@@ -8,6 +8,7 @@ from islands_service.store.datasets import Datasets
 from islands_service.store.jobs import Jobs
 from islands_service.store.leases import Leases
 from islands_service.store.migrations.upgrade import prepare
+from islands_service.store.monitor_states import Monitors
 from islands_service.store.results import Results
 from islands_service.store.retention import Retention
 from islands_service.store.tenants.deliveries import Deliveries
@@ -24,7 +25,9 @@ class Store:
     `LeaseLostError`. A checkpoint, its progress and its event appear together or not at all. An idempotency
     key names one job. Events of a job are numbered without gaps, in the order in which they became visible.
     An owner cannot access data of another owner. A change and its entry in the audit trail appear together;
-    so do the end of a job and the deliveries of its webhooks.
+    so do the end of a job and the deliveries of its webhooks. The records of a monitor are claimed one after
+    the other, in the order of their submission; the end of the job and the new state of the monitor appear
+    together.
 
     Parameters
     ----------
@@ -50,6 +53,7 @@ class Store:
         self.leases = Leases(self.database)
         self.results = Results(self.database)
         self.datasets = Datasets(self.database)
+        self.monitors = Monitors(self.database)
         self.keys = Keys(self.database)
         self.owners = Owners(self.database)
         self.webhooks = Webhooks(self.database)

@@ -72,6 +72,10 @@ jobs = Table(
     Column("declined", Text, nullable=False, server_default=""),
     # Islands of the search; 1 for a diagnosis.
     Column("islands", Integer, nullable=False, server_default=text("1")),
+    # Monitor whose record the job analyses, and the number of the record in the order of submission. The jobs
+    # of a deleted monitor are kept.
+    Column("monitor_id", String(32)),
+    Column("record_number", BigInteger),
     UniqueConstraint("owner", "idempotency_key"),
     Index(None, "owner", "created", "id"),
     Index(None, "owner", "state", "created", "id"),
@@ -86,6 +90,16 @@ Index(
     jobs.c.created,
     jobs.c.id,
     jobs.c.islands,
+)
+
+#: Order of the records of each monitor. Other jobs are not in it.
+Index(
+    "ix_jobs_monitor",
+    jobs.c.monitor_id,
+    jobs.c.state,
+    jobs.c.record_number,
+    sqlite_where=jobs.c.monitor_id.is_not(None),
+    postgresql_where=jobs.c.monitor_id.is_not(None),
 )
 
 #: Events of jobs. The number is the version of the job: without gaps, in the order of the commits.
@@ -175,6 +189,32 @@ keys = Table(
     Column("revoked", Float),
 )
 
+#: Simulations that follow the records of an owner. A record and its effect on the row are one transaction.
+monitors = Table(
+    "monitors",
+    metadata,
+    Column("id", String(32), primary_key=True),
+    Column("owner", String(64), nullable=False),
+    Column("name", String(200), nullable=False),
+    Column("spec", Text, nullable=False),
+    Column("priority", Integer, nullable=False),
+    # Raised by every analysed or rejected record.
+    Column("version", BigInteger, nullable=False),
+    # Number of the last submitted record.
+    Column("submitted", BigInteger, nullable=False),
+    Column("status", String(16), nullable=False),
+    Column("records", BigInteger, nullable=False),
+    Column("alarms", BigInteger, nullable=False),
+    # All that the analysis of a next record needs, and the states and alarms for clients.
+    Column("state", Text),
+    Column("document", Text),
+    Column("created", Float, nullable=False),
+    Column("updated", Float, nullable=False),
+    # Version of islands that wrote the state.
+    Column("islands_version", String(64)),
+    Index(None, "owner", "created", "id"),
+)
+
 #: URLs that receive the events of an owner's jobs.
 webhooks = Table(
     "webhooks",
@@ -233,7 +273,7 @@ audit = Table(
     Column("at", Float, nullable=False),
     Column("action", String(32), nullable=False),
     Column("owner", String(64), nullable=False),
-    # Id of the job, the data set, the key or the webhook, or name of the owner.
+    # Id of the job, the data set, the monitor, the key or the webhook, or name of the owner.
     Column("subject", String(64), nullable=False),
     # Key of the request; null without one.
     Column("key_id", String(16)),

@@ -11,6 +11,7 @@ from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
 from islands_service.store.job_rows.fair_queue import charge_owner, has_room, rank_owners
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document, update_job
+from islands_service.store.job_rows.monitor_records import IS_NEXT_RECORD
 from islands_service.store.tables import jobs
 
 #: Attempts since the last checkpoint after which a job is given up.
@@ -30,6 +31,7 @@ _FIRST = _CANDIDATE.where(
     jobs.c.owner == bindparam("owner", type_=String),
     or_(jobs.c.not_before <= now(), _CLOCK_WENT_BACK),
     ~jobs.c.declined.contains(bindparam("version", type_=String), escape="/"),
+    IS_NEXT_RECORD,
 ).order_by(jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
 _FIRST_LOCKED = _FIRST.with_for_update(skip_locked=True)
 

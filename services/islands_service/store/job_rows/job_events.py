@@ -23,6 +23,20 @@ def update_job(connection: Connection, job: str, **values: Any) -> Row[Any]:
     ).one()
 
 
+def cancel_job(connection: Connection, job: Row[Any]) -> Row[Any]:
+    """Cancel a queued job, or request cancellation of a running one; return the new row."""
+    waiting = job.state == JobState.QUEUED
+    row = update_job(
+        connection,
+        job.id,
+        cancel_requested=True,
+        state=JobState.CANCELLED if waiting else job.state,
+        finished=now() if waiting else None,
+    )
+    append_event(connection, row, "cancelled" if waiting else "cancelling")
+    return row
+
+
 def append_event(connection: Connection, row: Row[Any], kind: str, data: str = "{}") -> None:
     """Append the event of the current version of a job; at its end also to the outbox of webhooks."""
     values = {"job_id": row.id, "number": row.version, "kind": kind, "data": data, "at": row.updated}

@@ -39,21 +39,26 @@ class PendingDeliveries:
 def queue_deliveries(connection: Connection, job: Row[Any]) -> None:
     """Add the event of a job that has ended to the outbox of its owner's webhooks."""
     event = EVENTS[job.state]
-    found = connection.execute(
-        select(webhooks.c.id, webhooks.c.events).where(webhooks.c.owner == job.owner)
-    ).all()
     body = make_body(event, job.id, job.kind, job.name, job.state, job.updated)
+    queue_event(connection, event, job.owner, job.id, body, job.updated)
+
+
+def queue_event(connection: Connection, event: str, owner: str, job: str, body: str, at: float) -> None:
+    """Add an event to the outbox of the webhooks of an owner that ask for it."""
+    found = connection.execute(
+        select(webhooks.c.id, webhooks.c.events).where(webhooks.c.owner == owner)
+    ).all()
     for webhook in found:
         if event in json.loads(webhook.events):
             values = {
                 "id": uuid4().hex,
                 "webhook_id": webhook.id,
                 "event": event,
-                "job_id": job.id,
+                "job_id": job,
                 "body": body,
                 "attempts": 0,
-                "created": job.updated,
-                "next_at": job.updated,
+                "created": at,
+                "next_at": at,
             }
             connection.execute(insert(deliveries), values)
 

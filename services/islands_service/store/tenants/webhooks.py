@@ -12,7 +12,7 @@ from sqlalchemy import Connection, Row, delete, func, insert, select
 
 from islands.errors import SettingsError
 from islands_service.domain.job import QuotaError, Requester
-from islands_service.domain.webhook import EVENTS, Delivery, Webhook, WebhookNotFoundError
+from islands_service.domain.webhook import EVENT_NAMES, Delivery, Webhook, WebhookNotFoundError
 from islands_service.store.audit import Action, record_change
 from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
@@ -50,7 +50,7 @@ class Webhooks:
         url : str
             A URL that was checked by the caller.
         events : sequence of str
-            Some of `EVENTS`.
+            Some of `EVENT_NAMES`.
         most : int
             Largest number of webhooks of an owner.
 
@@ -61,10 +61,10 @@ class Webhooks:
         QuotaError
             The owner has ``most`` webhooks.
         """
-        if not events or not set(events) <= set(EVENTS.values()):
+        if not events or not set(events) <= set(EVENT_NAMES):
             raise SettingsError(
                 f"unknown events {', '.join(map(str, events)) or '(none)'}: take some of "
-                f"{', '.join(EVENTS.values())}"
+                f"{', '.join(EVENT_NAMES)}"
             )
         secret = SECRET_PREFIX + base64.b64encode(secrets.token_bytes(_SECRET_BYTES)).decode()
 

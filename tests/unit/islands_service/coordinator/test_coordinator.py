@@ -15,6 +15,7 @@ from islands_service.coordinator.coordinator import Coordinator
 from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
+    MONITORING,
     Job,
     JobOutcome,
     JobState,
@@ -58,7 +59,7 @@ def test_coordinator_runs_one_job_after_the_other(
 def test_coordinator_runs_jobs_of_every_kind(
     store: Store, job: Job, coordinator: Callable[..., Thread]
 ) -> None:
-    assert set(coordinator_module.JOB_RUNNERS) == {IDENTIFICATION, DISCREPANCY}
+    assert set(coordinator_module.JOB_RUNNERS) == {IDENTIFICATION, DISCREPANCY, MONITORING}
     short = store.jobs.submit(Submission(ALICE, held(job.spec["dataset"], rows="0:99"), DISCREPANCY))[0]
     coordinator()
     assert wait_until_finished(store, job).state == JobState.SUCCEEDED

@@ -27,6 +27,8 @@ def fill(store: Store) -> None:
     preview = {"columns": [{"name": "u", "unit": "µm"}]}
     store.datasets.add(ALICE, "Bühne.csv", ".csv", BLOB, 12, preview, source="https://example.org/a.csv")
     store.webhooks.create(ALICE, "https://hooks.example.org/a", ("job.succeeded",), 1)
+    monitor = store.monitors.create(ALICE, "press", {"input": "u"}, 0, 1)
+    store.jobs.cancel(ALICE, submitted(store, monitor=monitor.id).id)
     for outcome, owner in ((FOUND, ALICE), (FAILED, BOB)):
         submitted(store, owner, name="it's done; really", idempotency_key="k")
         lease = claimed(store)

@@ -1,0 +1,45 @@
+"""Results of jobs: the rows that the outcome of a job adds, in the transaction that ends it."""
+
+import json
+from typing import Any
+
+from sqlalchemy import Connection, delete, insert
+
+from islands_service.domain.job import JobOutcome
+from islands_service.store.job_rows.monitor_records import update_monitor
+from islands_service.store.tables import artefacts, models, results
+
+
+def store_result(connection: Connection, job: str, outcome: JobOutcome) -> None:
+    """Replace the result of a job, and store the new state of its monitor.
+
+    Parameters
+    ----------
+    connection : Connection
+        In the transaction that ends the job.
+    job : str
+    outcome : JobOutcome
+        Without a document the previous result is kept.
+
+    Raises
+    ------
+    LeaseLostError
+        See `update_monitor`.
+    """
+    if outcome.document is not None:
+        # Also delete the artefacts, which belong to the previous result.
+        for table in (results, models, artefacts):
+            connection.execute(delete(table).where(table.c.job_id == job))
+        connection.execute(insert(results).values(job_id=job, document=to_text(outcome.document)))
+        for rank, (document, file) in enumerate(outcome.models, start=1):
+            values = {"job_id": job, "rank": rank, "document": to_text(document), "file": file}
+            connection.execute(insert(models).values(values))
+        for name, blob in outcome.artefacts.items():
+            connection.execute(insert(artefacts).values(job_id=job, name=name, blob=blob))
+    if outcome.monitor is not None:
+        update_monitor(connection, job, outcome.monitor)
+
+
+def to_text(document: Any) -> str | None:
+    """Return a document as JSON; None for None."""
+    return None if document is None else json.dumps(document)

@@ -1,0 +1,213 @@
+"""Monitors of owners: create, read, list, delete. Their records are jobs, and change them when they end."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+from uuid import uuid4
+
+from sqlalchemy import Column, Connection, Row, Select, delete, func, insert, select, tuple_
+
+from islands_service.domain.job import ACTIVE, QuotaError, Requester
+from islands_service.domain.monitoring import Monitor, MonitorNotFoundError, MonitorStatus
+from islands_service.store.audit import Action, record_change
+from islands_service.store.backends import dialect
+from islands_service.store.backends.dialect import now
+from islands_service.store.database import Database
+from islands_service.store.job_rows.job_events import cancel_job
+from islands_service.store.tables import jobs, monitors
+
+_PENDING = (
+    select(func.count())
+    .select_from(jobs)
+    .where(jobs.c.monitor_id == monitors.c.id, jobs.c.state.in_(ACTIVE))
+    .scalar_subquery()
+)
+
+#: Rows without the states, which may have megabytes.
+_ROWS: Select[Any] = select(
+    *(column for column in monitors.c if column.name not in ("state", "document")), _PENDING.label("pending")
+)
+
+
+@dataclass(frozen=True, slots=True)
+class MonitorStatistics:
+    """Number of the monitors of all owners by status, and of their alarms."""
+
+    counts: Mapping[MonitorStatus, int]
+    alarms: int
+
+
+class Monitors:
+    """Monitor operations of the store.
+
+    Parameters
+    ----------
+    database : Database
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def create(
+        self,
+        owner: str,
+        name: str,
+        spec: Mapping[str, Any],
+        priority: int,
+        most: int,
+        by: Requester | None = None,
+    ) -> Monitor:
+        """Create a monitor without records.
+
+        Parameters
+        ----------
+        spec : mapping
+            A specification that was checked by the caller.
+        most : int
+            Largest number of monitors of an owner.
+
+        Raises
+        ------
+        QuotaError
+            The owner has ``most`` monitors.
+        """
+        identity = uuid4().hex
+        values = {
+            "id": identity,
+            "owner": owner,
+            "name": name,
+            "spec": json.dumps(spec),
+            "priority": priority,
+            "status": MonitorStatus.WAITING,
+            **dict.fromkeys(("version", "submitted", "records", "alarms"), 0),
+        }
+
+        def operation(connection: Connection) -> Monitor:
+            dialect.lock_owner(connection, owner)
+            present = connection.execute(
+                select(func.count()).select_from(monitors).where(monitors.c.owner == owner)
+            ).scalar_one()
+            if present >= most:
+                raise QuotaError(f"{present} monitors exist, and {most} is the most: delete one first")
+            connection.execute(insert(monitors).values(**values, created=now(), updated=now()))
+            record_change(connection, Action.CREATE_MONITOR, owner, identity, by)
+            return _make_monitor(_read_owned(connection, owner, identity))
+
+        return self._database.write(operation)
+
+    def get(self, owner: str, monitor: str) -> Monitor:
+        """Return a monitor.
+
+        Raises
+        ------
+        MonitorNotFoundError
+        """
+        with self._database.read() as connection:
+            return _make_monitor(_read_owned(connection, owner, monitor))
+
+    def load(self, owner: str, monitor: str) -> tuple[Monitor, str | None]:
+        """Return a monitor and its state for the next record; None before the first one.
+
+        Raises
+        ------
+        MonitorNotFoundError
+        """
+        return self._read_with(monitors.c.state, owner, monitor)
+
+    def result(self, owner: str, monitor: str) -> tuple[Monitor, str | None]:
+        """Return a monitor and its document for clients; None before the first record.
+
+        Raises
+        ------
+        MonitorNotFoundError
+        """
+        return self._read_with(monitors.c.document, owner, monitor)
+
+    def _read_with(self, column: Column[Any], owner: str, monitor: str) -> tuple[Monitor, str | None]:
+        query: Select[Any] = _ROWS.add_columns(column.label("text"))
+        with self._database.read() as connection:
+            row = connection.execute(query.where(*_owned(owner, monitor))).one_or_none()
+        if row is None:
+            raise _make_not_found_error(monitor)
+        return _make_monitor(row), row.text
+
+    def page(
+        self, owner: str, after: tuple[float, str] | None = None, limit: int = 50
+    ) -> tuple[tuple[Monitor, ...], tuple[float, str] | None]:
+        """Return a page of the monitors of an owner, newest first, and the position of the next page."""
+        query = _ROWS.where(monitors.c.owner == owner)
+        if after is not None:
+            query = query.where(tuple_(monitors.c.created, monitors.c.id) < tuple_(*after))
+        query = query.order_by(monitors.c.created.desc(), monitors.c.id.desc()).limit(limit + 1)
+        with self._database.read() as connection:
+            found = [_make_monitor(row) for row in connection.execute(query)]
+        more, found = len(found) > limit, found[:limit]
+        return tuple(found), (found[-1].created, found[-1].id) if more else None
+
+    def delete(self, owner: str, monitor: str, by: Requester | None = None) -> None:
+        """Delete a monitor with its states, and cancel the jobs of its records. Finished jobs are kept.
+
+        Raises
+        ------
+        MonitorNotFoundError
+        """
+
+        def operation(connection: Connection) -> None:
+            # First, since it locks the row: a record that is being submitted then finds no monitor.
+            gone = delete(monitors).where(*_owned(owner, monitor)).returning(monitors.c.id)
+            if connection.execute(gone).one_or_none() is None:
+                raise _make_not_found_error(monitor)
+            unfinished = select(jobs).where(
+                jobs.c.monitor_id == monitor, jobs.c.state.in_(ACTIVE), jobs.c.cancel_requested.is_(False)
+            )
+            for job in connection.execute(unfinished.with_for_update()).all():
+                cancel_job(connection, job)
+            record_change(connection, Action.DELETE_MONITOR, owner, monitor, by)
+
+        self._database.write(operation)
+
+    def statistics(self) -> MonitorStatistics:
+        """Return statistics of the monitors of all owners."""
+        query = select(monitors.c.status, func.count(), func.sum(monitors.c.alarms)).group_by(
+            monitors.c.status
+        )
+        with self._database.read() as connection:
+            found = connection.execute(query).all()
+        counts = {row[0]: row[1] for row in found}
+        # PostgreSQL returns a decimal number for a sum of integers.
+        alarms = sum(int(row[2]) for row in found)
+        return MonitorStatistics({status: counts.get(status, 0) for status in MonitorStatus}, alarms)
+
+
+def _owned(owner: str, monitor: str) -> tuple[Any, ...]:
+    return monitors.c.id == monitor, monitors.c.owner == owner
+
+
+def _read_owned(connection: Connection, owner: str, monitor: str) -> Row[Any]:
+    row = connection.execute(_ROWS.where(*_owned(owner, monitor))).one_or_none()
+    if row is None:
+        raise _make_not_found_error(monitor)
+    return row
+
+
+def _make_not_found_error(monitor: str) -> MonitorNotFoundError:
+    return MonitorNotFoundError(f"there is no monitor {monitor!r}: list them with GET /v1/monitors")
+
+
+def _make_monitor(row: Row[Any]) -> Monitor:
+    return Monitor(
+        row.id,
+        row.owner,
+        row.name,
+        json.loads(row.spec),
+        row.priority,
+        row.version,
+        MonitorStatus(row.status),
+        row.records,
+        row.alarms,
+        row.pending,
+        row.created,
+        row.updated,
+        row.islands_version,
+    )

@@ -1,0 +1,237 @@
+"""Contract of the store with monitors: records in order, each exactly once, with the state of the monitor."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from islands_service.domain.job import MONITORING, JobOutcome, JobState, LeaseLostError, QuotaError, Requester
+from islands_service.domain.monitoring import MonitorNotFoundError, MonitorStatus, MonitorUpdate
+from support.stores import (
+    ALICE,
+    BOB,
+    EXPIRED,
+    FAILED,
+    LONG,
+    at_once,
+    claimed,
+    contents,
+    kinds,
+    open_stores,
+    submitted,
+    turn_clock,
+)
+
+UNKNOWN = "0" * 32
+
+
+def created(store, owner=ALICE, most=10):
+    return store.monitors.create(owner, "press", {"input": "u"}, 5, most)
+
+
+def added(store, monitor, number=0, **changes):
+    """Submit a record of a monitor."""
+    spec = {"monitor": monitor.id, "number": number}
+    return submitted(store, monitor.owner, kind=MONITORING, spec=spec, monitor=monitor.id, **changes)
+
+
+def analysed(store, lease, is_alarm=False):
+    """Return the outcome of a record that is added to the current state of its monitor."""
+    monitor, state = store.monitors.load(lease.job.owner, lease.job.spec["monitor"])
+    records = [*json.loads(state or "[]"), lease.job.spec["number"]]
+    update = MonitorUpdate(
+        monitor.id,
+        monitor.version,
+        MonitorStatus.ALARM if is_alarm else MonitorStatus.NORMAL,
+        len(records),
+        monitor.alarms + is_alarm,
+        json.dumps(records),
+        json.dumps({"records": len(records)}),
+        is_alarm,
+    )
+    return JobOutcome(JobState.SUCCEEDED, {"number": lease.job.spec["number"]}, monitor=update)
+
+
+def records_of(store, monitor):
+    return json.loads(store.monitors.load(monitor.owner, monitor.id)[1] or "[]")
+
+
+def test_a_new_monitor_waits_for_its_first_record(store):
+    monitor = created(store)
+    assert (monitor.status, monitor.records, monitor.pending, monitor.version) == ("waiting", 0, 0, 0)
+    assert (monitor.spec, monitor.priority) == ({"input": "u"}, 5)
+    assert (
+        store.monitors.load(ALICE, monitor.id) == store.monitors.result(ALICE, monitor.id) == (monitor, None)
+    )
+    assert store.monitors.page(ALICE) == ((monitor,), None)
+
+
+def test_records_are_claimed_one_by_one_in_the_order_of_their_submission(store):
+    """A higher priority, which orders other jobs, and a clock that goes back change nothing."""
+    monitor = created(store)
+    jobs = [added(store, monitor, 0)]
+    turn_clock(store, -100.0)
+    jobs += [added(store, monitor, number, priority=number) for number in (1, 2, 3)]
+    for job in jobs:
+        lease = claimed(store)
+        assert lease.job.id == job.id
+        assert store.leases.claim("another", LONG) is None
+        store.leases.finish(lease, analysed(store, lease))
+    assert records_of(store, monitor) == [0, 1, 2, 3]
+    found = store.monitors.get(ALICE, monitor.id)
+    assert (found.records, found.version, found.status, found.pending) == (4, 4, "normal", 0)
+
+
+def test_records_delay_neither_other_monitors_nor_other_jobs(store):
+    first, second = created(store), created(store)
+    jobs = [added(store, first), added(store, first), added(store, second), submitted(store)]
+    found = [claimed(store).job.id for _ in range(3)]
+    assert set(found) == {jobs[0].id, jobs[2].id, jobs[3].id}
+    assert store.leases.claim("another", LONG) is None
+    assert store.monitors.get(ALICE, first.id).pending == 2
+
+
+def test_a_record_whose_coordinator_ended_is_claimed_before_later_ones(store):
+    monitor = created(store)
+    job = added(store, monitor)
+    added(store, monitor)
+    lost = claimed(store, EXPIRED)
+    again = claimed(store)
+    assert lost.job.id == again.job.id == job.id
+    store.leases.postpone(again, "the disk is slow", LONG)
+    assert store.leases.claim("another", LONG) is None
+
+
+def test_a_failed_record_that_is_resumed_waits_for_the_one_that_runs(store):
+    monitor = created(store)
+    first = added(store, monitor)
+    store.leases.finish(claimed(store), FAILED)
+    second = added(store, monitor)
+    lease = claimed(store)
+    assert lease.job.id == second.id
+    store.jobs.resume(ALICE, first.id)
+    assert store.leases.claim("another", LONG) is None
+    store.leases.finish(lease, analysed(store, lease))
+    assert claimed(store).job.id == first.id
+
+
+def test_the_state_of_a_monitor_and_the_end_of_the_job_appear_together(store):
+    monitor = created(store)
+    job = added(store, monitor)
+    lost = claimed(store, EXPIRED)
+    outcome = analysed(store, lost)
+    lease = claimed(store)
+    before = contents(store)
+    with pytest.raises(LeaseLostError):
+        store.leases.finish(lost, outcome)
+    assert contents(store) == before
+    store.leases.finish(lease, outcome)
+    assert (records_of(store, monitor), kinds(store, job.id)[-1]) == ([0], "succeeded")
+    with pytest.raises(LeaseLostError):
+        store.leases.finish(lease, outcome)
+    assert records_of(store, monitor) == [0]
+
+
+def test_an_update_of_an_earlier_version_of_the_monitor_changes_nothing(store):
+    monitor = created(store)
+    added(store, monitor)
+    lease = claimed(store)
+    outcome = analysed(store, lease)
+    stale = replace(outcome, monitor=replace(outcome.monitor, version=7))
+    before = contents(store)
+    with pytest.raises(LeaseLostError, match="was changed or deleted"):
+        store.leases.finish(lease, stale)
+    assert contents(store) == before
+    store.leases.finish(lease, outcome)
+
+
+def test_an_alarm_is_delivered_once_to_every_webhook_that_asks_for_it(store):
+    webhook, _ = store.webhooks.create(ALICE, "https://hooks.example.org/a", ("monitor.alarm",), 9)
+    other, _ = store.webhooks.create(ALICE, "https://hooks.example.org/b", ("job.failed",), 9)
+    monitor = created(store)
+    job = [added(store, monitor, number) for number in range(2)][-1]
+    for is_alarm in (False, True):
+        lease = claimed(store)
+        store.leases.finish(lease, analysed(store, lease, is_alarm))
+    (sent,) = store.webhooks.deliveries(ALICE, webhook.id)
+    assert (sent.event, sent.job) == ("monitor.alarm", job.id)
+    assert store.webhooks.deliveries(ALICE, other.id) == ()
+    (due,) = store.deliveries.claim(LONG, 10)
+    body = json.loads(due.body)
+    assert body["type"] == "monitor.alarm"
+    assert body["data"]["monitor"] == monitor.id
+    assert body["data"]["links"]["monitor"] == f"/v1/monitors/{monitor.id}"
+    statistics = store.monitors.statistics()
+    assert (statistics.counts[MonitorStatus.ALARM], statistics.alarms) == (1, 1)
+
+
+def test_deletion_of_a_monitor_cancels_its_waiting_records(store):
+    monitor, other = created(store), created(store)
+    running, waiting, foreign = added(store, monitor), added(store, monitor), added(store, other)
+    lease = claimed(store)
+    outcome = analysed(store, lease)
+    store.monitors.delete(ALICE, monitor.id, Requester("192.0.2.1"))
+    assert store.jobs.get(ALICE, running.id).cancel_requested
+    assert store.jobs.get(ALICE, waiting.id).state == JobState.CANCELLED
+    assert store.jobs.get(ALICE, foreign.id).state == JobState.QUEUED
+    with pytest.raises(LeaseLostError, match="was changed or deleted"):
+        store.leases.finish(lease, outcome)
+    with pytest.raises(MonitorNotFoundError):
+        added(store, monitor)
+    assert store.monitors.page(ALICE)[0] == (store.monitors.get(ALICE, other.id),)
+    (entry,) = store.audit.entries(limit=1)
+    assert (entry.action, entry.subject) == ("delete-monitor", monitor.id)
+
+
+@pytest.mark.parametrize("monitor", [None, UNKNOWN], ids=["foreign", "unknown"])
+def test_a_monitor_of_another_owner_is_not_found(store, monitor):
+    monitor = monitor or created(store, BOB).id
+    for operation in (store.monitors.get, store.monitors.load, store.monitors.result, store.monitors.delete):
+        with pytest.raises(MonitorNotFoundError, match=monitor):
+            operation(ALICE, monitor)
+    with pytest.raises(MonitorNotFoundError):
+        submitted(store, ALICE, kind=MONITORING, monitor=monitor)
+    assert store.jobs.page(ALICE).jobs == ()
+
+
+def test_a_repeated_submission_adds_no_second_record(store):
+    monitor = created(store)
+    assert added(store, monitor, idempotency_key="k").id == added(store, monitor, idempotency_key="k").id
+    assert store.monitors.get(ALICE, monitor.id).pending == 1
+
+
+def test_one_more_monitor_than_the_limit_is_refused(store):
+    created(store, most=1)
+    created(store, BOB, most=1)
+    with pytest.raises(QuotaError, match="1 monitors exist, and 1 is the most"):
+        created(store, most=1)
+
+
+def test_monitors_are_listed_in_pages(store):
+    made = [created(store).id for _ in range(5)]
+    found, after = [], None
+    while True:
+        page, after = store.monitors.page(ALICE, after, 2)
+        found += [each.id for each in page]
+        if after is None:
+            break
+    assert len(found) == 5
+    assert set(found) == set(made)
+
+
+@pytest.mark.ci
+def test_concurrent_coordinators_analyse_every_record_once_and_in_order(database):
+    count, processes = 24, 4
+
+    def work(store, name):
+        while store.monitors.get(ALICE, monitor.id).pending:
+            if (lease := store.leases.claim(name, LONG)) is not None:
+                store.leases.finish(lease, analysed(store, lease))
+
+    with open_stores(database, processes) as stores:
+        monitor = created(stores[0])
+        for number in range(count):
+            added(stores[0], monitor, number)
+        actions = [lambda store=store, at=at: work(store, f"{at}") for at, store in enumerate(stores)]
+        assert at_once(actions) == [None] * processes
+        assert records_of(stores[0], monitor) == list(range(count))
