@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from islands_api.schemas import ResponseModel
-from islands_service.domain.webhook import EVENTS
+from islands_service.domain.webhook import EVENT_NAMES
 from islands_service.outbound.checked_client import MAX_URL
 
 
@@ -33,11 +33,11 @@ class WebhookRequest(BaseModel):
         list[str],
         Field(
             min_length=1,
-            max_length=len(EVENTS),
+            max_length=len(EVENT_NAMES),
             description="Events to send; all by default.",
-            json_schema_extra={"items": {"type": "string", "enum": list(EVENTS.values())}},
+            json_schema_extra={"items": {"type": "string", "enum": list(EVENT_NAMES)}},
         ),
-    ] = list(EVENTS.values())
+    ] = list(EVENT_NAMES)
 
 
 class WebhookView(ResponseModel):

@@ -19,6 +19,9 @@ CHANGES = {
     ("PATCH", "/v1/admin/owners/{owner}"): Action.CHANGE_OWNER,
     ("POST", "/v1/webhooks"): Action.CREATE_WEBHOOK,
     ("DELETE", "/v1/webhooks/{webhook}"): Action.DELETE_WEBHOOK,
+    ("POST", "/v1/monitors"): Action.CREATE_MONITOR,
+    ("POST", "/v1/monitors/{monitor}/records"): Action.SUBMIT,
+    ("DELETE", "/v1/monitors/{monitor}"): Action.DELETE_MONITOR,
 }
 
 
@@ -39,6 +42,8 @@ def test_every_change_is_recorded_with_its_key_and_address(service):
     used, unused = kept(service.store, "me"), kept(service.store, "me", b"2")
     failed = job_in(service.store, JobState.FAILED, "me", spec=spec(used)).id
     webhook = service.store.webhooks.create("me", "https://1.1.1.1", ("job.succeeded",), 1)[0].id
+    columns = {name: value for name, value in held(used).items() if name != "dataset"}
+    monitor = service.store.monitors.create("me", "press", columns, 0, 1).id
     requests = [
         ("POST", "/v1/datasets", {"files": {"file": ("a.csv", csv())}}),
         ("DELETE", "/v1/datasets/{dataset}", {}),
@@ -47,6 +52,9 @@ def test_every_change_is_recorded_with_its_key_and_address(service):
         ("POST", "/v1/jobs/{job}/resume", {}),
         ("POST", "/v1/jobs/{job}/cancel", {}),
         ("DELETE", "/v1/jobs/{job}", {}),
+        ("POST", "/v1/monitors", {"json": columns}),
+        ("POST", "/v1/monitors/{monitor}/records", {"json": {"dataset": used}}),
+        ("DELETE", "/v1/monitors/{monitor}", {}),
         ("POST", "/v1/admin/keys", {"json": {"scopes": ["read"], "owner": "me"}}),
         ("PATCH", "/v1/admin/owners/{owner}", {"json": {"weight": 7}}),
         ("DELETE", "/v1/webhooks/{webhook}", {}),
@@ -56,12 +64,13 @@ def test_every_change_is_recorded_with_its_key_and_address(service):
     ]
     assert {(method, route) for method, route, _ in requests} == set(CHANGES)
     for method, route, body in requests:
-        path = route.format(job=failed, dataset=unused, owner="me", key=key.id, webhook=webhook)
+        subjects = {"job": failed, "dataset": unused, "owner": "me", "key": key.id}
+        subjects |= {"webhook": webhook, "monitor": monitor}
+        path = route.format(**subjects)
         answer = service.client.request(method, path, headers=header, **body)
         assert answer.is_success, (route, answer.text)
-        subjects = {"job": failed, "dataset": unused, "owner": "me", "key": key.id, "webhook": webhook}
         subject = subjects.get(route.partition("{")[2].partition("}")[0])
-        if "{" not in route:
+        if "{" not in route or route.endswith("/records"):
             subject = answer.json()["id"]
         (entry,) = service.store.audit.entries("me", limit=1)
         assert (entry.action, entry.subject) == (CHANGES[method, route], subject)

@@ -54,6 +54,12 @@ GUARDED = {
     ("POST", "/v1/webhooks"): "write",
     ("DELETE", "/v1/webhooks/{webhook}"): "write",
     ("GET", "/v1/webhooks/{webhook}/deliveries"): "read",
+    ("GET", "/v1/monitors"): "read",
+    ("POST", "/v1/monitors"): "write",
+    ("GET", "/v1/monitors/{monitor}"): "read",
+    ("GET", "/v1/monitors/{monitor}/state"): "read",
+    ("POST", "/v1/monitors/{monitor}/records"): "write",
+    ("DELETE", "/v1/monitors/{monitor}"): "write",
 }
 
 #: Public routes.
@@ -62,12 +68,15 @@ OPEN = {("GET", "/healthz"), ("GET", "/readyz"), ("GET", "/problems/{kind}")}
 
 def send_request(service, method, path, headers):
     """Send a request, with a body if the route needs one."""
-    path = path.format(
-        job="0" * 32, dataset="0" * 32, rank=1, figure="loop", key="0", owner="0", webhook="0" * 32
-    )
+    ids = dict.fromkeys(("job", "dataset", "webhook", "monitor"), "0" * 32)
+    path = path.format(rank=1, figure="loop", key="0", owner="0", **ids)
     body = {"json": spec("0-csv")} if (method, path) == ("POST", "/v1/jobs") else {}
     if path == "/v1/discrepancies":
         body = {"json": held("0-csv")}
+    if path.endswith("/records"):
+        body = {"json": {"dataset": "0-csv"}}
+    if (method, path) == ("POST", "/v1/monitors"):
+        body = {"json": {"diagnosis": "0" * 32}}
     if path.startswith("/v1/admin") and method in ("POST", "PATCH"):
         body = {"json": {}}
     if (method, path) in {("POST", "/v1/webhooks"), ("POST", "/v1/datasets/fetch")}:

@@ -14,6 +14,7 @@ from islands_api.web.routes.figures import SEARCH_FIGURES as NAMED
 from support.service import (
     columns,
     csv,
+    held,
     hidden,
     kept,
     problem_of,
@@ -119,6 +120,8 @@ def test_every_example_of_the_openapi_document_is_valid(document):
         "/v1/jobs/{job}/models/1/figures",
         "/v1/datasets",
         "/v1/datasets/{dataset}",
+        "/v1/monitors",
+        "/v1/monitors/{monitor}",
         "/v1/admin/keys",
         "/v1/admin/owners",
         "/v1/admin/owners/local",
@@ -130,7 +133,8 @@ def test_every_example_of_the_openapi_document_is_valid(document):
 )
 def test_responses_of_get_requests_match_the_documentation(service, document, finished, path):
     dataset = service.client.get("/v1/datasets").json()["items"][0]["id"]
-    answer = service.client.get(path.format(job=finished, dataset=dataset))
+    monitor = service.store.monitors.create("local", "press", held(dataset), 0, 99).id
+    answer = service.client.get(path.format(job=finished, dataset=dataset, monitor=monitor))
     assert answer.status_code == 200
     check_response(document, answer)
 
@@ -164,6 +168,17 @@ def test_responses_of_other_requests_match_the_documentation(service, document):
         == 304
     )
     service.client.post(f"/v1/jobs/{known}/cancel")
+    columns = {name: value for name, value in held("").items() if name != "dataset"}
+    monitor = check_response(document, service.client.post("/v1/monitors", json=columns))
+    path = monitor.headers["location"]
+    for method, where, body, status in (
+        ("POST", f"{path}/records", {"dataset": kept(service.store)}, 202),
+        ("GET", f"{path}/state", None, 404),
+        ("DELETE", path, None, 204),
+        ("DELETE", path, None, 404),
+    ):
+        answer = service.client.request(method, where, json=body)
+        assert check_response(document, answer).status_code == status
     key = check_response(document, service.client.post("/v1/admin/keys", json={"scopes": ["read"]}))
     path = f"/v1/admin/keys/{key.json()['id']}/revoke"
     assert check_response(document, service.client.post(path)).status_code == 200

@@ -44,7 +44,8 @@ rank = {{ values = [1, 2] }}
 [[operations]]
 include-name = [
     "POST /v1/jobs", "POST /v1/discrepancies", "POST /v1/datasets", "GET /v1/jobs", "GET /v1/datasets",
-    "POST /v1/datasets/fetch", "POST /v1/webhooks",
+    "POST /v1/datasets/fetch", "POST /v1/webhooks", "POST /v1/monitors", "GET /v1/monitors",
+    "POST /v1/monitors/{{monitor}}/records",
 ]
 checks.positive_data_acceptance.expected-statuses = ["2xx", "401", "403", "404", "409", "422", "429"]
 
@@ -53,11 +54,11 @@ checks.positive_data_acceptance.expected-statuses = ["2xx", "401", "403", "404",
 include-name = "POST /v1/datasets/fetch"
 checks.allow_header_conformance.enabled = false
 
-# Only jobs of one kind have these resources: 404 for a new job of the other kind is correct.
+# Only jobs of one kind have these resources, and a new monitor has no state: 404 is correct.
 [[operations]]
 include-name = [
     "GET /v1/jobs/{{job}}/extended", "GET /v1/jobs/{{job}}/figures", "GET /v1/jobs/{{job}}/history",
-    "GET /v1/jobs/{{job}}/models",
+    "GET /v1/jobs/{{job}}/models", "GET /v1/jobs/{{job}}/report", "GET /v1/monitors/{{monitor}}/state",
 ]
 checks.ensure_resource_availability.enabled = false
 """

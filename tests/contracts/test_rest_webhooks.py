@@ -19,7 +19,7 @@ from support.receivers import receiving
 from support.service import emptied, problem_of
 from support.stores import job_in
 
-EVENTS = ["job.succeeded", "job.failed", "job.cancelled"]
+EVENTS = ["job.succeeded", "job.failed", "job.cancelled", "monitor.alarm"]
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, get_args, over
 
 import httpx
 
-from islands_api.client import calls, dataset_calls, diagnosis_calls, webhook_calls
+from islands_api.client import calls, dataset_calls, diagnosis_calls, monitor_calls, webhook_calls
 from islands_api.client.calls import RequestSpec, T
 from islands_api.client.errors import JobFailedError
 from islands_api.client.transport import (
@@ -89,6 +89,12 @@ class BaseClient(Generic[H]):
     history = Endpoint(calls.history)
     export = Endpoint(calls.export)
     figure = Endpoint(calls.figure)
+    create_monitor = Endpoint(monitor_calls.create_monitor)
+    monitors = Endpoint(monitor_calls.monitors)
+    monitor = Endpoint(monitor_calls.monitor)
+    monitor_state = Endpoint(monitor_calls.monitor_state)
+    add_record = Endpoint(monitor_calls.add_record)
+    delete_monitor = Endpoint(monitor_calls.delete_monitor)
     create_webhook = Endpoint(webhook_calls.create_webhook)
     webhooks = Endpoint(webhook_calls.webhooks)
     delete_webhook = Endpoint(webhook_calls.delete_webhook)

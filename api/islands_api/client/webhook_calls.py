@@ -1,4 +1,4 @@
-"""Calls of webhooks, which the service calls when jobs end."""
+"""Calls of webhooks, which the service calls when jobs end and monitors raise alarms."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ def create_webhook(url: str, events: Sequence[str] | None = None) -> RequestSpec
     url : str
         HTTPS URL that receives the events.
     events : sequence of str, optional
-        Some of ``job.succeeded``, ``job.failed`` and ``job.cancelled``; all by default.
+        Some of ``job.succeeded``, ``job.failed``, ``job.cancelled`` and ``monitor.alarm``; all by default.
     """
     asked = {"url": url, **({} if events is None else {"events": list(events)})}
     return RequestSpec("POST", "/v1/webhooks", read_as(CreatedWebhook), json=asked, repeatable=False)

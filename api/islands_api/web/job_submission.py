@@ -14,6 +14,7 @@ from islands_api.web.dependencies import AppState
 from islands_api.web.problems import ResourceNotFoundError, ResultNotReadyError
 from islands_api.web.responses import JSONDocument, job_document
 from islands_service.domain.job import Job, JobState, Requester, Submission
+from islands_service.domain.job_spec import Discrepancy, Identification
 from islands_service.intake.file_inspection import inspect_file
 from islands_service.intake.job_inputs import link_blob
 from islands_service.intake.job_validation import ValidJob, validate_job
@@ -45,11 +46,9 @@ IdempotencyKey = Annotated[
     ),
 ]
 
-Request = JobRequest | DiscrepancyRequest
-
 
 async def submit_job(
-    state: AppState, caller: Principal, request: Request, kind: str, key: str | None
+    state: AppState, caller: Principal, request: JobRequest | DiscrepancyRequest, kind: str, key: str | None
 ) -> JSONDocument:
     """Validate a job, store it once and return it.
 
@@ -59,7 +58,19 @@ async def submit_job(
         The job could only fail, or its owner has used up a quota.
     """
     submission = Submission(caller.owner, request.spec, kind, request.name, request.priority, key)
-    job, new = await _validate_and_store(state, request, submission, caller.requester)
+    return await accept_job(state, caller, request, submission)
+
+
+async def accept_job(
+    state: AppState, caller: Principal, reading: Identification | Discrepancy, submission: Submission
+) -> JSONDocument:
+    """Validate and store a job as `submit_job` does, given the records that it reads.
+
+    Raises
+    ------
+    IslandsError
+    """
+    job, new = await _validate_and_store(state, reading, submission, caller.requester)
     if new:
         state.metrics.accepted.inc()
     headers = {
@@ -96,10 +107,10 @@ def etag(job: Job) -> str:
 
 
 async def _validate_and_store(
-    state: AppState, request: Request, submission: Submission, by: Requester
+    state: AppState, reading: Identification | Discrepancy, submission: Submission, by: Requester
 ) -> tuple[Job, bool]:
     """Return a stored job, and whether it is new."""
-    found = await state.run_blocking(_store_if_valid, state, request, submission, by)
+    found = await state.run_blocking(_store_if_valid, state, reading, submission, by)
     if isinstance(found, tuple):
         return found
     for inspection in found.inspections:
@@ -118,13 +129,13 @@ async def _validate_and_store(
 
 
 def _store_if_valid(
-    state: AppState, request: Request, submission: Submission, by: Requester
+    state: AppState, reading: Identification | Discrepancy, submission: Submission, by: Requester
 ) -> tuple[Job, bool] | ValidJob:
     """Store a job and return it, and whether it is new, unless files must be inspected before.
 
     One call does everything, since a change of the thread takes as long as a query.
     """
-    found = _validate_or_replay(state, request, submission)
+    found = _validate_or_replay(state, reading, submission)
     if isinstance(found, Job):
         return found, False
     return found if found.inspections else _store(state, submission, found, by)
@@ -135,7 +146,9 @@ def _store(state: AppState, submission: Submission, valid: ValidJob, by: Request
     return state.store.jobs.submit(submission, settings.max_active, by, settings.max_running_islands)
 
 
-def _validate_or_replay(state: AppState, request: Request, submission: Submission) -> Job | ValidJob:
+def _validate_or_replay(
+    state: AppState, reading: Identification | Discrepancy, submission: Submission
+) -> Job | ValidJob:
     """Return the job that an earlier request with the same key created, or what the validation found.
 
     The earlier job is looked up only if it saves an inspection or a rejection: an accepted job stays
@@ -143,7 +156,7 @@ def _validate_or_replay(state: AppState, request: Request, submission: Submissio
     transaction that stores the job.
     """
     try:
-        valid = validate_job(request, submission.owner, state.store, state.settings)
+        valid = validate_job(reading, submission.owner, state.store, state.settings)
     except IslandsError:
         if (replayed := state.store.jobs.find_replay(submission)) is not None:
             return replayed

@@ -24,6 +24,7 @@ from islands_service.domain.job import (
     JobStateError,
     QuotaError,
 )
+from islands_service.domain.monitoring import MonitorNotFoundError
 from islands_service.domain.webhook import WebhookNotFoundError
 from islands_service.outbound.addresses import OutboundFailedError
 from islands_service.store.backends.object_store import ObjectStoreError
@@ -156,6 +157,9 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         OwnerNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "no-such-owner", "There is no such owner"),
         WebhookNotFoundError: ProblemKind(
             HTTPStatus.NOT_FOUND, "no-such-webhook", "There is no such webhook"
+        ),
+        MonitorNotFoundError: ProblemKind(
+            HTTPStatus.NOT_FOUND, "no-such-monitor", "There is no such monitor"
         ),
         ResourceNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "not-found", "There is no such resource"),
         MalformedBodyError: ProblemKind(HTTPStatus.BAD_REQUEST, "bad-request", "The request cannot be read"),

@@ -115,6 +115,12 @@ class _JobCollector(Collector):
         yield GaugeMetricFamily(
             "islands_webhook_oldest_seconds", "Age of the oldest pending delivery.", pending.oldest
         )
+        found = self._store.monitors.statistics()
+        monitors = GaugeMetricFamily("islands_monitors", "Monitors by status.", labels=["status"])
+        for status, count in found.counts.items():
+            monitors.add_metric([status], count)
+        yield monitors
+        yield GaugeMetricFamily("islands_monitor_alarms", "Alarms of all monitors.", found.alarms)
         yield GaugeMetricFamily("islands_leases", "Leases that have not expired.", statistics.leases)
         running = (
             ("islands_evaluations_per_second", "Individuals evaluated per second.", "evaluations_per_second"),

@@ -10,6 +10,7 @@ from typing import Any
 from starlette.responses import JSONResponse
 
 from islands_service.domain.job import Job, JobState
+from islands_service.domain.monitoring import Monitor
 from islands_service.domain.owner import Owner
 from islands_service.domain.webhook import Delivery, Webhook
 from islands_service.store.datasets import StoredDataset
@@ -107,6 +108,21 @@ def dataset_summary(dataset: StoredDataset, retention: int = 0) -> dict[str, Any
     document = dataset_document(dataset, retention)
     summary = document.pop("preview")
     return {**document, **summary}
+
+
+def monitor_summary(monitor: Monitor) -> dict[str, Any]:
+    """Convert a monitor to a document with the fields of `islands_api.monitor_schemas.MonitorSummary`."""
+    return {
+        "id": monitor.id,
+        "name": monitor.name,
+        "status": monitor.status,
+        "records": monitor.records,
+        "alarms": monitor.alarms,
+        "pending": monitor.pending,
+        "priority": monitor.priority,
+        "created": _format_time(monitor.created),
+        "updated": _format_time(monitor.updated),
+    }
 
 
 def key_document(key: Key) -> dict[str, Any]:

@@ -7,6 +7,9 @@ import { poll } from "../lib/polling.js";
 
 const STATISTICS = ["Minimum", "Maximum", "Mean", "Std. deviation"];
 
+/** Return the input columns of a job; none for a record, whose monitor names them. */
+const getInputs = ({ inputs, input }) => inputs ?? (input === undefined ? [] : [input]);
+
 function makeColumnTable({ preview }, spec) {
   const hasRemarks = preview.columns.some((column) => column.problem);
   const role = (name) => {
@@ -15,7 +18,7 @@ function makeColumnTable({ preview }, spec) {
     // `u_V+1` is the column `u_V` advanced by one sample.
     const includesColumn = (names = []) =>
       names.some((each) => each === name || each.replace(/\+\d+$/, "") === name);
-    if (includesColumn(spec.inputs ?? [spec.input])) return "input";
+    if (includesColumn(getInputs(spec))) return "input";
     if (includesColumn(spec.channels)) return "channel";
     return spec.simulation?.column === name ? "simulation" : "";
   };
@@ -131,10 +134,14 @@ export function makeSettingsPanel(spec) {
     { class: "card" },
     el("h2", {}, "Settings"),
     makeFacts([
-      ["Inputs", (spec.inputs ?? [spec.input]).join(", ")],
+      ["Monitor", spec.monitor],
+      ["Record", spec.name],
+      ["Time", spec.time],
+      ["Inputs", getInputs(spec).join(", ")],
       ["Output", spec.output],
-      ...(spec.simulation ? listDiagnosisFacts(spec) : listSearchFacts(spec)),
-      ["Seed", String(spec.seed ?? "default")],
+      ...(spec.simulation ? listDiagnosisFacts(spec) : []),
+      ...(spec.simulation || spec.monitor ? [] : listSearchFacts(spec)),
+      ["Seed", spec.monitor ? null : String(spec.seed ?? "default")],
       ["Rows", spec.rows],
       ["Sampling time", spec.dt ? `${formatShort(spec.dt)} s` : null],
       ...changed,

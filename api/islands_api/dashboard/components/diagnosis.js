@@ -1,4 +1,4 @@
-/** Result of a discrepancy job: the verdict in words, the report, and the extended simulation. */
+/** Result in words of a discrepancy job, with its report, or of a record of a monitor. */
 
 import { el } from "../lib/dom.js";
 import { makeReportButtons, makeSaveButton } from "./report.js";
@@ -6,15 +6,19 @@ import { makeReportButtons, makeSaveButton } from "./report.js";
 /** Return whether a job is a discrepancy diagnosis. */
 export const isDiagnosis = (job) => job.kind === "discrepancy";
 
-/** Format the verdict of a job: `named: thermal-drift`. */
-export const formatVerdict = ({ verdict: word, effects }) =>
-  effects.length ? `${word}: ${effects.join(", ")}` : word;
+/** Return whether a job identifies models. */
+export const isSearch = (job) => job.kind === "identification";
+
+/** Format the verdict of a job, `named: thermal-drift`, or the status of its monitor. */
+export const formatVerdict = ({ verdict: word, effects = [], status }) =>
+  effects.length ? `${word}: ${effects.join(", ")}` : (word ?? status);
 
 /** Make the panel of the result. */
 export function makeFindingsPanel(job) {
   const { summary } = job;
   const file = `extended-${job.id.slice(0, 8)}.json`;
   const [first, ...lines] = summary.words.split("\n");
+  const isNamed = isDiagnosis(job) && summary.reduction_percent !== null;
   return el(
     "section",
     { class: "card findings" },
@@ -24,10 +28,8 @@ export function makeFindingsPanel(job) {
     el(
       "div",
       { class: "row exports" },
-      makeReportButtons(job),
-      summary.reduction_percent === null
-        ? null
-        : makeSaveButton(job, "Save the extended simulation", "extended", file),
+      isDiagnosis(job) ? makeReportButtons(job) : null,
+      isNamed ? makeSaveButton(job, "Save the extended simulation", "extended", file) : null,
     ),
   );
 }

@@ -2,7 +2,7 @@
 
 import { el, setText } from "../lib/dom.js";
 import { formatCount } from "../lib/numbers.js";
-import { formatVerdict, isDiagnosis } from "./diagnosis.js";
+import { formatVerdict, isSearch } from "./diagnosis.js";
 
 export const STATES = ["queued", "running", "succeeded", "failed", "cancelled"];
 
@@ -44,7 +44,7 @@ function formatQueue({ note, position, generation, generations }) {
 }
 
 function formatProgress(job) {
-  if (isDiagnosis(job) && job.summary) return formatVerdict(job.summary);
+  if (!isSearch(job) && job.summary) return formatVerdict(job.summary);
   const progress = job.progress ?? {};
   const { phase, note, generation, generations } = progress;
   if (isBetweenEpochs(job)) return note ?? phase;
@@ -65,7 +65,7 @@ export function makeProgressBar({ showsReason = false } = {}) {
     show(job) {
       const { generation = 0, generations = 1 } = job.progress ?? {};
       bar.value = job.state === "succeeded" ? 1 : generation / Math.max(1, generations);
-      if (isDiagnosis(job) && job.state === "running") {
+      if (!isSearch(job) && job.state === "running") {
         const { fraction } = job.progress ?? {};
         if (Number.isFinite(fraction)) bar.value = fraction;
         else bar.removeAttribute("value");
@@ -75,7 +75,7 @@ export function makeProgressBar({ showsReason = false } = {}) {
       text.classList.toggle("reason", Boolean(reason));
       text.title = reason ?? "";
       const isSentence = Boolean(reason) || (job.state === "queued" && Boolean(job.progress?.note));
-      text.classList.toggle("long", isSentence || isDiagnosis(job) || isBetweenEpochs(job));
+      text.classList.toggle("long", isSentence || !isSearch(job) || isBetweenEpochs(job));
       setText(text, reason ?? formatProgress(job));
     },
   };

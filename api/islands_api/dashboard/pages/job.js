@@ -4,7 +4,7 @@ import { clearBanner, showProblem } from "../components/banner.js";
 import { askConfirmation } from "../components/confirm.js";
 import { makeConvergencePanel } from "../components/convergence.js";
 import { makeDatasetPanel, makeSettingsPanel } from "../components/dataset.js";
-import { isDiagnosis, makeFindingsPanel } from "../components/diagnosis.js";
+import { isSearch, makeFindingsPanel } from "../components/diagnosis.js";
 import {
   getIsolatedName,
   getName,
@@ -23,7 +23,7 @@ import { followJob } from "../lib/polling.js";
 const getPath = (id) => `v1/jobs/${encodeURIComponent(id)}`;
 
 async function deleteJob(job) {
-  const contents = isDiagnosis(job) ? "findings and report" : "models, figures and history";
+  const contents = isSearch(job) ? "models, figures and history" : "findings and report";
   const text = `${getIsolatedName(job)} is deleted with its ${contents}. This cannot be undone.`;
   if (!(await askConfirmation("Delete this job?", text, "Delete it"))) return null;
   await sendRequest(getPath(job.id), { method: "DELETE" });
@@ -141,7 +141,7 @@ export function mountJob(host, { id, rank }, signal) {
   function build(job) {
     const onUnitKnown = (value) => {
       unit = value;
-      if (isDiagnosis(job)) return;
+      if (!isSearch(job)) return;
       convergence = makeConvergencePanel(id, unit, signal);
       convergenceHost.replaceChildren(convergence.node);
       if (current) show(current);
@@ -171,7 +171,7 @@ export function mountJob(host, { id, rank }, signal) {
     factsHost.replaceChildren(makeJobFacts(job, unit));
     failureHost.replaceChildren(...[makeFailureCard(job)].filter(Boolean));
     convergence?.advance(job);
-    if (isDiagnosis(job)) {
+    if (!isSearch(job)) {
       // Not replaced if present: a button in it may have the focus.
       const succeeded = job.state === "succeeded";
       if (succeeded !== modelsHost.hasChildNodes())

@@ -18,7 +18,7 @@ from islands_api.web.job_submission import get_job_of_kind, get_result
 from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import Rank, get_model
-from islands_service.domain.job import IDENTIFICATION, REPORT
+from islands_service.domain.job import IDENTIFICATION, MONITORING, REPORT
 from islands_service.domain.job_spec import parse_identification
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
@@ -157,7 +157,12 @@ async def simulation(job: Id, rank: Rank, caller: Reader, state: AppStateDep) ->
 @router.get("/{job}/report", response_class=Response, responses=_HTML_RESPONSES)
 async def report(job: Id, caller: Reader, state: AppStateDep) -> Response:
     """Return the report of a job: a self-contained HTML file with the result and its figures."""
-    await get_result(state, await state.run_blocking(state.store.jobs.get, caller.owner, job))
+    found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
+    await get_result(state, found)
+    if found.kind == MONITORING:
+        raise ResourceNotFoundError(
+            f"job {job} has analysed a record of a monitor and has no report: see its /result"
+        )
     response = await _figure_response(state, caller, job, REPORT, None, "text/html; charset=utf-8")
     response.headers["Content-Security-Policy"] = _REPORT_POLICY
     return response

@@ -1,0 +1,136 @@
+"""Wire models of monitors and their records."""
+
+from datetime import datetime
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from islands.io.simulator_spec.specification import SimulationSpec
+from islands_api.schemas import DATASET_ID, ResponseModel
+from islands_service.domain.job import PRIORITIES
+from islands_service.domain.job_spec import Name, Seconds, check_single
+from islands_service.domain.monitor_spec import (
+    DEFAULT_RATE,
+    TRAINING,
+    AlarmRate,
+    Interval,
+    Line,
+    RecordSpec,
+    Tolerances,
+    Training,
+)
+from islands_service.domain.monitoring import MonitorStatus
+
+_JOB_ID = "5d1b0a7e9c3f4e52a1f60c7b8d9e0f12"
+
+#: Fields that describe the simulation. A diagnosis has them.
+_SIMULATION = ("simulation", "input", "output", "channels", "dt")
+
+
+class MonitorRequest(BaseModel):
+    """Request to follow a simulation from record to record: that of a diagnosis, or a given one."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"diagnosis": _JOB_ID, "false_alarms": "1 per month", "interval": 3600.0, "name": "press 4"},
+                {
+                    "simulation": {"kind": "second-order"},
+                    "input": "F_N",
+                    "output": "x_m",
+                    "false_alarms": "1 per 720 records",
+                },
+            ]
+        },
+    )
+
+    diagnosis: Annotated[
+        str | None,
+        Field(
+            pattern=r"^[0-9A-Za-z_-]{1,64}$",
+            description="Id of a discrepancy job that has succeeded. Its extended simulation is followed or, "
+            "if it named no effect, its simulation, with its columns.",
+        ),
+    ] = None
+    simulation: SimulationSpec | None = Field(
+        default=None,
+        description="Simulation to follow. Parameters that it does not state are those of the first record.",
+    )
+    input: Annotated[Name | None, BeforeValidator(check_single)] = Field(
+        default=None, description="Column that drives the simulation."
+    )
+    output: Name | None = Field(default=None, description="Column that is measured.")
+    channels: Annotated[tuple[Name, ...], Field(max_length=15)] = Field(
+        default=(), description="Columns that may influence the output."
+    )
+    dt: Seconds | None = Field(
+        default=None, description="Sampling time in seconds, if the records do not contain it."
+    )
+    tolerance: Tolerances = Field(default_factory=dict)
+    false_alarms: Annotated[
+        AlarmRate, Field(description="Rate of false alarms of all monitored values together.")
+    ] = DEFAULT_RATE
+    interval: Interval = None
+    training: Training = TRAINING
+    name: Annotated[Line, Field(description="Human-readable name; one line.")] = ""
+    priority: Annotated[
+        int,
+        Field(
+            ge=PRIORITIES.start,
+            le=PRIORITIES.stop - 1,
+            description="Priority of the jobs that analyse the records, among your own jobs.",
+        ),
+    ] = 0
+
+    @model_validator(mode="after")
+    def _check_simulation(self) -> Self:
+        if self.diagnosis is None and None in (self.simulation, self.input, self.output):
+            raise ValueError("give the diagnosis, or simulation, input and output")
+        if self.diagnosis is not None and (given := {*_SIMULATION} & self.model_fields_set):
+            raise ValueError(f"the diagnosis has {', '.join(sorted(given))}: leave them out")
+        return self
+
+
+class MonitorRecordRequest(RecordSpec):
+    """Request to analyse a record of a monitor."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"dataset": DATASET_ID, "name": "hour 12", "time": "2026-11-23T12:00:00"}]
+        }
+    )
+
+
+class MonitorSummary(ResponseModel):
+    """Monitor without its states."""
+
+    id: str
+    name: str
+    status: MonitorStatus = Field(
+        description="waiting for the first record, training, normal, or alarm if the last record raised one."
+    )
+    records: int = Field(description="Number of analysed records.")
+    alarms: int = Field(description="Number of alarms.")
+    pending: int = Field(description="Number of records that are queued or being analysed.")
+    priority: int
+    created: datetime
+    updated: datetime = Field(description="Time at which the last record was analysed.")
+
+
+class MonitorView(MonitorSummary):
+    """Monitor with the states of its effects and its alarms."""
+
+    spec: dict[str, Any] = Field(description="Simulation, columns and settings.")
+    result: dict[str, Any] | None = Field(
+        default=None,
+        description="As `monitor.json` of the command line: parameters, states of the effects in each "
+        "record, alarms with their beginning, and rejected records; null before the first record.",
+    )
+
+
+class MonitorPage(ResponseModel):
+    """Page of monitors, newest first."""
+
+    items: tuple[MonitorSummary, ...]
+    next: str | None = Field(default=None, description="Cursor of the next page. None on the last page.")

@@ -1,0 +1,161 @@
+"""Monitors: create, list, read, add a record, delete."""
+
+import json
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Response
+
+from islands.io.simulator_spec.specification import ExtendedSpec
+from islands_api.monitor_schemas import MonitorPage, MonitorRecordRequest, MonitorRequest, MonitorView
+from islands_api.schemas import JobView
+from islands_api.web.auth import Principal, Reader, Writer
+from islands_api.web.dependencies import AppState, AppStateDep
+from islands_api.web.job_submission import (
+    ACCEPTED_RESPONSES,
+    IdempotencyKey,
+    accept_job,
+    get_job_of_kind,
+    get_result,
+)
+from islands_api.web.problems import RESPONSES, ResourceNotFoundError
+from islands_api.web.requests import Cursor, JSONRoute, Limit, decode_cursor, encode_cursor
+from islands_api.web.responses import JSONDocument, json_text, monitor_summary
+from islands_service.domain.job import DISCREPANCY, EXTENDED, MONITORING, Submission
+from islands_service.domain.job_spec import parse_discrepancy
+from islands_service.domain.monitor_spec import MonitorSpec, parse_monitor
+from islands_service.domain.monitoring import Monitor
+from islands_service.intake.job_validation import check_discrepancy
+
+router = APIRouter(prefix="/v1/monitors", tags=["monitors"], responses=RESPONSES, route_class=JSONRoute)
+
+#: Path parameter: the id of a monitor.
+Id = Annotated[
+    str,
+    Path(
+        pattern=r"^[0-9a-f]{32}$",
+        description="A monitor's `id`.",
+        examples=["c2f41d0a6b7e4d51a0e3b9f8d7c6a5b4"],
+    ),
+]
+
+_CREATED: dict[int | str, dict[str, Any]] = {
+    201: {
+        "description": "Created.",
+        "headers": {"Location": {"description": "Path of the monitor.", "schema": {"type": "string"}}},
+    }
+}
+
+
+@router.post("", status_code=201, response_model=MonitorView, responses=_CREATED)
+async def create(request: MonitorRequest, caller: Writer, state: AppStateDep) -> Any:
+    """Create a monitor of a diagnosed or given simulation. Its records follow one by one.
+
+    The first `training` records are taken as the undisturbed state.
+    """
+    spec = await _make_spec(state, caller, request)
+    # The name of a data set is part of the form, and not checked.
+    check_discrepancy(spec.describe_record("none"))
+    monitor = await state.run_blocking(
+        state.store.monitors.create,
+        caller.owner,
+        request.name,
+        spec.model_dump(mode="json", exclude_unset=True, by_alias=True),
+        request.priority,
+        state.settings.max_monitors,
+        caller.requester,
+    )
+    location = f"{state.settings.root_path}{router.prefix}/{monitor.id}"
+    return Response(_render(monitor, None), 201, {"Location": location}, "application/json")
+
+
+@router.get("", response_model=MonitorPage)
+async def monitors(caller: Reader, state: AppStateDep, cursor: Cursor = None, limit: Limit = 50) -> Any:
+    """List the monitors, newest first, without their states."""
+    page, after = await state.run_blocking(
+        state.store.monitors.page, caller.owner, decode_cursor(cursor), limit
+    )
+    return JSONDocument({"items": [monitor_summary(each) for each in page], "next": encode_cursor(after)})
+
+
+@router.get("/{monitor}", response_model=MonitorView)
+async def monitor(monitor: Id, caller: Reader, state: AppStateDep) -> Any:
+    """Return a monitor: the states of the effects in each record, and the alarms with their beginning."""
+    found, document = await state.run_blocking(state.store.monitors.result, caller.owner, monitor)
+    return Response(_render(found, document), media_type="application/json")
+
+
+@router.get("/{monitor}/state", response_model=dict[str, Any])
+async def saved(monitor: Id, caller: Reader, state: AppStateDep) -> Response:
+    """Return `state.json` of a monitor, from which `islands monitor` continues with the same bits."""
+    _, text = await state.run_blocking(state.store.monitors.load, caller.owner, monitor)
+    if text is None:
+        raise ResourceNotFoundError(f"monitor {monitor} has no state: wait for its first record")
+    return Response(text, media_type="application/json")
+
+
+@router.post("/{monitor}/records", status_code=202, response_model=JobView, responses=ACCEPTED_RESPONSES)
+async def add_record(
+    monitor: Id,
+    request: MonitorRecordRequest,
+    caller: Writer,
+    state: AppStateDep,
+    idempotency_key: IdempotencyKey = None,
+) -> Any:
+    """Submit a job that analyses the next record of a monitor.
+
+    Records are analysed one after the other in the order of submission, each exactly once. The job is
+    followed and cancelled under `/v1/jobs`; its `result` has the states of this record and the alarms that
+    it raised. A record that cannot be used fails its job and is listed under `rejected` of the monitor.
+    """
+    found = await state.run_blocking(state.store.monitors.get, caller.owner, monitor)
+    submission = Submission(
+        caller.owner,
+        {"monitor": monitor, **request.model_dump(mode="json", exclude_unset=True)},
+        MONITORING,
+        request.name or found.name,
+        found.priority,
+        idempotency_key,
+        monitor=monitor,
+    )
+    reading = parse_monitor(found.spec).describe_record(request.dataset, request.rows)
+    return await accept_job(state, caller, reading, submission)
+
+
+@router.delete("/{monitor}", status_code=204)
+async def delete(monitor: Id, caller: Writer, state: AppStateDep) -> Response:
+    """Delete a monitor with its states; records that wait are cancelled. Finished jobs are kept."""
+    await state.run_blocking(state.store.monitors.delete, caller.owner, monitor, caller.requester)
+    return Response(status_code=204)
+
+
+async def _make_spec(state: AppState, caller: Principal, request: MonitorRequest) -> MonitorSpec:
+    """Return the specification of a monitor, with the simulation of its diagnosis.
+
+    Raises
+    ------
+    JobNotFoundError, ResourceNotFoundError, ResultNotReadyError
+        The diagnosis does not exist, is no diagnosis, or has not succeeded.
+    """
+    given = request.model_dump(exclude_unset=True, exclude={"diagnosis", "name", "priority"})
+    if request.diagnosis is None:
+        return MonitorSpec.model_validate(given)
+    job = await get_job_of_kind(state, caller, request.diagnosis, DISCREPANCY)
+    await get_result(state, job)
+    asked = parse_discrepancy(job.spec)
+    columns = (asked.input, *asked.channels)
+    simulation = asked.simulation
+    blob = await state.run_blocking(state.store.results.artefact, job.id, EXTENDED)
+    if blob is not None:
+        text = await state.run_blocking(state.blobs.read, blob)
+        simulation = ExtendedSpec.model_validate(json.loads(text))
+        columns = simulation.inputs
+    known: dict[str, Any] = {"input": columns[0], "output": asked.output, "channels": columns[1:]}
+    if asked.dt is not None:
+        known["dt"] = asked.dt
+    return MonitorSpec.model_validate({"simulation": simulation, **known, **given})
+
+
+def _render(monitor: Monitor, document: str | None) -> bytes:
+    """Return a monitor as JSON. Its states may have megabytes: they are not parsed."""
+    head = json_text({**monitor_summary(monitor), "spec": monitor.spec})
+    return f'{head[:-1]},"result":{document or "null"}}}'.encode()
