@@ -43,6 +43,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "serve": "Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next "
         "start.",
         "jobs": "Jobs of a service: submit, diagnose, list, show, watch, cancel, resume, result.",
+        "monitors": "Monitors of a service: create, add records, list, show, delete.",
         "keys": "API keys of a service: create, list, revoke.",
         "admin": "Operation of a service: audit, owners, backup, restore.",
     }
@@ -50,7 +51,10 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
 
 #: Folders of the commands that are not in the folder of all commands.
 FOLDERS: Mapping[str, str] = MappingProxyType(
-    {**dict.fromkeys(("demo", "examples", "systems"), "demonstration"), "monitor": "monitoring"}
+    {
+        **dict.fromkeys(("demo", "examples", "systems"), "demonstration"),
+        **dict.fromkeys(("monitor", "monitors"), "monitoring"),
+    }
 )
 
 #: Extra of ``pyproject.toml`` by the package that it installs.

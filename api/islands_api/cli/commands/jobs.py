@@ -1,6 +1,7 @@
 """``islands jobs``: submission and monitoring of jobs, over REST only."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,11 +15,12 @@ from islands_api.cli.output_folder import check_folder
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, Seed, with_search_options
 from islands_api.cli.service import job_views as views
+from islands_api.cli.service.client_options import LOCAL, ApiKey, Json, Url, open_client, read_pages
 from islands_api.client import Client, JobFailedError
 from islands_api.client.diagnosis_calls import parse_simulation
 from islands_api.client.recording_parts import make_part
 from islands_api.schemas import JobView
-from islands_service.domain.job import DISCREPANCY, JobState
+from islands_service.domain.job import IDENTIFICATION, JobState
 
 jobs = typer.Typer(
     help="Jobs of a service: submit, diagnose, list, show, watch, cancel, resume, result.",
@@ -26,12 +28,6 @@ jobs = typer.Typer(
     add_completion=False,
 )
 
-Url = Annotated[str, typer.Option("--url", envvar="ISLANDS_URL", help="The service's address.")]
-ApiKey = Annotated[
-    str | None,
-    typer.Option("--key", envvar="ISLANDS_KEY", help="API key; not needed on the service's own machine."),
-]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Name = Annotated[str, typer.Option("--name", help="Name of the job, for display.")]
 Priority = Annotated[int, typer.Option("--priority", help="Of your own jobs, higher ones run first.")]
 IdempotencyKey = Annotated[
@@ -40,13 +36,6 @@ IdempotencyKey = Annotated[
 ]
 Watch = Annotated[bool, typer.Option("--watch", help="Wait for the job and print its result.")]
 Id = Annotated[str, typer.Argument(help="The job's id.")]
-
-#: Default address of the service.
-LOCAL = "http://127.0.0.1:8000"
-
-#: Seconds during which a command repeats a call to an unreachable service. Watching a job uses the client's
-#: default, which is longer.
-RETRY_SECONDS = 5.0
 
 #: Largest length of a job's name.
 _MAX_NAME_LENGTH = 200
@@ -80,7 +69,7 @@ def submit(
     held_out = _parse_validation(validation)
     if isinstance(held_out, str) and len(records) > 1:
         raise SettingsError(f"--validation {held_out}: with several recordings, give a file or a fraction")
-    with _client(url, key) as client:
+    with open_client(url, key) as client:
         whole = output_column if rows is None else None
         dataset, *others = (client.upload(record, names, whole, dt, reading.changes()) for record in records)
         validation_data: float | dict[str, Any] | None
@@ -140,7 +129,7 @@ def diagnose(
     channel_names = options.columns(channels or [])
     simulation = parse_simulation(simulated)
     read = [driving, *channel_names, *([simulation["column"]] if "column" in simulation else [])]
-    with _client(url, key) as client:
+    with open_client(url, key) as client:
         whole = output_column if rows is None else None
         dataset, *others = (client.upload(record, read, whole, dt, reading.changes()) for record in records)
         job = client.diagnose(
@@ -173,27 +162,21 @@ def list_jobs(
     as_json: Json = False,
 ) -> None:
     """List the jobs, newest first."""
-    found: list[JobView] = []
-    with _client(url, key) as client:
-        page = client.jobs(state, limit=min(limit, 200))
-        found += page.items
-        while page.next is not None and len(found) < limit:
-            page = client.jobs(state, page.next, min(limit - len(found), 200))
-            found += page.items
-    views.show_jobs(found, as_json)
+    with open_client(url, key) as client:
+        views.show_jobs(read_pages(partial(client.jobs, state), limit), as_json)
 
 
 @jobs.command()
 def show(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
     """Show the current state of a job."""
-    with _client(url, key) as client:
+    with open_client(url, key) as client:
         views.show_job(client.job(job), as_json)
 
 
 @jobs.command()
 def watch(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
     """Follow a job until it has ended, and print its result. Ctrl-C stops watching, not the job."""
-    with _client(url, key) as client:
+    with open_client(url, key) as client:
         now = client.job(job)
     _follow(url, key, now, as_json)
 
@@ -201,14 +184,14 @@ def watch(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) 
 @jobs.command()
 def cancel(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
     """Cancel a job; it can be resumed."""
-    with _client(url, key) as client:
+    with open_client(url, key) as client:
         views.show_job(client.cancel(job), as_json)
 
 
 @jobs.command()
 def resume(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
     """Resume a job that has failed or was cancelled from its last checkpoint."""
-    with _client(url, key) as client:
+    with open_client(url, key) as client:
         views.show_job(client.resume(job), as_json)
 
 
@@ -227,9 +210,9 @@ def result(
     if out is not None:
         for kind in views.RESULTS.values():
             check_folder(out, force, kind.file)
-    with _client(url, key) as client:
+    with open_client(url, key) as client:
         document = client.result(job)
-        kind = views.RESULTS["models" if "models" in document else "verdict"]
+        kind = next(kind for name, kind in views.RESULTS.items() if name in document)
         if out is not None:
             kind.download(client, job, document, out)
         if as_json:
@@ -268,10 +251,6 @@ def _parse_validation(text: str | None) -> Path | str | float | None:
         ) from None
 
 
-def _client(url: str, key: str | None) -> Client:
-    return Client(url, key, retry=RETRY_SECONDS)
-
-
 def _follow(url: str, key: str | None, job: JobView, as_json: bool) -> None:
     """Show the progress of a job until it has ended, then its result.
 
@@ -291,8 +270,8 @@ def _follow(url: str, key: str | None, job: JobView, as_json: bool) -> None:
             raise
         if as_json:
             views.show_job(job, as_json)
-        elif job.state == JobState.SUCCEEDED and job.kind == DISCREPANCY:
-            views.show_diagnosis(job)
+        elif job.state == JobState.SUCCEEDED and job.kind != IDENTIFICATION:
+            views.show_findings(job)
         elif job.state == JobState.SUCCEEDED:
             views.show_models(client, job, client.models(job))
     if job.state != JobState.SUCCEEDED:

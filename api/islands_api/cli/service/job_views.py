@@ -18,7 +18,7 @@ from islands.io.simulator_spec.specification import EXTENDED_FILE
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
-from islands_service.domain.job import DISCREPANCY, TERMINAL, JobState
+from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, TERMINAL, JobState
 
 #: Largest number of islands that have a line each.
 _SHOWN_ISLANDS = 16
@@ -43,8 +43,8 @@ def show_job(job: JobView, as_json: bool) -> None:
         output.print(_describe_phase(job), markup=False)
     if status.get("note") and job.state not in TERMINAL:
         output.print(status["note"], markup=False)
-    if job.kind == DISCREPANCY:
-        show_diagnosis(job)
+    if job.kind != IDENTIFICATION:
+        show_findings(job)
     elif job.summary is not None:
         # Results of earlier versions have no sentences.
         for sentence in job.summary.get("words", job.summary["equation"]).splitlines():
@@ -53,8 +53,8 @@ def show_job(job: JobView, as_json: bool) -> None:
         output.print(job.problem["detail"], markup=False)
 
 
-def show_diagnosis(job: JobView) -> None:
-    """Show the verdict of a discrepancy job as text, or the phase of a running one."""
+def show_findings(job: JobView) -> None:
+    """Show the verdict of a discrepancy job, or the states of a record, as text; the phase if it runs."""
     if job.summary is not None:
         output.print(job.summary["words"], markup=False)
     elif job.progress is not None and job.state == JobState.RUNNING:
@@ -137,7 +137,7 @@ def job_progress_bar() -> Iterator[Callable[[JobView], None]]:
             text = f"{job.state}, generation {done}/{status.get('generations', '?')}, best error {best}"
             # The other phases of a search are the stages before and after its epochs.
             searching = job.state in TERMINAL or status.get("phase", "search") == "search"
-            if job.kind == DISCREPANCY or not searching:
+            if job.kind != IDENTIFICATION or not searching:
                 text = f"{job.state}, {_describe_phase(job)}"
             islands = [
                 f"  island {index:3d}  RMSE {_format_number(error)}"
@@ -188,6 +188,12 @@ def download_diagnosis(client: Client, job: str, document: dict[str, Any], folde
     _write_document(document, folder / "discrepancy.json")
 
 
+def download_record(_client: Client, _job: str, document: dict[str, Any], folder: Path) -> None:
+    """Write the result of a record of a monitor into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    _write_document(document, folder / "record.json")
+
+
 def parse_models(document: dict[str, Any]) -> tuple[ModelView, ...]:
     """Return the models of a result document."""
     return ModelPage(items=document["models"]).items
@@ -226,7 +232,13 @@ RESULTS: Mapping[str, DownloadFolder] = MappingProxyType(
             "discrepancy.json",
             "discrepancy.json, report.html, extended.json if an effect was named",
             download_diagnosis,
-            lambda client, job, _: show_diagnosis(client.job(job)),
+            lambda client, job, _: show_findings(client.job(job)),
+        ),
+        "record": DownloadFolder(
+            "record.json",
+            "record.json",
+            download_record,
+            lambda client, job, _: show_findings(client.job(job)),
         ),
     }
 )

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from islands.evolution.engine import SerialEngine
-from islands_api.cli.commands import jobs as command
+from islands_api.cli.service import client_options
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import JobOutcome, Submission
 from islands_service.store.blobs import Blobs
@@ -41,7 +41,7 @@ def owner(service: Service, monkeypatch: pytest.MonkeyPatch) -> str:
 @pytest.fixture
 def run(owner: str, monkeypatch: pytest.MonkeyPatch, command_line: Run, tmp_path: Path) -> Run:
     """Run ``islands jobs`` in a folder with ``r.csv``; return exit code, standard output and error."""
-    monkeypatch.setattr(command, "RETRY_SECONDS", 0.2)
+    monkeypatch.setattr(client_options, "RETRY_SECONDS", 0.2)
     (tmp_path / "r.csv").write_bytes(csv())
     return partial(command_line, "jobs")
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from islands_api.cli.commands import jobs as command
+from islands_api.cli.service import client_options
 from islands_service.domain.job import JobOutcome
 from support.command_line import COLUMNS, ISLANDS
 from support.processes import eventually
@@ -258,4 +258,4 @@ def test_options_name_the_service_and_the_key(
 
 
 def test_unreachable_service_is_retried_for_a_short_time() -> None:
-    assert command.RETRY_SECONDS <= 5.0
+    assert client_options.RETRY_SECONDS <= 5.0
