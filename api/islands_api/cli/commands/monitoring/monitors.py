@@ -7,17 +7,13 @@ from typing import Annotated
 import typer
 
 from islands.errors import SettingsError
-from islands.figures.over_time.monitored_states import draw_monitored_states
-from islands.figures.style import save
-from islands.io.checkpoints.monitor_document import monitor_json
-from islands.io.checkpoints.monitor_state import monitor_from_json, write_monitor
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands_api.cli import options
 from islands_api.cli.commands.monitoring.watched_folder import find_time, hash_file, order_of_recording
 from islands_api.cli.console import errors, output
 from islands_api.cli.record_options import with_reading_options
-from islands_api.cli.service import monitor_views as views
 from islands_api.cli.service.client_options import LOCAL, ApiKey, Json, Url, open_client, read_pages
+from islands_api.cli.service.job_views import print_json
 from islands_api.client import Client
 from islands_api.monitor_schemas import MonitorView
 from islands_api.schemas import JobView
@@ -31,8 +27,8 @@ monitors = typer.Typer(
 
 Id = Annotated[str, typer.Argument(help="The monitor's id.")]
 
-#: Files of ``--out``, as ``islands monitor`` writes them.
-STATE, RESULT, FIGURE = "state.json", "monitor.json", "monitor.svg"
+#: Line of a monitor in a list.
+_LINE = "{:32}  {:8}  {:>7}  {:>6}  {:>7}  {}"
 
 #: Exit code if an added record has raised an alarm.
 ALARM_EXIT = 3
@@ -87,7 +83,7 @@ def create(
             name=name,
             priority=priority,
         )
-    views.show_monitor(made, None, as_json)
+    _show_status(made, as_json)
 
 
 @monitors.command()
@@ -160,7 +156,15 @@ def list_monitors(
 ) -> None:
     """List the monitors, newest first."""
     with open_client(url, key) as client:
-        views.show_monitors(read_pages(client.monitors, limit), as_json)
+        found = read_pages(client.monitors, limit)
+    if as_json:
+        print_json({"items": [each.model_dump(mode="json") for each in found]})
+        return
+    # Not a table: it would truncate the ids in a narrow terminal or a pipe.
+    output.print(_LINE.format("monitor", "status", "records", "alarms", "pending", "name"), markup=False)
+    for each in found:
+        line = _LINE.format(each.id, each.status, each.records, each.alarms, each.pending, each.name)
+        output.print(line, markup=False)
 
 
 @monitors.command()
@@ -185,14 +189,17 @@ def show(
         found = client.monitor(monitor)
         if found.result is None and out is not None:
             raise SettingsError(f"monitor {monitor} waits for its first record: there is nothing to download")
-        saved = None if found.result is None else monitor_from_json(client.monitor_state(monitor))
-    views.show_monitor(found, saved, as_json)
-    if out is not None and saved is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        write_monitor(saved, out / STATE)
-        (out / RESULT).write_text(monitor_json(saved), encoding="utf-8")
-        save(draw_monitored_states(saved.state), out / FIGURE)
-        output.print(f"{out}/: {STATE}, {RESULT}, {FIGURE}", markup=False)
+        state = None if found.result is None else client.monitor_state(monitor)
+    _show_status(found, as_json)
+    if state is None:
+        return
+    from islands_api.cli.service.monitor_files import describe_states, write_states  # noqa: PLC0415
+
+    if not as_json:
+        for line in describe_states(state):
+            output.print(line, markup=False)
+    if out is not None:
+        errors.print(write_states(state, out), markup=False)
 
 
 @monitors.command()
@@ -201,3 +208,14 @@ def delete(monitor: Id, url: Url = LOCAL, key: ApiKey = None) -> None:
     with open_client(url, key) as client:
         client.delete_monitor(monitor)
     output.print(f"monitor {monitor} is deleted", markup=False)
+
+
+def _show_status(monitor: MonitorView, as_json: bool) -> None:
+    """Show the status of a monitor and the numbers of its records and alarms."""
+    if as_json:
+        print_json(monitor.model_dump(mode="json"))
+        return
+    named = f" ({monitor.name})" if monitor.name else ""
+    counts = f"records {monitor.records}, alarms {monitor.alarms}"
+    waiting = f", records to analyse {monitor.pending}" if monitor.pending else ""
+    output.print(f"monitor {monitor.id}{named}: {monitor.status}, {counts}{waiting}", markup=False)

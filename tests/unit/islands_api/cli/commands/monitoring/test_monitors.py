@@ -8,12 +8,17 @@ from typing import Any
 
 import pytest
 
+from islands.facade.record_monitor import reject_record
+from islands.io.checkpoints.monitor_document import monitor_document
+from islands.io.checkpoints.monitor_state import monitor_to_json
+from islands_api.cli.commands.monitoring.watched_folder import hash_file
 from islands_api.cli.service import client_options
 from islands_api.web.auth import LOCAL_OWNER
-from islands_service.domain.job import MONITORING, JobOutcome, JobState
+from islands_service.domain.job import MONITORING, JobOutcome, JobState, Submission
 from islands_service.domain.monitoring import MonitorStatus, MonitorUpdate
+from support.monitored_oscillator import follow, make_records
 from support.service import Service, csv
-from support.stores import claimed
+from support.stores import claimed, taken
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -59,12 +64,12 @@ def test_records_are_added_in_the_order_of_recording_and_once(
     paths = [str(tmp_path / name) for name in names]
     code, shown, _ = run("add", monitor, *paths, "--no-watch")
     assert (code, shown.count("job ")) == (0, 2)
-    assert run("add", monitor, *paths, "--no-watch")[1] == shown
+    assert run("add", monitor, paths[1], "--no-watch")[1] == shown.splitlines(keepends=True)[0]
     lease = claimed(service.store)
     assert lease.job.kind == MONITORING
     assert (lease.job.spec["name"], lease.job.spec["time"]) == (names[1], "2026-11-03T09:00:00")
     service.store.jobs.cancel(LOCAL_OWNER, shown.split()[4].removesuffix(":"))
-    document = {"records": [{"name": names[1], "sha256": hash_of(paths[1])}], "rejected": []}
+    document = {"records": [{"name": names[1], "sha256": hash_file(Path(paths[1]))}], "rejected": []}
     update = MonitorUpdate(monitor, 0, MonitorStatus.ALARM, 1, 1, "{}", json.dumps(document), True)
     summary = {"words": "ALARM: k changed", "alarms": 1}
     service.store.leases.finish(
@@ -74,7 +79,21 @@ def test_records_are_added_in_the_order_of_recording_and_once(
     assert (code, shown, complaint) == (0, "", "")
 
 
-def hash_of(path: str) -> str:
-    from islands_api.cli.commands.monitoring.watched_folder import hash_file
-
-    return hash_file(Path(path))
+@pytest.mark.ci
+def test_the_states_of_a_monitor_are_shown_and_downloaded(run: Run, service: Service, tmp_path: Path) -> None:
+    saved = reject_record(follow(make_records(1)), "short.csv", "", "it is too short")
+    monitor = json.loads(run(*CREATE, "--json")[1])["id"]
+    submission = Submission(LOCAL_OWNER, {}, MONITORING, priority=100, monitor=monitor)
+    job, _ = service.store.jobs.submit(submission)
+    texts = monitor_to_json(saved), json.dumps(monitor_document(saved))
+    update = MonitorUpdate(monitor, 0, MonitorStatus.TRAINING, 1, 0, *texts, False)
+    outcome = JobOutcome(JobState.SUCCEEDED, {"record": {}}, monitor=update)
+    service.store.leases.finish(taken(service.store, job.id), outcome)
+    code, shown, _ = run("show", monitor, "--out", "states")
+    first, record, rejected = shown.splitlines()
+    assert (code, first) == (0, f"monitor {monitor}: training, records 1, alarms 0")
+    assert record.endswith("training 1 of 16")
+    assert rejected == "short.csv: rejected: it is too short"
+    assert (tmp_path / "states" / "state.json").read_text() == texts[0]
+    assert json.loads((tmp_path / "states" / "monitor.json").read_text()) == json.loads(texts[1])
+    assert "<svg" in (tmp_path / "states" / "monitor.svg").read_text()
