@@ -47,7 +47,7 @@ include-name = [
     "POST /v1/datasets/fetch", "POST /v1/webhooks", "POST /v1/monitors", "GET /v1/monitors",
     "POST /v1/monitors/{{monitor}}/records",
 ]
-checks.positive_data_acceptance.expected-statuses = ["2xx", "401", "403", "404", "409", "422", "429"]
+checks.positive_data_acceptance.expected-statuses = ["2xx", "401", "403", "404", "409", "410", "422", "429"]
 
 # The path is also that of a data set with this id, whose methods are allowed, too.
 [[operations]]
