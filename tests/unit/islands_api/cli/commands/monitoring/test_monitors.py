@@ -80,14 +80,17 @@ def test_records_are_added_in_the_order_of_recording_and_once(
 
 
 @pytest.mark.ci
-def test_the_states_of_a_monitor_are_shown_and_downloaded(run: Run, service: Service, tmp_path: Path) -> None:
+def test_the_states_of_a_monitor_are_shown_and_downloaded(
+    run: Run, command_line: Run, service: Service, tmp_path: Path
+) -> None:
     saved = reject_record(follow(make_records(1)), "short.csv", "", "it is too short")
     monitor = json.loads(run(*CREATE, "--json")[1])["id"]
     submission = Submission(LOCAL_OWNER, {}, MONITORING, priority=100, monitor=monitor)
     job, _ = service.store.jobs.submit(submission)
     texts = monitor_to_json(saved), json.dumps(monitor_document(saved))
     update = MonitorUpdate(monitor, 0, MonitorStatus.TRAINING, 1, 0, *texts, False)
-    outcome = JobOutcome(JobState.SUCCEEDED, {"record": {}}, monitor=update)
+    summary = {"words": "record 0: normal", "alarms": 0}
+    outcome = JobOutcome(JobState.SUCCEEDED, {"record": {}}, summary=summary, monitor=update)
     service.store.leases.finish(taken(service.store, job.id), outcome)
     code, shown, _ = run("show", monitor, "--out", "states")
     first, record, rejected = shown.splitlines()
@@ -96,4 +99,7 @@ def test_the_states_of_a_monitor_are_shown_and_downloaded(run: Run, service: Ser
     assert rejected == "short.csv: rejected: it is too short"
     assert (tmp_path / "states" / "state.json").read_text() == texts[0]
     assert json.loads((tmp_path / "states" / "monitor.json").read_text()) == json.loads(texts[1])
+    code, shown, _ = command_line("jobs", "result", job.id, "--out", "record")
+    assert (code, shown) == (0, "record 0: normal\nrecord/: record.json\n")
+    assert json.loads((tmp_path / "record" / "record.json").read_text()) == {"record": {}}
     assert "<svg" in (tmp_path / "states" / "monitor.svg").read_text()
