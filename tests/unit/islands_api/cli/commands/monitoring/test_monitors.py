@@ -39,6 +39,7 @@ def run(service: Service, monkeypatch: pytest.MonkeyPatch, command_line: Run) ->
     return partial(command_line, "monitors")
 
 
+@pytest.mark.ci
 def test_a_monitor_is_created_listed_shown_and_deleted(run: Run) -> None:
     code, shown, _ = run(*CREATE, "--false-alarms", "1 per 720 records", "--name", "press 4", "--json")
     made = json.loads(shown)
@@ -53,7 +54,7 @@ def test_a_monitor_is_created_listed_shown_and_deleted(run: Run) -> None:
     assert (code, "no monitor" in complaint) == (2, True)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_records_are_added_in_the_order_of_recording_and_once(
     run: Run, service: Service, tmp_path: Path
 ) -> None:
