@@ -1,5 +1,6 @@
 """Filters that several effects use: first-order low-pass and fractional delay."""
 
+from functools import lru_cache
 from math import exp, factorial
 
 import numpy as np
@@ -31,12 +32,18 @@ def low_pass(signal: Signal, tau: float, dt: float) -> Signal:
     error makes a lag of half a sample look like another effect.
     """
     step = dt / tau
-    weights = _LAGRANGE @ _moments(step)
+    weights = _compute_weights(step)
     start = signal[0]
     seen = np.concatenate([[0.0], signal - start, [signal[-1] - start]])
     moved = np.convolve(seen, weights[::-1], mode="valid")
     followed = scipy.signal.lfilter([1.0], [1.0, -exp(-step)], moved)
     return np.concatenate([[start], followed + start])
+
+
+@lru_cache(maxsize=256)
+def _compute_weights(step: float) -> Signal:
+    """Return the weights of four neighbours; a calibration needs those of few time constants."""
+    return np.array(_LAGRANGE @ _moments(step))
 
 
 def _moments(step: float) -> Signal:

@@ -29,6 +29,10 @@ class ForceLaw:
         Whether the force dissipates energy, as friction and drag do.
     initial_state_index : int or None
         Index of the value that is the initial internal state; None if the initial state is zero.
+    equation, state_equation : str
+        The same force and derivative as expressions of ``x``, its rate ``v``, the state ``z`` and the numbers
+        ``n0``, ``n1``, ..., for simulations of equations, which compute expressions faster than functions.
+        Empty if the force is only a function.
     """
 
     force: Law
@@ -36,6 +40,12 @@ class ForceLaw:
     constants: Callable[[SimulationContext], tuple[float, ...]] = lambda _: ()
     is_dissipative: bool = False
     initial_state_index: int | None = None
+    equation: str = ""
+    state_equation: str = ""
+
+    def get_initial_state(self, values: Signal) -> float:
+        """Return the internal state at the first sample."""
+        return 0.0 if self.initial_state_index is None else float(values[self.initial_state_index])
 
 
 def pack_force_laws(
@@ -71,12 +81,7 @@ def pack_force_laws(
                 for element, _ in forces
             ]
         ),
-        np.array(
-            [
-                0.0 if element.initial_state_index is None else values[element.initial_state_index]
-                for element, values in forces
-            ]
-        ),
+        np.array([element.get_initial_state(values) for element, values in forces]),
         numbers,
     )
 
@@ -93,3 +98,28 @@ def add_output_forces(
         x, np.gradient(x, context.dt), context.dt, pack_force_laws(forces, context, balance=False), total
     )
     return total
+
+
+def sum_output_forces(
+    inputs: Sequence[Signal], context: SimulationContext, forces: Sequence[Sequence[tuple[ForceLaw, Signal]]]
+) -> list[Signal]:
+    """Return `add_output_forces` of several simulations; a law is computed once for equal inputs and values.
+
+    Parameters
+    ----------
+    inputs : sequence of ndarray, each of shape (samples,)
+        Coordinate of each simulation. Equal ones are the same array.
+    forces : sequence of sequence
+        Forces of each simulation.
+    """
+    known: dict[tuple[int, ForceLaw, bytes], Signal] = {}
+    sums = []
+    for x, given in zip(inputs, forces, strict=True):
+        total = np.zeros(x.size)
+        for law, values in given:
+            key = id(x), law, values.tobytes()
+            if key not in known:
+                known[key] = add_output_forces(x, context, [(law, values)])
+            total += known[key]
+        sums.append(total)
+    return sums

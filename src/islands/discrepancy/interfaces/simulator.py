@@ -126,6 +126,22 @@ class BatchSimulator(Protocol):
         """Simulate the outputs of runs with the same effects and force laws, shape (runs, samples)."""
 
 
+@runtime_checkable
+class WrappingSimulator(Protocol):
+    """Simulator that runs another one."""
+
+    @property
+    def simulator(self) -> Simulator:
+        """The simulator that is run."""
+
+
+def is_batch_simulator(simulator: Simulator) -> bool:
+    """Return whether a simulator, or the one that it runs, computes several runs at once."""
+    while isinstance(simulator, WrappingSimulator):
+        simulator = simulator.simulator
+    return isinstance(simulator, BatchSimulator)
+
+
 def simulate_runs(simulator: Simulator, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
     """Simulate runs with the same effects and force laws, at once if the simulator can; (runs, samples)."""
     if isinstance(simulator, BatchSimulator):

@@ -13,6 +13,7 @@ from islands.discrepancy.interfaces.simulator import (
     Forces,
     SimulationRun,
     Simulator,
+    is_batch_simulator,
     simulate_runs,
     split_recordings,
 )
@@ -123,6 +124,11 @@ class ExtendedSimulator:
         return np.array(self.recordings > 0)
 
     @property
+    def is_batch(self) -> bool:
+        """Whether several simulations of one call cost less than one by one."""
+        return is_batch_simulator(self.simulator)
+
+    @property
     def simulator_slice(self) -> slice:
         """Slice of the values that belongs to the simulator."""
         return self._slices[0]
@@ -172,7 +178,7 @@ class ExtendedSimulator:
             )
             return np.full_like(joined, np.nan) if np.isnan(joined).any() else joined
         if effect_parameters or forces:
-            run = self._make_run(values, effect_parameters, forces)
+            run = self._make_run(values, effect_parameters, forces, {})
             with np.errstate(over="ignore", invalid="ignore"):
                 y = self.simulator.simulate(
                     run.values, run.x, self.context, run.effect_parameters, run.forces
@@ -206,7 +212,8 @@ class ExtendedSimulator:
         known = {key: self._cache[key] for key in keys if key in self._cache}
         missing = {key: values for key, values in zip(keys, points, strict=True) if key not in known}
         if missing:
-            runs = [self._make_run(values, _NONE, ()) for values in missing.values()]
+            inputs: dict[bytes, Signal] = {}
+            runs = [self._make_run(values, _NONE, (), inputs) for values in missing.values()]
             with np.errstate(over="ignore", invalid="ignore"):
                 found = simulate_runs(self.simulator, runs, self.context)
             known |= zip(missing, found, strict=True)
@@ -227,16 +234,29 @@ class ExtendedSimulator:
         return np.full_like(y, np.nan) if diverged else y
 
     def _make_run(
-        self, values: Signal, effect_parameters: Mapping[str, float], further: Forces
+        self,
+        values: Signal,
+        effect_parameters: Mapping[str, float],
+        further: Forces,
+        inputs: dict[bytes, Signal],
     ) -> SimulationRun:
-        """Return the run of the simulator, with all effects but the output maps."""
-        x, forces = self.context.u, list(further)
+        """Return the run, without output maps. Runs with equal input maps share their input in ``inputs``."""
+        forces = list(further)
+        mapped = [
+            (effect, values[part])
+            for effect, part in zip(self.effects, self._slices[1:], strict=True)
+            if effect.site == Site.INPUT
+        ]
+        key = b"".join(own.tobytes() for _, own in mapped)
+        if key not in inputs:
+            x = self.context.u
+            for effect, own in mapped:
+                x = apply_map(effect, x, own, self.context)
+            inputs[key] = x
         parameters = dict(effect_parameters)
         simulator_values = values[self.simulator_slice].copy()
         for effect, part in zip(self.effects, self._slices[1:], strict=True):
             match effect.site:
-                case Site.INPUT:
-                    x = apply_map(effect, x, values[part], self.context)
                 case Site.CORE:
                     parameters |= {
                         parameter.name: float(value)
@@ -247,7 +267,7 @@ class ExtendedSimulator:
                 case Site.FORCE:
                     assert isinstance(effect.form, ForceLaw)
                     forces.append((effect.form, values[part]))
-        return SimulationRun(simulator_values, x, parameters, forces)
+        return SimulationRun(simulator_values, inputs[key], parameters, forces)
 
     def _get_parameter_index(self, effect: Effect) -> int:
         _, _, name = effect.name.partition(":")

@@ -9,10 +9,16 @@ import numpy as np
 from islands.discrepancy.effects.time_variation import GAIN_EFFECTS, gain_over_time
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.force import add_output_forces, pack_force_laws
+from islands.discrepancy.interfaces.force import ForceLaw, pack_force_laws, sum_output_forces
 from islands.discrepancy.interfaces.simulator import Forces, SimulationRun
 from islands.discrepancy.simulators.coordinates import input_coordinate, output_coordinate, peak_amplitude
-from islands.discrepancy.simulators.ode_effects import find_effects, list_terms
+from islands.discrepancy.simulators.ode_effects import (
+    add_force_laws,
+    find_effects,
+    list_numbers,
+    list_states,
+    list_terms,
+)
 from islands.discrepancy.simulators.record_channels import sample_channel
 from islands.discrepancy.simulators.shooting import Shots
 from islands.systems.ode.equation_parser import TIME
@@ -135,13 +141,13 @@ class OdeSimulator:
         )
         has_factor = bool(self.system.gain) and not GAIN_EFFECTS.isdisjoint(runs[0].effect_parameters)
         laws = runs[0].forces if self._has_force_equation else ()
-        program = self._get_program(active, has_factor, len(laws))
+        program = self._get_program(active, has_factor, tuple(law for law, _ in laws))
         if self.shots is None:
             outputs = self._run(program, active, runs, context)[:, 0]
         else:
             outputs = self._fit_shots(self.shots, program, active, runs, context)
         if not self._has_force_equation and runs[0].forces:
-            outputs = outputs + [add_output_forces(run.x, context, run.forces) for run in runs]
+            outputs += sum_output_forces([run.x for run in runs], context, [run.forces for run in runs])
         return outputs
 
     @property
@@ -178,13 +184,23 @@ class OdeSimulator:
         """Return the simulator of one recording."""
         return replace(self, shots=self.shots.for_samples(first, last)) if self.shots else self
 
-    def _get_program(self, active: tuple[OdeEffect, ...], has_factor: bool, laws: int) -> OdeProgram:
+    def _is_term(self, law: ForceLaw) -> bool:
+        """Whether a force law becomes a term; shooting restarts no states but those of the system."""
+        return bool(law.equation) and not (law.state_derivative and (self.shots or not law.state_equation))
+
+    def _get_program(
+        self, active: tuple[OdeEffect, ...], has_factor: bool, laws: tuple[ForceLaw, ...]
+    ) -> OdeProgram:
         key = active, has_factor, laws
         if key not in self._programs:
             system = self.system.with_factor(self.system.gain, _GAIN) if has_factor else self.system
             for effect in active:
                 system = system.with_effect(effect)
-            self._programs[key] = generate_program(system, laws=laws)
+            terms = [(number, law) for number, law in enumerate(laws) if self._is_term(law)]
+            calls = len(laws) - len(terms)
+            if terms:
+                system = add_force_laws(system, terms, has_others=calls > 0)
+            self._programs[key] = generate_program(system, laws=calls)
         return self._programs[key]
 
     def _run(
@@ -204,30 +220,39 @@ class OdeSimulator:
         lanes = []
         for index, run in enumerate(runs):
             effects = run.effect_parameters
-            between = run.intersample_values
-            between = context.get_intersample_values(run.x) if between is None else between
             gain = gain_over_time(effects, context)
             signals = dict(common)
             if isinstance(gain, float) or self.system.gain:
                 key = run.x.tobytes()
                 if key not in made:
-                    made[key] = SampledSignal(run.x, *between).refine(steps)
+                    made[key] = SampledSignal(run.x, *_get_between(run, context)).refine(steps)
                 signals[self.system.input] = made[key]
                 if not isinstance(gain, float):
                     signals[_GAIN] = interpolate_linearly(gain).refine(steps)
             else:
-                signals[self.system.input] = SampledSignal(run.x * gain, *(between * gain)).refine(steps)
+                between = _get_between(run, context) * gain
+                signals[self.system.input] = SampledSignal(run.x * gain, *between).refine(steps)
             given = {each.name: float(v) for each, v in zip(self.parameters, run.values, strict=True)}
-            laws = run.forces if self._has_force_equation else ()
+            laws = list(enumerate(run.forces)) if self._has_force_equation else []
+            calls = [law for _, law in laws if not self._is_term(law[0])]
+            parameters, states = dict[str, float](), dict[str, float]()
+            for number, (law, values) in laws:
+                if self._is_term(law):
+                    parameters |= list_numbers(number, law, values, context)
+                    states |= list_states(number, law, values)
             lanes.append(
                 LaneInput(
                     {
                         **{each.name: given.get(each.name, each.value) for each in self.system.parameters},
                         **{each.name: effects[each.name] for each in active},
+                        **parameters,
                     },
-                    {name: given.get(f"initial {name}", value) for name, value in self.initial.items()},
+                    {
+                        **{name: given.get(f"initial {name}", value) for name, value in self.initial.items()},
+                        **states,
+                    },
                     signals,
-                    pack_force_laws(laws, context, balance=True) if laws else None,
+                    pack_force_laws(calls, context, balance=True) if calls else None,
                     *self._find_limits(effects),
                     starts[index] if starts else None,
                 )
@@ -257,6 +282,11 @@ class OdeSimulator:
             if caught := effect_parameters.get(f"{label} caught", 0.0):
                 spills[state.name] = (state.spills_into, caught)
         return limits, spills
+
+
+def _get_between(run: SimulationRun, context: SimulationContext) -> Signal:
+    """Return the values of the input between the samples, shape (2, samples)."""
+    return context.get_intersample_values(run.x) if run.intersample_values is None else run.intersample_values
 
 
 def _make_parameter(given: OdeParameter) -> Parameter:

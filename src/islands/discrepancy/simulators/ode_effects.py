@@ -1,19 +1,30 @@
-"""Effects in the equations of a system: offsets and limits of states, and those that a file lists."""
+"""Effects in the equations of a system: offsets and limits of states, those that a file lists, force laws.
 
-from collections.abc import Mapping
+The kernel calls the function of a force law once for each lane. A law that is an expression becomes
+instructions instead, which compute all lanes at once.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
 
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.effects.baseline import input_offset
 from islands.discrepancy.effects.nonlinearity import outflow_law, state_clip
 from islands.discrepancy.effects.time_variation import GAIN_EFFECTS
-from islands.discrepancy.interfaces.effect import Effect, Site
+from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Signal, SimulationContext, Site
 from islands.errors import ModelError
-from islands.systems.ode.ode_expression import Symbol
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.mechanics import WIDTH
+from islands.systems.ode.equation_parser import FORCE, parse_expression
+from islands.systems.ode.ode_expression import OdeExpression, Operation, Symbol, substitute
+from islands.systems.ode.ode_system import OdeParameter, OdeSystem
 from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect
 
 #: Effects of the catalogue that a term can describe.
 _SUPPORTED = frozenset(each.name for each in CATALOGUE.values() if each.site == Site.CORE) - GAIN_EFFECTS
+
+#: Expression of a force law that is given as a text.
+_parse = cache(parse_expression)
 
 
 def list_terms(system: OdeSystem) -> tuple[OdeEffect, ...]:
@@ -67,3 +78,57 @@ def find_effects(system: OdeSystem, sizes: Mapping[str, float]) -> tuple[frozens
                 f"{', '.join(sorted(_SUPPORTED))}, each with equation and term, or state-clip:STATE"
             )
     return frozenset(supported), tuple(found)
+
+
+def add_force_laws(system: OdeSystem, laws: Sequence[tuple[int, ForceLaw]], has_others: bool) -> OdeSystem:
+    """Return a system with force laws in its equations, each with its number; others remain calls."""
+    assert system.force is not None
+    forces: list[OdeExpression] = [Symbol(FORCE)] if has_others else []
+    parameters, states = list(system.parameters), []
+    for number, law in laws:
+        names = {"x": Symbol(system.force.coordinate), "v": Symbol(system.force.rate)}
+        names |= {f"n{index}": Symbol(_name_number(number, index)) for index in range(WIDTH)}
+        names["z"] = Symbol(_name_state(number))
+        parameters += [OdeParameter(_name_number(number, index), 0.0) for index in range(WIDTH)]
+        forces.append(substitute(_parse(law.equation), names))
+        if law.state_equation:
+            states.append((_name_state(number), substitute(_parse(law.state_equation), names)))
+    total = forces[0]
+    for force in forces[1:]:
+        total = Operation("add", (total, force))
+
+    def insert(right: OdeExpression) -> OdeExpression:
+        return substitute(right, {FORCE: total})
+
+    return replace(
+        system,
+        parameters=tuple(parameters),
+        derivatives=(*((name, insert(right)) for name, right in system.derivatives), *states),
+        variables=tuple((name, insert(right)) for name, right in system.variables),
+        output=insert(system.output),
+    )
+
+
+def list_numbers(
+    number: int, law: ForceLaw, values: Signal, context: SimulationContext
+) -> Mapping[str, float]:
+    """Return the parameters of a numbered law, by their names in the equations."""
+    given = (*values, *law.constants(context))
+    padded = [*map(float, given), *[0.0] * (WIDTH - len(given))]
+    return {_name_number(number, index): value for index, value in enumerate(padded)}
+
+
+def list_states(number: int, law: ForceLaw, values: Signal) -> Mapping[str, float]:
+    """Return the initial internal state of a numbered law, if it has one, by its name in the equations."""
+    return {_name_state(number): law.get_initial_state(values)} if law.state_equation else {}
+
+
+# No name in equations has brackets.
+
+
+def _name_number(number: int, index: int) -> str:
+    return f"force[{number}] n{index}"
+
+
+def _name_state(number: int) -> str:
+    return f"force[{number}] z"
