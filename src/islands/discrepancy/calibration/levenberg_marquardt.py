@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.discrepancy.calibration.calibration_problem import CalibrationProblem, FittedPoint
 from islands.discrepancy.calibration.noise_model import (
     NoiseModel,
     fit_noise,
@@ -25,8 +26,12 @@ MAX_DAMPING_TRIALS = 6
 #: The iteration ends at a step that decreases minus twice the log-likelihood by less than this.
 MIN_DECREASE = 0.02
 
-#: Finite-difference step, as a fraction of the scale of a parameter.
-DIFFERENCE_STEP = 1e-2
+#: Number of samples from which simulations that may not be needed are computed in the same call as others.
+#: In shorter ones, the preparation of a simulation costs as much as what a common call saves.
+MIN_BATCHED_SAMPLES = 2000
+
+#: First and least damping, factor between the damping values of a step, and decrease after a step.
+FIRST_DAMPING, MIN_DAMPING, DAMPING_FACTOR, DAMPING_DECREASE = 1e-3, 1e-9, 8.0, 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,48 +143,89 @@ def calibrate(
     is_fixed : ndarray of bool, shape (parameters,), optional
         Parameters that keep their values; by default none.
     """
-    lower, upper = simulation.bounds
-    inverse_std, nominal = prior_precision(simulation, target.prior_std)
-    inverse_std = inverse_std * target.prior_weight**0.5
-    scales = simulation.scales
-    values = np.clip(start, lower, upper)
-    output = simulation.simulate(values)
-    residual = target.residual(output)
-    cost = _compute_cost(residual, inverse_std * (values - nominal))
-    damping = 1e-3
+    point = minimise(simulation, target, start, max_iterations, is_fixed=is_fixed)
+    return _make_result(simulation, target, point.values, point.output)
+
+
+def minimise(
+    simulation: ExtendedSimulator,
+    target: Target,
+    start: Signal,
+    max_iterations: int = MAX_ITERATIONS,
+    min_decrease: float = MIN_DECREASE,
+    is_fixed: NDArray[np.bool_] | None = None,
+) -> FittedPoint:
+    """Fit the parameters as `calibrate` does, without a noise model of the residual.
+
+    Parameters
+    ----------
+    min_decrease : float
+        The iteration ends at a step that decreases the cost by less than this, or if the derivatives promise
+        a tenth of it.
+    """
+    problem, is_batch = (
+        _make_problem(simulation, target, is_fixed),
+        simulation.is_batch and target.y.size >= MIN_BATCHED_SAMPLES,
+    )
+    point = problem.evaluate(start, with_jacobian=is_batch)
+    damping, is_rejected = FIRST_DAMPING, False
     # Residuals at the level of rounding cannot be fitted: the record may be an output of the simulation.
-    rounding = residual.size * (np.finfo(float).eps * float(np.nanmax(np.abs(target.y)))) ** 2
-    for _ in range(max_iterations if values.size and np.isfinite(cost) else 0):
-        if float(residual @ residual) <= rounding:
+    rounding = point.residual.size * (np.finfo(float).eps * float(np.nanmax(np.abs(target.y)))) ** 2
+    for _ in range(max_iterations if start.size and np.isfinite(point.cost) else 0):
+        if float(point.residual @ point.residual) <= rounding:
             break
-        jacobian = _compute_jacobian(simulation, target, values, output, is_fixed)
-        weight = residual.size / max(float(residual @ residual), np.finfo(float).tiny)
-        hessian = weight * (jacobian.T @ jacobian) + np.diag((inverse_std * scales) ** 2)
-        slope = weight * (jacobian.T @ residual) - scales * inverse_std**2 * (values - nominal)
-        for _ in range(MAX_DAMPING_TRIALS):
-            damped = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
-            new_values = np.clip(
-                values + np.linalg.lstsq(damped, slope, rcond=None)[0] * scales, lower, upper
-            )
-            new_output = simulation.simulate(new_values)
-            new_residual = target.residual(new_output)
-            new_cost = _compute_cost(new_residual, inverse_std * (new_values - nominal))
-            if new_cost < cost:
-                break
-            damping = max(8 * damping, 1e-6)
+        point = problem.linearise(point)
+        dampings: Signal = damping * DAMPING_FACTOR ** np.arange(MAX_DAMPING_TRIALS, dtype=np.float64)
+        steps, predicted = problem.find_steps(point, dampings)
+        if predicted.max() < 0.1 * min_decrease:
+            break
+        if is_rejected and is_batch:
+            trials = problem.evaluate_all(steps)
         else:
+            # The derivatives at the next point are simulated in the same call, unless it is the last one.
+            trials = [problem.evaluate(steps[0], with_jacobian=is_batch and predicted[0] > min_decrease)]
+            if not trials[0].cost < point.cost:
+                trials += _try_further(problem, steps[1:], point.cost, is_batch)
+        place = next((index for index, trial in enumerate(trials) if trial.cost < point.cost), None)
+        if place is None:
             break
-        decrease = cost - new_cost
-        values, output, residual, cost = new_values, new_output, new_residual, new_cost
-        damping /= 5
-        if decrease < MIN_DECREASE:
+        decrease = point.cost - trials[place].cost
+        point, is_rejected = trials[place], place > 0
+        damping = max(float(dampings[place]) / DAMPING_DECREASE, MIN_DAMPING)
+        if decrease < min_decrease:
             break
-    return evaluate_fit(simulation, target, values)
+    return point
+
+
+def _try_further(
+    problem: CalibrationProblem, steps: Signal, cost: float, is_batch: bool
+) -> list[FittedPoint]:
+    """Evaluate several steps: all at once, or one by one until one of them decreases the cost."""
+    if is_batch:
+        return problem.evaluate_all(steps)
+    trials: list[FittedPoint] = []
+    for values in steps:
+        trials.append(problem.evaluate(values))
+        if trials[-1].cost < cost:
+            break
+    return trials
+
+
+def _make_problem(
+    simulation: ExtendedSimulator, target: Target, is_fixed: NDArray[np.bool_] | None = None
+) -> CalibrationProblem:
+    inverse_std, nominal = prior_precision(simulation, target.prior_std)
+    return CalibrationProblem(simulation, target, inverse_std * target.prior_weight**0.5, nominal, is_fixed)
 
 
 def evaluate_fit(simulation: ExtendedSimulator, target: Target, values: Signal) -> CalibrationResult:
     """Compare a simulation with a record at the given values, without fitting."""
-    output = simulation.simulate(values)
+    return _make_result(simulation, target, values, simulation.simulate(values))
+
+
+def _make_result(
+    simulation: ExtendedSimulator, target: Target, values: Signal, output: Signal
+) -> CalibrationResult:
     residual = (target.y - output)[target.estimation_part]
     inverse_std, nominal = prior_precision(simulation, target.prior_std)
     penalty = float(np.sum((inverse_std * (values - nominal)) ** 2))
@@ -208,7 +254,9 @@ def estimate_covariance(fit: CalibrationResult, target: Target) -> NDArray[np.fl
     simulation = fit.simulation
     whitened = replace(target, noise=fit.noise)
     scales = simulation.scales
-    jacobian = _compute_jacobian(simulation, whitened, fit.values, fit.output)
+    problem = _make_problem(simulation, whitened)
+    jacobian = problem.linearise(problem.evaluate(fit.values)).jacobian
+    assert jacobian is not None
     inverse_std, _ = prior_precision(simulation, target.prior_std)
     weight = fit.noise.effective_samples / np.count_nonzero(target.estimation_part)
     information = weight * (jacobian.T @ jacobian) / fit.noise.variance + np.diag((inverse_std * scales) ** 2)
@@ -232,39 +280,3 @@ def prior_precision(simulation: ExtendedSimulator, tolerance: Mapping[str, float
         if parameter.name in tolerance:
             inverse_std[index] = 1.0 / (tolerance[parameter.name] * abs(parameter.nominal))
     return inverse_std, nominal
-
-
-def _compute_jacobian(
-    simulation: ExtendedSimulator,
-    target: Target,
-    values: Signal,
-    output: Signal,
-    is_fixed: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float64]:
-    """Compute the derivatives of the whitened output with respect to each scaled value; zero if it is fixed.
-
-    Returns
-    -------
-    ndarray, shape (estimation samples, parameters)
-    """
-    _, upper = simulation.bounds
-    columns = np.zeros((int(np.count_nonzero(target.estimation_part)), values.size))
-    free = np.arange(values.size) if is_fixed is None else np.flatnonzero(~is_fixed)
-    scales = simulation.scales[free]
-    steps = np.where(
-        values[free] + DIFFERENCE_STEP * scales <= upper[free], DIFFERENCE_STEP, -DIFFERENCE_STEP
-    )
-    points = np.tile(values, (free.size, 1))
-    points[np.arange(free.size), free] += steps * scales
-    shifted = simulation.simulate_batch(points) if free.size else points
-    for index, step, moved in zip(free, steps, shifted, strict=True):
-        columns[:, index] = target.select((moved - output) / step)
-    # A simulation that diverges at the shifted value gives no information about that direction.
-    return np.nan_to_num(columns, nan=0.0)
-
-
-def _compute_cost(residual: Signal, prior_residual: Signal) -> float:
-    squares = max(float(residual @ residual), np.finfo(float).tiny)
-    if np.isnan(squares):
-        return float("inf")
-    return residual.size * float(np.log(squares)) + float(prior_residual @ prior_residual)

@@ -6,12 +6,21 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import TypeAlias
 
-from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate, prior_precision
+from islands.discrepancy.calibration.levenberg_marquardt import (
+    MAX_ITERATIONS,
+    MIN_DECREASE,
+    Target,
+    minimise,
+    prior_precision,
+)
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
-#: Iterations of each start before the best one is calibrated to convergence.
+#: Iterations of each start of a rough calibration.
 FIRST_ITERATIONS = 6
+
+#: Decrease of the cost at which a rough calibration ends. Scores that differ by this are ties.
+ROUGH_DECREASE = 0.5
 
 #: A simulation to be calibrated, and its starting points.
 CalibrationTask: TypeAlias = tuple[ExtendedSimulator, Sequence[Signal]]
@@ -25,26 +34,29 @@ class StartsCalibrator:
     ----------
     target : Target
         What simulations are calibrated to.
+    is_rough : bool
+        Whether the calibration ends as soon as it shows how much a simulation explains.
     """
 
     target: Target
+    is_rough: bool = False
 
     def __call__(self, task: CalibrationTask) -> list[Signal]:
-        """Return the values of those starts that were calibrated to convergence.
-
-        These are all starts under model error, and otherwise the best one after a few iterations.
+        """Return the calibrated values of the starts: of all under model error, otherwise of the best one.
 
         Returns
         -------
         list of ndarray, each of shape (parameters,)
         """
         simulation, starts = task
-        target = self.target
-        if target.effective_samples is not None:
-            # Model error causes many minima, and the first iterations do not show which is the best.
-            return [calibrate(simulation, target, start).values for start in starts]
-        fits = [calibrate(simulation, target, start, max_iterations=FIRST_ITERATIONS) for start in starts]
-        return [calibrate(simulation, target, min(fits, key=attrgetter("score")).values).values]
+        has_model_error = self.target.effective_samples is not None
+        # Model error causes many minima, and the first iterations do not show which is the best.
+        iterations = FIRST_ITERATIONS if self.is_rough and not has_model_error else MAX_ITERATIONS
+        decrease = ROUGH_DECREASE if self.is_rough else MIN_DECREASE
+        points = [minimise(simulation, self.target, start, iterations, decrease) for start in starts]
+        if has_model_error:
+            return [point.values for point in points]
+        return [min(points, key=attrgetter("cost")).values]
 
     def make_digest(self, task: CalibrationTask) -> str:
         """Return the SHA-256 of all numbers that the result of a task depends on.
@@ -55,14 +67,15 @@ class StartsCalibrator:
         residual = self.target.residual(simulation.simulate(starts[0]))
         prior, limits = prior_precision(simulation, self.target.prior_std), simulation.bounds
         names = [effect.name for effect in simulation.effects]
-        weighting = (self.target.effective_samples, self.target.fitted_segments)
+        weighting = (self.target.effective_samples, self.target.fitted_segments, self.is_rough)
         digest = hashlib.sha256(repr((names, *weighting)).encode())
         for numbers in (residual, *prior, *limits, simulation.scales, *starts):
             digest.update(numbers.tobytes())
         return digest.hexdigest()
 
 
-def make_task_key(task: CalibrationTask) -> Hashable:
+def make_task_key(calibrator: StartsCalibrator, task: CalibrationTask) -> Hashable:
     """Return a key that is equal for tasks with equal results, given the same simulator and target."""
     simulation, starts = task
-    return tuple(effect.name for effect in simulation.effects), *(start.tobytes() for start in starts)
+    names = tuple(effect.name for effect in simulation.effects)
+    return calibrator.is_rough, names, *(start.tobytes() for start in starts)

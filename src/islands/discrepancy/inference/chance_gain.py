@@ -11,8 +11,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from islands.discrepancy.calibration.calibration_problem import DIFFERENCE_STEP
 from islands.discrepancy.calibration.levenberg_marquardt import (
-    DIFFERENCE_STEP,
     CalibrationResult,
     Target,
 )

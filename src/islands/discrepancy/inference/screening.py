@@ -6,8 +6,8 @@ from operator import attrgetter, itemgetter
 
 import numpy as np
 
+from islands.discrepancy.calibration.calibration_problem import DIFFERENCE_STEP
 from islands.discrepancy.calibration.levenberg_marquardt import (
-    DIFFERENCE_STEP,
     CalibrationResult,
     Target,
     evaluate_fit,
@@ -36,6 +36,10 @@ DEPENDENCE = 1e-6
 #: Minimum number of effects that are calibrated in addition to others, even if their linear responses promise
 #: no gain.
 MIN_CALIBRATED_EFFECTS = 5
+
+#: Least number of effects that are calibrated to convergence, the best ones after a rough calibration, and
+#: distance from the best score within which all others are as well.
+MIN_CONVERGED_EFFECTS, MAX_DISTANCE = 6, 20.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,18 +94,42 @@ def screen_effects(
             if index < MIN_CALIBRATED_EFFECTS
             or projection.score_decrease(candidate[0]) > bic_penalty(candidate[1], base)
         ]
-    calibrated = parallel_map(
-        StartsCalibrator(target),
-        [(simulation, starts) for _, _, simulation, starts in candidates],
+    rough = _calibrate_starts(
+        StartsCalibrator(target, is_rough=True),
+        [(effect, simulation, starts) for _, effect, simulation, starts in candidates],
+        parallel_map,
     )
-    screened = [
+    # Effects that are far from the best ones need no better fit.
+    ranked = sorted(rough, key=lambda each: -each.score_gain(base))
+    gains = [each.score_gain(base) for each in ranked]
+    count = sum(gain > gains[0] - MAX_DISTANCE for gain in gains)
+    best = ranked[: max(count, MIN_CONVERGED_EFFECTS)]
+    converged = _calibrate_starts(
+        StartsCalibrator(target),
+        [(each.effect, each.fit.simulation, [each.fit.values]) for each in rough if each in best],
+        parallel_map,
+    )
+    found = {each.effect.name: each for each in (*rough, *converged)}
+    return sorted(found.values(), key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
+
+
+def _calibrate_starts(
+    calibrator: StartsCalibrator,
+    tasks: Sequence[tuple[Effect, ExtendedSimulator, Sequence[Signal]]],
+    parallel_map: ParallelMap,
+) -> list[ScreenedEffect]:
+    """Return the best fit of each effect, in the order of the tasks."""
+    calibrated = parallel_map(calibrator, [(simulation, starts) for _, simulation, starts in tasks])
+    return [
         ScreenedEffect(
             effect,
-            min((evaluate_fit(simulation, target, values) for values in ends), key=attrgetter("score")),
+            min(
+                (evaluate_fit(simulation, calibrator.target, values) for values in ends),
+                key=attrgetter("score"),
+            ),
         )
-        for (_, effect, simulation, _), ends in zip(candidates, calibrated, strict=True)
+        for (effect, simulation, _), ends in zip(tasks, calibrated, strict=True)
     ]
-    return sorted(screened, key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
 
 
 def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSimulator) -> Signal:

@@ -1,7 +1,7 @@
 """Parallel map: a function applied to each of several arguments, with the results in order."""
 
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 A = TypeVar("A")
 R = TypeVar("R")
@@ -17,17 +17,17 @@ class ParallelMap(Protocol):
         """Apply the function to each argument."""
 
 
-def memoised_map(parallel_map: ParallelMap, key: Callable[[A], Hashable]) -> ParallelMap:
-    """Return a map that caches results by the key of the argument.
+def memoised_map(parallel_map: ParallelMap, key: Callable[[Any, Any], Hashable]) -> ParallelMap:
+    """Return a map that caches results by a key of the function and the argument.
 
-    All calls of the returned map must use the same function, or functions with equal results.
+    Calls with equal keys must have equal results.
     """
-    results: dict[Hashable, object] = {}
+    results: dict[Hashable, Any] = {}
 
     def cached_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
-        keyed = [(key(argument), argument) for argument in arguments]
+        keyed = [(key(function, argument), argument) for argument in arguments]
         missing = {each: argument for each, argument in keyed if each not in results}
         results.update(zip(missing, parallel_map(function, missing.values()), strict=True))
-        return (results[each] for each, _ in keyed)  # type: ignore[misc]
+        return (results[each] for each, _ in keyed)
 
-    return cached_map  # type: ignore[return-value]
+    return cached_map

@@ -10,7 +10,7 @@ def test_memoised_map_evaluates_each_key_once_and_keeps_the_order() -> None:
         evaluated.append(number)
         return number**2
 
-    parallel_map = memoised_map(map, abs)
+    parallel_map = memoised_map(map, lambda _, number: abs(number))
     assert list(parallel_map(square, [3, -1, 1, 3])) == [9, 1, 1, 9]
     assert list(parallel_map(square, (each for each in (2, -3)))) == [4, 9]
     assert sorted(map(abs, evaluated)) == [1, 2, 3]

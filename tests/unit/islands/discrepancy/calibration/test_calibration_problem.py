@@ -1,0 +1,65 @@
+"""`CalibrationProblem`: derivatives in the call of a point or after it, and damped steps."""
+
+import numpy as np
+import pytest
+
+from islands.discrepancy.calibration import levenberg_marquardt
+from islands.discrepancy.calibration.calibration_problem import CalibrationProblem
+from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate
+from islands.discrepancy.calibration.preparation import make_context
+from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.io.simulator_spec.factory import make_simulator
+from islands.io.simulator_spec.specification import PhysicalSpec
+from support.simulated_records import recorded, wave
+
+SPRING = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})
+
+
+@pytest.fixture(scope="module")
+def oscillator() -> tuple[ExtendedSimulator, Target]:
+    """A linear oscillator with a cubic spring to be found, and a record with noise."""
+    u = wave(240)
+    record = recorded(u, u / 200.0)
+    core = make_simulator(SPRING, record)
+    simulation = ExtendedSimulator(core, (CATALOGUE["cubic-stiffness"],), make_context(record, core, 180))
+    y = simulation.simulate(1.03 * simulation.nominal) + 1e-2 * np.random.default_rng(4).standard_normal(240)
+    return simulation, Target(y, np.arange(240) < 180, None, {})
+
+
+def test_derivatives_of_the_same_call_have_the_same_bits(
+    oscillator: tuple[ExtendedSimulator, Target],
+) -> None:
+    simulation, target = oscillator
+    free = np.zeros(simulation.nominal.size)
+    problem = CalibrationProblem(simulation, target, free, simulation.nominal)
+    at_once = problem.evaluate(simulation.nominal, with_jacobian=True)
+    later = problem.linearise(problem.evaluate(simulation.nominal))
+    assert at_once.jacobian is not None
+    assert later.jacobian is not None
+    assert at_once.jacobian.tobytes() == later.jacobian.tobytes()
+    assert (at_once.cost, at_once.output.tobytes()) == (later.cost, later.output.tobytes())
+
+
+def test_step_without_damping_solves_the_linearised_problem(
+    oscillator: tuple[ExtendedSimulator, Target],
+) -> None:
+    simulation, target = oscillator
+    free = np.zeros(simulation.nominal.size)
+    problem = CalibrationProblem(simulation, target, free, simulation.nominal)
+    point = problem.evaluate(1.001 * simulation.nominal, with_jacobian=True)
+    assert point.jacobian is not None
+    steps, predicted = problem.find_steps(point, np.array([1e-12, 1e3]))
+    expected = np.linalg.lstsq(point.jacobian, point.residual, rcond=None)[0] * simulation.scales
+    np.testing.assert_allclose(steps[0] - point.values, expected, rtol=1e-4)
+    assert predicted[0] > predicted[1] > 0.0
+
+
+def test_simulations_in_groups_give_the_same_fit(
+    oscillator: tuple[ExtendedSimulator, Target], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulation, target = oscillator
+    one_by_one = calibrate(simulation, target, simulation.nominal)
+    monkeypatch.setattr(levenberg_marquardt, "MIN_BATCHED_SAMPLES", 1)
+    grouped = calibrate(simulation, target, simulation.nominal)
+    assert grouped.values.tobytes() == one_by_one.values.tobytes()
