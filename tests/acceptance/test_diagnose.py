@@ -59,7 +59,7 @@ def test_diagnose_names_the_missing_effect(folder: Path) -> None:
 def test_report_is_a_single_file_with_a_summary(folder: Path) -> None:
     text = (folder / "out/report.html").read_text()
     assert "thermal-drift: k = " in text
-    assert "on the last quarter of the record, which is held out" in text
+    assert "on the last quarter of the record, excluded from fitting" in text
     assert text.count("<img ") == 4
     assert not re.findall(r'(?:src|href)="(?!data:)', text)
 
@@ -99,6 +99,24 @@ def test_several_files_are_diagnosed_together(offset_record: Path) -> None:
     assert [effect["name"] for effect in document["effects"]] == ["offset"]
     assert document["effects"][0]["parameters"]["c"]["value"] == pytest.approx(0.3, abs=0.03)
     assert "record.csv, other.csv" in (offset_record / "both/report.html").read_text()
+
+
+@pytest.mark.ci
+def test_file_for_validation_is_held_out_as_a_whole(offset_record: Path) -> None:
+    other = offset_record / "validation.csv"
+    header, *lines = write_offset(other).read_text().splitlines()
+    other.write_text("\n".join([header, *lines[300:]]))
+    options = ("--input", "u_V", "--output", "y_um", "--simulation", "column:theirs_um", "--rows", "0:300")
+    with undrawn_figures():
+        succeed(
+            *("diagnose", offset_record / "record.csv", "--validation", other, *options),
+            *("--out", offset_record / "held"),
+        )
+    document = json.loads((offset_record / "held/discrepancy.json").read_text())
+    assert document["record"]["segments"] == [300, 100]
+    assert "on the last recording, excluded from fitting" in (offset_record / "held/report.html").read_text()
+    planned = fail("diagnose", other, *options, "--plan", "--validation", other, "--out", offset_record / "p")
+    assert "--validation is for a diagnosis" in planned
 
 
 def run_self_test(base: Path, out: str, *options: object) -> tuple[str, dict]:

@@ -23,6 +23,11 @@ from islands.systems.published_models import get_published_model
 Record = Annotated[
     Path, typer.Argument(help="The record: text, XLSX, NPZ, MAT, HDF5, Parquet, MDF or TDMS; also .gz, .zip.")
 ]
+HeldOut = Annotated[
+    Path | None,
+    typer.Option("--validation", help="Recording that is held out as a whole, not the last quarter."),
+]
+
 Records = Annotated[
     list[Path],
     typer.Argument(

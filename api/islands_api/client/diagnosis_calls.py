@@ -22,6 +22,7 @@ def diagnose(
     dt: float | None = None,
     rows: str | None = None,
     recordings: Sequence[DatasetRef | Mapping[str, Any]] = (),
+    validation: DatasetRef | Mapping[str, Any] | None = None,
     name: str = "",
     priority: int = 0,
     idempotency_key: str | None = None,
@@ -45,6 +46,8 @@ def diagnose(
         ``START:STOP``, the samples to use.
     recordings : sequence of data set or mapping
         Further recordings of the same system: data sets, or ``{"dataset": ID, "rows": "START:STOP"}``.
+    validation : data set or mapping, optional
+        A recording that is held out as a whole, instead of the last quarter of the record.
 
     Raises
     ------
@@ -65,6 +68,7 @@ def diagnose(
         "dt": dt,
         "rows": rows,
         "recordings": [make_part(each) for each in recordings] or None,
+        "validation": None if validation is None else make_part(validation),
         "name": name or None,
         "priority": priority or None,
     }

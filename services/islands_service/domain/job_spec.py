@@ -193,6 +193,10 @@ class Discrepancy(BaseModel):
     dt: Seconds | None = Field(default=None, description=_DT)
     rows: Rows | None = Field(default=None, description="Samples to analyse; all by default.")
     recordings: Recordings = ()
+    validation: Part | None = Field(
+        default=None,
+        description="A recording that is held out as a whole, instead of the last quarter of the record.",
+    )
     simulation: SimulationSpec = Field(description="Simulation to compare with the record.")
     tolerance: Annotated[dict[Name, Fraction], Field(max_length=100)] = Field(
         default_factory=dict,
@@ -212,9 +216,14 @@ class Discrepancy(BaseModel):
         return (self.input, *self.channels, *self.recorded_columns)
 
     @property
-    def parts(self) -> tuple[Part, ...]:
-        """Recordings to analyse."""
+    def estimation(self) -> tuple[Part, ...]:
+        """Recordings to which the simulation is fitted, except for the last quarter if it is held out."""
         return (Part(dataset=self.dataset, rows=self.rows), *self.recordings)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Recordings to analyse, the one that is held out last."""
+        return (*self.estimation, *([self.validation] if self.validation else []))
 
 
 def parse_identification(document: Mapping[str, Any]) -> Identification:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset, join
+from islands.data.split import hold_out
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
 from islands_service.intake.record_reading import RecordRequest, read_confined
 from islands_service.settings import service_settings
@@ -73,6 +74,8 @@ def read_record_and_columns(
     BlobNotFoundError
         The data folder has lost a file.
     """
-    whole = join(tuple(_read_part(spec, part, datasets, blobs) for part in spec.parts))
+    whole = join(tuple(_read_part(spec, part, datasets, blobs) for part in spec.estimation))
+    if spec.validation is not None:
+        whole = hold_out(whole, _read_part(spec, spec.validation, datasets, blobs))
     kept = 1 + len(spec.channels)
     return whole.first_inputs(kept), dict(zip(spec.recorded_columns, whole.u[:, kept:].T, strict=True))

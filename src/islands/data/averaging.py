@@ -63,6 +63,7 @@ def average_samples(record: Dataset, count: int) -> Dataset:
         recordings=tuple(name for name, length in zip(record.recordings, lengths, strict=True) if length),
         start=record.start + 0.5 * (count - 1) * record.dt,
         sha256="",
+        held_out=0,
     )
 
 

@@ -43,6 +43,9 @@ class Dataset:
         What was done to the samples of the file, such as resampling, in this order.
     preprocessing : Preprocessing or None
         Steps that were done with the samples, see `islands.data.preprocessing.preprocess`.
+    held_out : int
+        Number of samples at the end, in whole segments, that a diagnosis holds out; 0 for a quarter of the
+        samples.
 
     Raises
     ------
@@ -64,6 +67,7 @@ class Dataset:
     sha256: str = ""
     reading: tuple[str, ...] = ()
     preprocessing: Preprocessing | None = None
+    held_out: int = 0
 
     def __post_init__(self) -> None:
         u = np.array(self.u, dtype=np.float64, order="C", ndmin=1)
@@ -88,6 +92,10 @@ class Dataset:
         if sum(segments) != len(y) or min(segments) < 1:
             raise RecordError(
                 f"the segments' lengths {segments} must be positive and sum to the {len(y)} samples"
+            )
+        if self.held_out and len(y) - self.held_out not in np.cumsum(segments)[:-1]:
+            raise RecordError(
+                f"segments of {segments} samples cannot be divided so that {self.held_out} are held out"
             )
         recordings = tuple(self.recordings) or ("",)
         recordings *= len(segments) if len(recordings) == 1 else 1
@@ -175,10 +183,12 @@ class Dataset:
             for (begin, end), name in zip(self.bounds, self.recordings, strict=True)
             if min(last, end) > max(first, begin)
         ]
+        fitted = self.samples - self.held_out
         return replace(
             self,
             u=self.u[first:last],
             y=self.y[first:last],
+            held_out=last - fitted if first < fitted < last else 0,
             segments=tuple(length for length, _ in kept),
             recordings=tuple(name for _, name in kept),
             start=self.start + first * self.dt,
@@ -244,6 +254,7 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
         segments=tuple(length for recording in recordings for length in recording.segments),
         recordings=_name_recordings(recordings),
         sha256="",
+        held_out=0,
         reading=tuple(step for recording in recordings for step in recording.reading),
     )
 

@@ -45,5 +45,6 @@ def skip_missing_outputs(record: Dataset) -> Dataset:
         y=record.y[known],
         segments=tuple(lengths),
         recordings=tuple(names),
+        held_out=0,
         start=record.start + int(np.argmax(known)) * record.dt,
     )

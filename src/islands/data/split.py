@@ -1,6 +1,6 @@
 """Split of the data into an estimation part and a validation part."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -86,6 +86,24 @@ def split_data(record: Dataset, validation: Dataset | float) -> Split:
             "rows, or a fraction of the record"
         )
     return parts
+
+
+def hold_out(record: Dataset, validation: Dataset) -> Dataset:
+    """Return the joined recordings of two records, of which a diagnosis holds out the second one as a whole.
+
+    Raises
+    ------
+    RecordError
+        The records differ in their columns, units or sampling time.
+    SettingsError
+        The validation data has samples of the record.
+    """
+    parts = Split(record, validation)
+    if share_samples(record, validation):
+        raise SettingsError(
+            "the validation data has samples of the record: give another recording, or other rows"
+        )
+    return replace(join((parts.estimation, parts.validation)), held_out=validation.samples)
 
 
 def average_split(split: Split, count: int) -> Split:

@@ -82,3 +82,11 @@ class Diagnosis:
     nominal_rmse: float
     record_findings: tuple[RecordFinding, ...] = ()
     discovery: Discovery | None = None
+
+    @property
+    def held_out_part(self) -> str:
+        """Name of the hold-out part in a sentence."""
+        if not self.record.held_out:
+            return "the last quarter of the record"
+        count = len(self.record[self.estimation_samples :].rows_by_recording)
+        return "the last recording" if count == 1 else f"the last {count} recordings"

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from islands.data.dataset import Dataset
+from islands.data.split import hold_out
 from islands.discrepancy.diagnosis import diagnose as diagnose_simulator
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.effects import EFFECTS
@@ -30,6 +31,7 @@ def diagnose(
     inputs: str | Sequence[str] = (),
     output: str | None = None,
     dt: float | None = None,
+    validation: "RecordLike | None" = None,
     tolerance: Mapping[str, float] | None = None,
     columns: Mapping[str, Signal] | None = None,
     effects: Sequence[Effect] = EFFECTS,
@@ -51,11 +53,15 @@ def diagnose(
         Names of the columns of a data frame.
     dt : float, optional
         Sampling time of a data frame without a time, in seconds.
+    validation : Dataset or data frame, optional
+        Further recordings, which are held out as a whole instead of the last quarter of the record: of these,
+        the initial states alone are fitted.
     tolerance : mapping, optional
         Relative standard deviations of parameters about their nominal values. Other parameters are
         calibrated without a prior.
     columns : mapping, optional
-        Outputs of external simulations by name, each of shape (samples,), for ``column:NAME``.
+        Outputs of external simulations by name, each of shape (samples,), for ``column:NAME``; those of the
+        validation data follow those of the record.
     effects : sequence of Effect
         Effects to search for. Add your own with ``(*islands.EFFECTS, mine)``; user-defined maps act after
         those of the catalogue.
@@ -76,6 +82,9 @@ def diagnose(
         an effect is invalid.
     """
     record = as_record(record, dt=dt, inputs=inputs, output=output, resting_inputs=True)
+    if validation is not None:
+        held_out = as_record(validation, dt=dt, inputs=inputs, output=output, resting_inputs=True)
+        record = hold_out(record, held_out)
     simulator = _as_simulator(simulation, record, columns)
     return diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)
 

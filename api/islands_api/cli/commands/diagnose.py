@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -9,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from islands.data.dataset import Dataset
+from islands.data.split import hold_out
 from islands.discrepancy.detectability import SelfTest, self_test
 from islands.discrepancy.diagnosis import diagnose as run_diagnosis
 from islands.discrepancy.diagnosis_result import Diagnosis
@@ -68,6 +70,7 @@ def diagnose(
     tolerance: options.Tolerances = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
+    validation: options.HeldOut = None,
     reading: ReadingOptions = DEFAULT_READING,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     tested: Annotated[
@@ -83,6 +86,8 @@ def diagnose(
 ) -> None:
     """Find the errors of a simulation on recordings, name their causes, measure the gain of correction."""
     if planning.plan:
+        if validation:
+            raise SettingsError("--validation is for a diagnosis: leave it out of a plan")
         check_folder(out, force, PLAN)
         compile_kernels()
         columns_of_input = [options.single_input(options.columns(inputs)), *(channels or [])]
@@ -108,7 +113,8 @@ def diagnose(
         inner = innermost(spec)
         column = inner.column if isinstance(inner, ColumnSpec) else None
         data, columns = _read_record(
-            records, options.columns(inputs), channels or [], column, output_column, dt, rows, reading
+            *(records, validation, options.columns(inputs), channels or [], column),
+            *(output_column, dt, rows, reading),
         )
         simulator = make_simulator(spec, data, columns)
         tolerances = options.tolerances(tolerance or [])
@@ -187,6 +193,7 @@ def _format_duration(seconds: float) -> str:
 
 def _read_record(
     records: list[Path],
+    validation: Path | None,
     inputs: list[str],
     channels: list[str],
     column: str | None,
@@ -200,5 +207,7 @@ def _read_record(
     names = [options.single_input(inputs), *channels, *extra]
     recordings = Recordings(records, names, output_column, dt, reading, resting_inputs=True)
     whole = recordings.read(rows)
+    if validation is not None:
+        whole = hold_out(whole, replace(recordings, paths=[validation]).read())
     kept = 1 + len(channels)
     return whole.first_inputs(kept), {} if column is None else {column: whole.u[:, kept]}

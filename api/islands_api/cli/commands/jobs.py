@@ -97,10 +97,7 @@ def submit(
             idempotency_key=idempotency_key,
             **search.changes,
         )
-    if watch:
-        _follow(url, key, job, as_json)
-    else:
-        views.show_job(job, as_json)
+    _follow(url, key, job, as_json, watch)
 
 
 @jobs.command()
@@ -114,6 +111,7 @@ def diagnose(
     tolerance: options.Tolerances = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
+    validation: options.HeldOut = None,
     reading: ReadingOptions = DEFAULT_READING,
     seed: Seed = 0,
     name: Name = "",
@@ -132,6 +130,7 @@ def diagnose(
     with open_client(url, key) as client:
         whole = output_column if rows is None else None
         dataset, *others = (client.upload(record, read, whole, dt, reading.changes()) for record in records)
+        held_out = validation and client.upload(validation, read, output_column, dt, reading.changes())
         job = client.diagnose(
             dataset,
             driving,
@@ -143,14 +142,12 @@ def diagnose(
             dt=dt,
             rows=rows,
             recordings=[make_part(other, rows) for other in others],
+            validation=held_out or None,
             name=_make_name(name, records),
             priority=priority,
             idempotency_key=idempotency_key,
         )
-    if watch:
-        _follow(url, key, job, as_json)
-    else:
-        views.show_job(job, as_json)
+    _follow(url, key, job, as_json, watch)
 
 
 @jobs.command("list")
@@ -251,14 +248,17 @@ def _parse_validation(text: str | None) -> Path | str | float | None:
         ) from None
 
 
-def _follow(url: str, key: str | None, job: JobView, as_json: bool) -> None:
-    """Show the progress of a job until it has ended, then its result.
+def _follow(url: str, key: str | None, job: JobView, as_json: bool, watch: bool = True) -> None:
+    """Show the progress of a job until it has ended, then its result; without ``watch`` show the job only.
 
     Raises
     ------
     JobFailedError
         The job has failed or was cancelled.
     """
+    if not watch:
+        views.show_job(job, as_json)
+        return
     errors.print(f"job {job.id}", markup=False)
     with Client(url, key) as client:
         try:

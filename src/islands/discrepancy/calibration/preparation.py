@@ -122,9 +122,11 @@ def validate_prior(tolerance: Mapping[str, float], simulator: Simulator) -> Mapp
 def estimation_part(record: Dataset) -> Dataset:
     """Return the part of a record that is used for estimation, without the hold-out part at its end.
 
-    The hold-out part may consist of whole recordings. It begins with a recording if less than
-    `MIN_RECORDING_SAMPLES` would be divided from one.
+    The hold-out part is that of the record, or its last quarter, which may consist of whole recordings. The
+    quarter begins with a recording if less than `MIN_RECORDING_SAMPLES` would be divided from one.
     """
+    if record.held_out:
+        return record[: -record.held_out]
     fitted = int((1.0 - HOLDOUT_FRACTION) * record.samples)
     for boundary, _ in record.bounds[1:]:
         if abs(fitted - boundary) < MIN_RECORDING_SAMPLES:
@@ -145,6 +147,11 @@ def count_fitted_samples(record: Dataset) -> int:
         raise RecordError(
             f"the record has {record.samples} samples, and a diagnosis needs at least {MIN_SAMPLES}: give a "
             "longer one"
+        )
+    if (used := record.samples - record.held_out) < MIN_SAMPLES:
+        raise RecordError(
+            f"the recordings that are not held out have {used} samples, and a diagnosis needs at least "
+            f"{MIN_SAMPLES}: give longer ones"
         )
     if len(record.segments) > 1 and (shortest := min(record.segments)) < MIN_RECORDING_SAMPLES:
         raise RecordError(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset, join
-from islands.data.split import Split, share_samples, split, split_data
+from islands.data.split import Split, hold_out, share_samples, split, split_data
 from islands.errors import RecordError, SettingsError
 
 
@@ -132,3 +132,22 @@ def test_a_recording_among_several_is_found_again():
     one, other, third = (drawn(seed=seed) for seed in (1, 2, 3))
     assert share_samples(join((one, other)), other)
     assert not share_samples(join((one, other)), third)
+
+
+def test_recording_that_is_held_out_follows_the_others():
+    first, second = record(300), record(100, start=50.0)
+    joined = hold_out(first, second)
+    assert (joined.samples, joined.held_out, joined.segments) == (400, 100, (300, 100))
+    assert np.array_equal(joined.y[300:], second.y)
+    assert [joined[rows].held_out for rows in (slice(0, 300), slice(250, 390), slice(300, 400))] == [0, 90, 0]
+
+
+def test_recording_that_is_held_out_has_no_sample_of_the_others():
+    whole = record(300)
+    with pytest.raises(SettingsError, match="has samples of the record"):
+        hold_out(whole, whole[100:200])
+
+
+def test_part_that_is_held_out_begins_with_a_recording():
+    with pytest.raises(RecordError, match="cannot be divided so that 50 are held out"):
+        replace(join((record(300), record(100, start=50.0))), held_out=50)

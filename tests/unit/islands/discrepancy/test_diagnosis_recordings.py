@@ -97,6 +97,24 @@ def test_many_short_recordings_are_diagnosed() -> None:
 
 
 @pytest.mark.ci
+def test_recording_that_is_held_out_as_a_whole_is_no_part_of_an_estimate() -> None:
+    parts = oscillator_recordings(1, (400, 300), "cubic-stiffness", 300.0)
+    other = replace(parts[1], y=parts[1].y + 0.01)
+    one, two = (
+        islands.diagnose(parts[0], "second-order", validation=each, effects=FEW[:3])
+        for each in (parts[1], other)
+    )
+    assert [each.name for each in one.effects] == ["cubic-stiffness"]
+    assert one.estimation_samples == 400
+    assert one.held_out_part == "the last recording"
+    np.testing.assert_array_equal(one.best.values[:4], two.best.values[:4])
+    assert one.gain is not None
+    assert one.gain.after.rmse == pytest.approx(SIGMA, rel=0.2)
+    # The offset of the other recording is an error that no effect of the first one explains.
+    assert two.gain is None or two.gain.after.rmse > 2 * SIGMA
+
+
+@pytest.mark.ci
 def test_change_between_two_recordings_is_a_jump_at_the_boundary() -> None:
     first, second = oscillator_recordings(5, (500, 300))
     record = islands.join((first, replace(second, y=second.y + 0.005)))

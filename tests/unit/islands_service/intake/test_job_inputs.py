@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands_service.domain.job_spec import Discrepancy, Identification
+from islands_service.domain.job_spec import Discrepancy, Identification, Part
 from islands_service.intake.job_inputs import read_record_and_columns, read_record_and_validation
 from islands_service.store.blobs import Blobs
 from islands_service.store.datasets import StoredDataset
@@ -35,6 +35,10 @@ def test_recordings_of_a_diagnosis_are_joined_with_their_recorded_simulations(tm
     assert record.rows_by_recording == {"a.csv": slice(0, 120), "b.csv": slice(120, 205)}
     assert record.input_names == ("u_V",)
     assert np.flatnonzero(np.diff(columns["t_s"]) < 0.0).tolist() == [119]
+    changes = {"rows": "0:70", "recordings": (), "validation": Part(dataset="a", rows="70:")}
+    divided, _ = read_record_and_columns(order.model_copy(update=changes), store_datasets(blobs), blobs)
+    assert (divided.held_out, record.held_out) == (50, 0)
+    assert np.array_equal(divided.u, record.u[:120])
 
 
 @pytest.mark.ci

@@ -188,10 +188,12 @@ def test_options_of_diagnose_reach_the_job(run: Run, service: Service, owner: st
 def test_recordings_of_a_diagnosis_are_uploaded(run: Run, tmp_path: Path) -> None:
     (tmp_path / "v.csv").write_bytes(csv(120))
     words = ("--simulation", "bouc-wen-piezo", "--rows", "0:110", "--json")
-    code, out, err = run("diagnose", "r.csv", "v.csv", *COLUMNS, *words)
+    (tmp_path / "w.csv").write_bytes(csv(90))
+    code, out, err = run("diagnose", "r.csv", "v.csv", "--validation", "w.csv", *COLUMNS, *words)
     assert (code, err) == (0, "")
     job = json.loads(out)
     assert job["name"] == "r.csv, v.csv"
+    assert job["spec"]["validation"].keys() == {"dataset"}
     (other,) = job["spec"]["recordings"]
     assert other["rows"] == "0:110"
     assert other["dataset"] != job["spec"]["dataset"]
