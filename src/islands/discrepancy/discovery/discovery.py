@@ -83,7 +83,9 @@ def discover_terms(
     # The scores of a search with model error count other samples.
     scored = evaluate_fit(fit.simulation, target, fit.values)
     named_cost = scored.score + sum(bic_penalty(effect, base) for effect in effects)
-    margin = max(EQUIVALENCE_MARGIN, MIN_RELATIVE_GAIN * (base.score - found.cost))
+    # A formula is preferred to a curve that explains as much.
+    has_names = not any(effect.is_free for effect in effects)
+    margin = max(EQUIVALENCE_MARGIN, MIN_RELATIVE_GAIN * (base.score - found.cost)) if has_names else 0.0
     if found.cost > named_cost - margin:
         return None
     if cross_validate_gain(base, False, found.fit, target, fitted, rng) <= 0.0:

@@ -9,8 +9,9 @@ from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
+import scipy
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN
 from islands.discrepancy.inference.hypothesis import Hypothesis, with_effect, without_effect
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
@@ -26,6 +27,12 @@ MIN_NAMED_FRACTION = 0.9
 
 #: Maximum number of free forms of a hypothesis.
 MAX_FORMS = 2
+
+#: Number of free forms, the best ones, that may replace all effects.
+MAX_REPLACEMENTS = 3
+
+#: Probability with which the further coefficients of a free form gain by chance.
+CHANCE_PROBABILITY = 0.01
 
 
 def compare_with_free_forms(
@@ -50,6 +57,8 @@ def search_free_forms(
 ) -> SearchOutcome | None:
     """Replace effects by free forms, or add free forms, as long as these explain clearly more.
 
+    One free form that fits better than several effects replaces them: it is one cause instead of several.
+
     Parameters
     ----------
     outcome : SearchOutcome
@@ -65,9 +74,10 @@ def search_free_forms(
         Outcome with free forms, not assessed yet; their screening is added to that of the effects. None if
         the named effects explain as much.
     """
-    base, target, found = outcome.base, outcome.target, outcome.hypothesis
+    base = outcome.base
     alone = Hypothesis(base, base.score, ())
-    screened = screen_effects(base, target, forms, parallel_map)
+    screened = screen_effects(base, outcome.target, forms, parallel_map)
+    found, target = _replace_by_one_form(outcome, alone, screened)
     for _ in range(MAX_FORMS):
         starts = [(alone, screened)]
         others = [found] if found.effects else []
@@ -92,6 +102,31 @@ def search_free_forms(
     return replace(
         outcome, hypothesis=found, target=target, screened=_merge(base, outcome.screened, screened)
     )
+
+
+def _replace_by_one_form(
+    outcome: SearchOutcome, alone: Hypothesis, screened: Sequence[ScreenedEffect]
+) -> tuple[Hypothesis, Target]:
+    """Return the hypothesis with one free form if that fits clearly better than all effects, else these.
+
+    A single effect that is a special case of the form is left to `_explains_more`.
+    """
+    found, target = outcome.hypothesis, outcome.target
+    for each in screened[:MAX_REPLACEMENTS] if found.effects else ():
+        if len(found.effects) == 1 and found.effects[0].cause in each.effect.special_cases:
+            continue
+        (single,), refitted = refit_with_ar_noise([with_effect(alone, each)], outcome.target)
+        if single.fit.score < found.fit.score - _compute_chance_margin(each.effect, found):
+            found, target = single, refitted
+    return found, target
+
+
+def _compute_chance_margin(form: Effect, found: Hypothesis) -> float:
+    """Return the margin of equivalents, and what the further coefficients of a form gain by chance."""
+    context = found.fit.simulation.context
+    count = sum(len(effect.parameters(context)) for effect in found.effects)
+    further = max(len(form.parameters(context)) - count, 1)
+    return EQUIVALENCE_MARGIN + float(scipy.stats.chi2.ppf(1.0 - CHANCE_PROBABILITY, further))
 
 
 def _explains_more(new: Hypothesis, old: Hypothesis, outcome: SearchOutcome) -> bool:

@@ -42,6 +42,7 @@ def _make_free_form(
     site: Site,
     form: Map | ForceLaw,
     source: str,
+    special_cases: tuple[str, ...],
     similar_to: str,
     distinguished_by: str,
     labels: Callable[[SimulationContext], Sequence[str]],
@@ -69,6 +70,7 @@ def _make_free_form(
         source=source,
         linear_parameters=0,
         is_free=True,
+        special_cases=special_cases,
         similar_to=similar_to,
         distinguished_by=distinguished_by,
     )
@@ -137,6 +139,24 @@ _FILTER = "Ljung, System Identification, section 4"
 _MEMORY = "Kuhnen, Modeling, identification and compensation of complex hysteretic nonlinearities, 2003"
 _CHANGE = "Niedzwiecki, Identification of Time-Varying Processes"
 
+#: Effects with the shapes of the free forms. Of a simulation that is nearly static or linear, characteristics
+#: of the input, of the spring and of the output can hardly be distinguished, nor can filters.
+_LINEAR = (
+    *("delay", "sensor-lag", "resonance", "viscous", "relaxation"),
+    *("exponential-creep", "logarithmic-creep"),
+)
+_HYSTERETIC = (
+    *("backlash", "stiction", "second-hysteresis", "coulomb-friction"),
+    *("loop-asymmetry", "rate-dependent-loop"),
+)
+_STATIC = (
+    *("dead-zone", "input-saturation", "even-nonlinearity", "cubic-stiffness"),
+    *("absolute-value-sensor", "output-saturation"),
+)
+_DAMPING = ("viscous", "coulomb-friction", "viscous-asymmetry", "quadratic-drag")
+_CHANGING = ("gain-step", "ageing")
+_DRIFTING = ("offset", "linear-drift", "jump", "thermal-drift", "exponential-creep", "logarithmic-creep")
+
 #: The free forms, in the order in which maps act on a signal.
 FREE_FORMS: tuple[Effect, ...] = (
     _make_free_form(
@@ -146,6 +166,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         Site.INPUT,
         _add_low_passes,
         _FILTER,
+        _LINEAR,
         "delay, output-filter",
         "amplitude and phase that change with the frequency, also at small amplitudes",
         _label_time_constants,
@@ -157,6 +178,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         Site.INPUT,
         lambda u, values, context: _add_plays(u, values, context.input_peak),
         _MEMORY,
+        _HYSTERETIC,
         "backlash, stiction, output-memory",
         "loops that do not become thinner when the input is slower",
         _label_half_widths,
@@ -168,6 +190,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         Site.INPUT,
         _input_curve,
         _CURVE,
+        _STATIC,
         "dead-zone, input-saturation, output-curve",
         "a curve of the residual over the input, the same in both directions",
         _label_places,
@@ -181,6 +204,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         Site.INPUT,
         _multiply_over_time,
         _CHANGE,
+        _CHANGING,
         "gain-step, ageing, output-gain-curve",
         "a residual proportional to the input, with a factor that changes over time",
         _label_times,
@@ -196,6 +220,7 @@ FREE_FORMS: tuple[Effect, ...] = (
             is_dissipative=True,
         ),
         _CURVE,
+        _DAMPING,
         "viscous, coulomb-friction, quadratic-drag",
         "a curve of the residual over the rate, the same at all places",
         _label_places,
@@ -209,6 +234,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         Site.FORCE,
         ForceLaw(_stiffness_force, constants=lambda context: (context.force_coordinate.peak,)),
         _CURVE,
+        _STATIC,
         "cubic-stiffness, even-nonlinearity, input-curve",
         "a curve of the residual over the coordinate, the same at all rates",
         _label_places,
@@ -222,6 +248,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         Site.OUTPUT,
         _add_low_passes,
         _FILTER,
+        _LINEAR,
         "sensor-lag, exponential-creep, input-filter",
         "amplitude and phase that change with the frequency, also at small amplitudes",
         _label_time_constants,
@@ -233,6 +260,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         Site.OUTPUT,
         lambda y, values, context: _add_plays(y, values, context.output_peak),
         _MEMORY,
+        _HYSTERETIC,
         "second-hysteresis, input-memory",
         "loops that do not become thinner when the input is slower",
         _label_half_widths,
@@ -244,6 +272,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         Site.OUTPUT,
         _output_curve,
         _CURVE,
+        _STATIC,
         "output-saturation, absolute-value-sensor, input-curve",
         "a curve of the residual over the output, the same in both directions",
         _label_places,
@@ -257,6 +286,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         Site.OUTPUT,
         _multiply_over_time,
         _CHANGE,
+        _CHANGING,
         "gain-step, ageing, input-gain-curve",
         "a residual proportional to the output, with a factor that changes over time",
         _label_times,
@@ -268,6 +298,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         Site.OUTPUT,
         lambda y, values, context: y + _interpolate_time(values, context),
         _CHANGE,
+        _DRIFTING,
         "linear-drift, jump, thermal-drift",
         "a slow residual that depends on the time alone",
         _label_times,

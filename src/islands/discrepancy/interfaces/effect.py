@@ -57,6 +57,8 @@ class Effect:
     is_free : bool
         Whether the effect is a free form, which has any shape of its family. It has one starting point for
         each coefficient, and its calibration starts from their best combination.
+    special_cases : tuple of str
+        Names of the effects with a shape that a free form has as well.
     extra_degrees_of_freedom : int
         Degrees of freedom added to the number of parameters in the information criterion, for example for an
         instant or a frequency that is selected among all samples.
@@ -81,6 +83,7 @@ class Effect:
     linear_parameters: int = 1
     is_gain: bool = False
     is_free: bool = False
+    special_cases: tuple[str, ...] = ()
     extra_degrees_of_freedom: int = 0
     confounded_with: "tuple[Effect, float] | None" = None
     similar_to: str = ""
