@@ -280,6 +280,7 @@ def _make_diagnosis(
                 explained_fraction(outcome.base, each.fit, floor),
             )
             for each in outcome.screened
+            if not each.effect.is_free or each.effect in hypothesis.effects
         ),
         gain,
         outcome.residual_structure,

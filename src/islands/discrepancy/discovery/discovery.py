@@ -78,8 +78,9 @@ def discover_terms(
     found = search_terms(base, target)
     if found is None:
         return None
-    effects = hypothesis.effects or tuple(each.effect for each in screened[:1])
-    fit = hypothesis.fit if hypothesis.effects or not screened else screened[0].fit
+    nearest = [] if hypothesis.effects else [each for each in screened if not each.effect.is_free][:1]
+    effects = hypothesis.effects or tuple(each.effect for each in nearest)
+    fit = nearest[0].fit if nearest else hypothesis.fit
     # The scores of a search with model error count other samples.
     scored = evaluate_fit(fit.simulation, target, fit.values)
     named_cost = scored.score + sum(bic_penalty(effect, base) for effect in effects)

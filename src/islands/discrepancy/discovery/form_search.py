@@ -9,10 +9,9 @@ from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
-import scipy
 
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
-from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN
+from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, compute_form_chance
 from islands.discrepancy.inference.hypothesis import Hypothesis, with_effect, without_effect
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.stepwise_search import eliminate_backward, refit_with_ar_noise
@@ -31,9 +30,6 @@ MAX_FORMS = 2
 #: Number of free forms, the best ones, that may replace all effects.
 MAX_REPLACEMENTS = 3
 
-#: Probability with which the further coefficients of a free form gain by chance.
-CHANCE_PROBABILITY = 0.01
-
 
 def compare_with_free_forms(
     outcome: SearchOutcome,
@@ -43,18 +39,22 @@ def compare_with_free_forms(
     rng: np.random.Generator,
     parallel_map: ParallelMap,
 ) -> SearchOutcome:
-    """Return the outcome with free forms if they explain clearly more and withstand the same tests."""
+    """Return the outcome with free forms if they explain clearly more and withstand the same tests.
+
+    Otherwise the forms are only added to the alternatives of a single effect.
+    """
     freer = search_free_forms(outcome, forms, parallel_map)
-    if freer is None:
-        return outcome
-    assessed = assess_evidence(freer, fitted, effects, rng)
-    has_forms = any(effect.is_free for effect in assessed.hypothesis.effects)
-    return assessed if has_forms and assessed.verdict != Verdict.UNKNOWN else outcome
+    if freer.hypothesis is not outcome.hypothesis:
+        assessed = assess_evidence(freer, fitted, effects, rng)
+        has_forms = any(effect.is_free for effect in assessed.hypothesis.effects)
+        if has_forms and assessed.verdict != Verdict.UNKNOWN:
+            return assessed
+    return replace(outcome, screened=freer.screened)
 
 
 def search_free_forms(
     outcome: SearchOutcome, forms: Sequence[Effect], parallel_map: ParallelMap = map
-) -> SearchOutcome | None:
+) -> SearchOutcome:
     """Replace effects by free forms, or add free forms, as long as these explain clearly more.
 
     One free form that fits better than several effects replaces them: it is one cause instead of several.
@@ -70,9 +70,9 @@ def search_free_forms(
 
     Returns
     -------
-    SearchOutcome or None
-        Outcome with free forms, not assessed yet; their screening is added to that of the effects. None if
-        the named effects explain as much.
+    SearchOutcome
+        Outcome with free forms, not assessed yet, or with the same hypothesis if the named effects explain as
+        much. The screening of the forms is added to that of the effects.
     """
     base = outcome.base
     alone = Hypothesis(base, base.score, ())
@@ -97,11 +97,8 @@ def search_free_forms(
         if not beam or not _explains_more(beam[0], found, outcome):
             break
         found, target = beam[0], refitted
-    if found is outcome.hypothesis:
-        return None
-    return replace(
-        outcome, hypothesis=found, target=target, screened=_merge(base, outcome.screened, screened)
-    )
+    merged = _merge(base, outcome.screened, screened)
+    return replace(outcome, hypothesis=found, target=target, screened=merged)
 
 
 def _replace_by_one_form(
@@ -116,17 +113,10 @@ def _replace_by_one_form(
         if len(found.effects) == 1 and found.effects[0].cause in each.effect.special_cases:
             continue
         (single,), refitted = refit_with_ar_noise([with_effect(alone, each)], outcome.target)
-        if single.fit.score < found.fit.score - _compute_chance_margin(each.effect, found):
+        chance = compute_form_chance(each.effect, found.effects, found.fit)
+        if single.fit.score < found.fit.score - chance - EQUIVALENCE_MARGIN:
             found, target = single, refitted
     return found, target
-
-
-def _compute_chance_margin(form: Effect, found: Hypothesis) -> float:
-    """Return the margin of equivalents, and what the further coefficients of a form gain by chance."""
-    context = found.fit.simulation.context
-    count = sum(len(effect.parameters(context)) for effect in found.effects)
-    further = max(len(form.parameters(context)) - count, 1)
-    return EQUIVALENCE_MARGIN + float(scipy.stats.chi2.ppf(1.0 - CHANCE_PROBABILITY, further))
 
 
 def _explains_more(new: Hypothesis, old: Hypothesis, outcome: SearchOutcome) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
@@ -17,13 +18,16 @@ from islands.discrepancy.inference.confidence import (
 )
 from islands.discrepancy.inference.confounders import Confounder, find_confounder
 from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, find_alternatives
-from islands.discrepancy.inference.screening import ScreenedEffect
+from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
 from islands.discrepancy.inference.verdict import choose_reference_fit, explained_fraction
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 
 #: Effects whose scores are within this margin of the named one cannot be distinguished from it.
 EQUIVALENCE_MARGIN = 9.0
+
+#: Probability with which the further coefficients of a free form gain less by chance.
+CHANCE_QUANTILE = 0.99
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +104,13 @@ def describe_effects(
         alternatives = hypothesis.alternatives or find_alternatives(hypothesis, target, effects, parallel_map)
     for effect, alternative in zip(hypothesis.effects, alternatives, strict=True):
         without = alternative.without
+        rivals = [each for each in alternative.screened if effect.cause not in each.effect.special_cases]
         scored = {
             each.effect.cause: ScoredAlternative(
-                each.score_gain(without.fit), sum_squares_by_block(each.fit, hypothesis.fit, target)
+                _compute_score(each, effect, without.fit),
+                sum_squares_by_block(each.fit, hypothesis.fit, target),
             )
-            for each in reversed(alternative.screened)
+            for each in reversed(rivals)
         }
         gain = without.cost - hypothesis.cost
         score = max(scored[effect.cause].score if effect.cause in scored else 0.0, gain)
@@ -120,8 +126,13 @@ def describe_effects(
         nothing = ScoredAlternative(0.0, sum_squares_by_block(without.fit, hypothesis.fit, target))
         named = scored.pop(name)
         confidence = compute_confidence(named, [*scored.values(), nothing])
-        equal = {each for each, other in scored.items() if other.score > named.score - EQUIVALENCE_MARGIN}
-        equivalents += [each for each in alternative.screened if each.effect.cause in equal]
+        forms = {each.effect.cause for each in rivals if each.effect.is_free}
+        equal = {
+            each
+            for each, other in scored.items()
+            if other.score > named.score - (0.0 if each in forms else EQUIVALENCE_MARGIN)
+        }
+        equivalents += [each for each in rivals if each.effect.cause in equal]
         reference = choose_reference_fit(hypothesis, without.fit, target)
         findings.append(
             Finding(
@@ -135,6 +146,30 @@ def describe_effects(
             )
         )
     return tuple(findings), tuple(equivalents)
+
+
+def compute_form_chance(form: Effect, effects: Sequence[Effect], fit: CalibrationResult) -> float:
+    """Return what a free form gains by chance over effects that are right, in minus twice the log-likelihood.
+
+    It is the 0.99 quantile of the chi-square distribution with the number of its further coefficients.
+    """
+    context = fit.simulation.context
+    count = sum(len(effect.parameters(context)) for effect in effects)
+    further = max(len(form.parameters(context)) - count, 1)
+    return float(scipy.stats.chi2.ppf(CHANCE_QUANTILE, further))
+
+
+def _compute_score(screened: ScreenedEffect, named: Effect, without: CalibrationResult) -> float:
+    """Return the score gain of an alternative.
+
+    Further coefficients of a free form have the penalty of chance instead of that of the BIC, with which
+    seven coefficients are never better than a wrong effect with one.
+    """
+    gain = screened.score_gain(without)
+    if not screened.effect.is_free or named.is_free:
+        return gain
+    penalties = bic_penalty(screened.effect, without) - bic_penalty(named, without)
+    return gain + penalties - compute_form_chance(screened.effect, (named,), without)
 
 
 def _scale_values(
