@@ -9,7 +9,8 @@ from islands.evolution.engine import Engine
 from islands.evolution.progress import ProgressCallback
 from islands_service.domain.job import IDENTIFICATION, Job, Lease
 from islands_service.domain.job_memory import estimate_memory, machine_memory
-from islands_service.domain.job_spec import parse_identification, resolve_job_settings
+from islands_service.domain.job_spec import parse_identification
+from islands_service.domain.search_limits import resolve_job_settings
 from islands_service.runtime.actor_pool import ignore_placement, kill_stale_actors
 from islands_service.runtime.cluster import cluster_memory
 from islands_service.runtime.ray_engine import RayEngine

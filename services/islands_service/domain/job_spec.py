@@ -4,7 +4,6 @@ import inspect
 import re
 from collections.abc import Mapping
 from dataclasses import fields
-from functools import lru_cache
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -19,12 +18,9 @@ from pydantic import (
 )
 
 from islands.errors import SettingsError
-from islands.estimation.parameter_constraints import constraint
-from islands.estimation.structure_selection.input_delays import expand_delays
-from islands.evolution.presets import AUTO, PRESET_NAMES, resolve_kinds, resolve_settings
+from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings, get_text_type
 from islands.io.simulator_spec.specification import ColumnSpec, SimulationSpec, innermost
-from islands.model.candidate_library import candidates, count_inputs
 
 S = TypeVar("S", bound=BaseModel)
 
@@ -49,31 +45,8 @@ DatasetId = Annotated[
     str, Field(pattern=r"^[0-9A-Za-z_-]{1,48}$", examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])
 ]
 
-#: Largest values over REST of settings that would otherwise cost memory rather than time.
-LIMITS = {
-    "population": 100_000,
-    "generations": 1_000_000,
-    "max_terms": 100,
-    "max_height": 12,
-    "library_degree": 8,
-    "library_lags": 30,
-    "initial_height": 12,
-    "tournament": 10_000,
-    "shooting": 10**9,
-    "max_evaluations": 10**15,
-}
-
-#: Largest number of entries of a list.
-_MAX_ENTRIES = 64
-
 #: Largest number of recordings of a job.
 MAX_RECORDINGS = 64
-
-#: Largest back-shift, in samples.
-MAX_SHIFT = 1000
-
-#: Largest number of characters of a text.
-_MAX_TEXT = 20_000
 
 
 def _read_descriptions() -> dict[str, str]:
@@ -258,52 +231,3 @@ def parse_document(form: type[S], document: Mapping[str, Any]) -> S:
         raise SettingsError(
             f"this version of islands cannot read the job ({where}: {first['msg']}): submit it again"
         ) from error
-
-
-def resolve_job_settings(
-    spec: Identification, max_islands: int, max_evaluations: int
-) -> tuple[Settings, ...]:
-    """Return the search settings of a job from an untrusted client; those of every kind for the preset auto.
-
-    Raises
-    ------
-    SettingsError
-        A setting is unknown or out of range, or exceeds a limit of this service.
-    """
-    changes = spec.changes
-    for name, most in {**LIMITS, "islands": max_islands}.items():
-        # Check before building anything: a million islands would exhaust the memory of this process.
-        if changes.get(name, 0) > most:
-            raise SettingsError(f"{name} is at most {most} on this service, got {changes[name]}")
-    for name, value in changes.items():
-        if isinstance(value, str) and len(value) > _MAX_TEXT:
-            raise SettingsError(f"{name} has {len(value)} characters, and {_MAX_TEXT} is the most")
-        if isinstance(value, tuple) and len(value) > _MAX_ENTRIES:
-            raise SettingsError(f"{name} has {len(value)} entries, and {_MAX_ENTRIES} is the most")
-    if any(shift > MAX_SHIFT for shift in changes.get("shifts", ())):
-        raise SettingsError(f"back-shifts are at most {MAX_SHIFT} on this service, got {changes['shifts']}")
-    kinds = tuple(resolve_kinds(changes).values()) if spec.preset == AUTO else ()
-    found = kinds or (resolve_settings(spec.preset, changes),)
-    for settings in found:
-        _check_settings(settings, len(spec.inputs), max_evaluations)
-    return found
-
-
-def _check_settings(settings: Settings, inputs: int, max_evaluations: int) -> None:
-    constraint(settings.constraints).check_inputs(inputs)
-    expand_delays(settings.library_delays, inputs)
-    asked = settings.population * (settings.generations + 1) * settings.islands
-    if asked > max_evaluations:
-        raise SettingsError(
-            f"population x generations x islands is {asked:.3g} individuals, and this service evaluates at "
-            f"most {max_evaluations:.3g} for a job: fewer generations, islands or individuals are needed"
-        )
-    if settings.library:
-        _check_library(settings.library, settings.library_degree, settings.library_lags, inputs)
-
-
-@lru_cache
-def _check_library(name: str, degree: int, lags: int, inputs: int) -> None:
-    """Raise the error of an invalid candidate library before the search does."""
-    count_inputs(name, degree, lags, inputs)
-    candidates(name, 1, lags, 1)

@@ -16,14 +16,8 @@ from islands.io.records.row_range import overlap, parse_rows
 from islands.io.records.validation import check_choice
 from islands.io.simulator_spec.specification import SIMULATORS, ModelSpec, PhysicalSpec, innermost
 from islands_service.domain.job_memory import DEFAULT_SHARE, estimate_memory, machine_memory
-from islands_service.domain.job_spec import (
-    LIMITS,
-    MAX_SHIFT,
-    Discrepancy,
-    Identification,
-    Part,
-    resolve_job_settings,
-)
+from islands_service.domain.job_spec import Discrepancy, Identification, Part
+from islands_service.domain.search_limits import LIMITS, MAX_SHIFT, resolve_job_settings
 from islands_service.intake.file_inspection import InspectionRequest
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store

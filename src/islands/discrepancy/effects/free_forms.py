@@ -139,23 +139,15 @@ _FILTER = "Ljung, System Identification, section 4"
 _MEMORY = "Kuhnen, Modeling, identification and compensation of complex hysteretic nonlinearities, 2003"
 _CHANGE = "Niedzwiecki, Identification of Time-Varying Processes"
 
-#: Effects with the shapes of the free forms. Of a simulation that is nearly static or linear, characteristics
-#: of the input, of the spring and of the output can hardly be distinguished, nor can filters.
-_LINEAR = (
-    *("delay", "sensor-lag", "resonance", "viscous", "relaxation"),
-    *("exponential-creep", "logarithmic-creep"),
-)
-_HYSTERETIC = (
-    *("backlash", "stiction", "second-hysteresis", "coulomb-friction"),
-    *("loop-asymmetry", "rate-dependent-loop"),
-)
-_STATIC = (
-    *("dead-zone", "input-saturation", "even-nonlinearity", "cubic-stiffness"),
-    *("absolute-value-sensor", "output-saturation"),
-)
+#: Effects with the shapes of the free forms. Characteristics of input, spring and output are often alike.
+_DRIFTING = ("offset", "linear-drift", "jump", "thermal-drift", "exponential-creep", "logarithmic-creep")
+_LINEAR = ("delay", "sensor-lag", "resonance", "viscous", "relaxation", *_DRIFTING[-2:])
+_LOOPS = ("second-hysteresis", "loop-asymmetry", "rate-dependent-loop", "coulomb-friction")
+_HYSTERETIC = ("backlash", "stiction", *_LOOPS)
+_SPRINGS = ("even-nonlinearity", "cubic-stiffness")
+_STATIC = ("dead-zone", "input-saturation", "absolute-value-sensor", "output-saturation", *_SPRINGS)
 _DAMPING = ("viscous", "coulomb-friction", "viscous-asymmetry", "quadratic-drag")
 _CHANGING = ("gain-step", "ageing")
-_DRIFTING = ("offset", "linear-drift", "jump", "thermal-drift", "exponential-creep", "logarithmic-creep")
 
 #: The free forms, in the order in which maps act on a signal.
 FREE_FORMS: tuple[Effect, ...] = (

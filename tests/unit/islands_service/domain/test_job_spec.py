@@ -10,7 +10,8 @@ from islands.errors import SettingsError
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
 from islands_api.schemas import JobRequest
-from islands_service.domain.job_spec import LIMITS, Identification, SettingsChanges, resolve_job_settings
+from islands_service.domain.job_spec import Identification, SettingsChanges
+from islands_service.domain.search_limits import LIMITS, resolve_job_settings
 from support.service import spec
 
 DATASET = "0" * 32 + "-csv"

@@ -13,6 +13,7 @@ from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.figures.diagnosis.form_values import draw_free_forms
 from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import simulate_spec
+from islands.performance.trials.trial import Trial, run_trial
 from support.simulated_records import recorded, wave
 
 U = wave(2000) / 20.0
@@ -64,3 +65,17 @@ def test_free_form_vanishes_at_its_nominal_values(form: islands.Effect) -> None:
         np.linalg.matrix_rank(simulation.simulate_batch(moved) - U)
         >= simulation.nominal.size - (form.site == "input map") * simulation.nominal.size
     )
+
+
+@pytest.mark.ci
+def test_one_curve_replaces_two_names_that_fit_worse() -> None:
+    found = run_trial(Trial(("cubic-damping",), 7_715_009, "white", (0.2, 1.0), core="second-order"))
+    assert (found.verdict, found.named) == ("family", ("damping-curve",))
+
+
+@pytest.mark.ci
+def test_curve_of_another_kind_lowers_the_confidence_of_a_name() -> None:
+    found = run_trial(Trial(("tanh-spring",), 7_715_008, "white", (1.0, 4.0), core="second-order"))
+    assert found.named == ("second-hysteresis",)
+    assert found.confidence < 0.5
+    assert found.equivalents == (("stiffness-curve",),)
