@@ -16,8 +16,9 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
-#: Iterations of each start of a rough calibration.
-FIRST_ITERATIONS = 6
+#: Iterations of each start of a rough calibration, if the residual is noise and if it is model error, which
+#: causes many minima: the first iterations do not show which is the best.
+FIRST_ITERATIONS, FIRST_ITERATIONS_WITH_MODEL_ERROR = 6, 12
 
 #: Decrease of the cost at which a rough calibration ends. Scores that differ by this are ties.
 ROUGH_DECREASE = 0.5
@@ -50,8 +51,8 @@ class StartsCalibrator:
         """
         simulation, starts = task
         has_model_error = self.target.effective_samples is not None
-        # Model error causes many minima, and the first iterations do not show which is the best.
-        iterations = FIRST_ITERATIONS if self.is_rough and not has_model_error else MAX_ITERATIONS
+        first = FIRST_ITERATIONS_WITH_MODEL_ERROR if has_model_error else FIRST_ITERATIONS
+        iterations = first if self.is_rough else MAX_ITERATIONS
         decrease = ROUGH_DECREASE if self.is_rough else MIN_DECREASE
         points = [minimise(simulation, self.target, start, iterations, decrease) for start in starts]
         if has_model_error:
