@@ -6,11 +6,22 @@ from typing import Protocol
 
 from rich.console import Console, Group
 from rich.live import Live
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+)
 from rich.text import Text
 
 output = Console(highlight=False, soft_wrap=True)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
+
+#: Fraction from which the time left is estimated.
+MIN_FRACTION = 0.05
 
 
 class Display(Protocol):
@@ -26,6 +37,18 @@ def print_message(message: str, _fraction: float | None = None, /) -> None:
     errors.print(message, markup=False)
 
 
+class FractionColumn(ProgressColumn):
+    """The completed fraction, and the time left if the rest takes as long in proportion."""
+
+    def render(self, task: Task) -> Text:
+        """Return the text; it is empty as long as the fraction is small."""
+        if task.completed < MIN_FRACTION or task.elapsed is None:
+            return Text()
+        left = task.elapsed * (1.0 - task.completed) / task.completed
+        duration = f"{left:.0f} s" if left < 100 else f"{left / 60:.0f} min"
+        return Text(f"{task.completed:.0%}, {duration} left")
+
+
 @contextmanager
 def progress(title: str) -> Iterator[Display]:
     """Show a progress bar during the context."""
@@ -34,6 +57,7 @@ def progress(title: str) -> Iterator[Display]:
         TextColumn("{task.fields[title]}"),
         BarColumn(),
         TimeElapsedColumn(),
+        FractionColumn(),
         TextColumn("{task.description}"),
     )
     bar = Progress(*columns, console=errors)
