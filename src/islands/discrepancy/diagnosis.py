@@ -203,6 +203,8 @@ def _extend_equations(
     residual, output = (record.y - fit.output)[:fitted], fit.output[:fitted]
     context = fit.simulation.context
     structure = find_residual_structure(residual, output, context, rng)
+    if structure:  # The rest is no noise: only its innovations are.
+        floor = min(floor, float(np.sqrt(fit.noise.variance)))
     explained = explained_fraction(found.base, fit, floor**2)
     if (
         classify(explained, has_effects=True, has_remainder=bool(structure), is_model_error=False)
