@@ -1,10 +1,19 @@
 """Disturbances: coupling of another channel, a periodic disturbance."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.discrepancy.effects.channels import channel, channel_range, channel_unit, has_channel
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
+
+#: Half width of a line in the spectrum and error of its frequency, relative to the resolution.
+LINE_WIDTH, LINE_ERROR = 2.0, 0.1
+
+#: Fraction of the power of the input in its largest line, from which it has one frequency only.
+MIN_LINE_POWER = 0.8
 
 
 def _cross_coupling_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
@@ -58,6 +67,25 @@ def _periodic_disturbance_parameters(context: SimulationContext) -> tuple[Parame
     )
 
 
+def _find_input_harmonics(
+    frequencies: NDArray[np.floating[Any]], context: SimulationContext
+) -> NDArray[np.bool_]:
+    """Return which frequencies are multiples of that of an input with a single line in its spectrum.
+
+    A disturbance there cannot be distinguished from a distortion of the response.
+    """
+    resolution = 1.0 / context.fit_end_time
+    u = context.u[: int(context.fit_end_time / context.dt)]
+    spectrum = np.abs(np.fft.rfft((u - u.mean()) * np.hanning(u.size), 4 * u.size)) ** 2
+    line = float(frequencies[np.argmax(spectrum)])
+    is_near = np.abs(frequencies - line) < LINE_WIDTH * resolution
+    if not spectrum.any() or spectrum[is_near].sum() < MIN_LINE_POWER * spectrum.sum():
+        return np.zeros(frequencies.size, dtype=np.bool_)
+    order = np.round(frequencies / line)
+    distance = np.abs(frequencies - order * line)
+    return (order >= 1) & (distance < (LINE_WIDTH + LINE_ERROR * order) * resolution)
+
+
 def _periodic_disturbance_starting_points(
     context: SimulationContext, residual: Signal
 ) -> tuple[tuple[float, ...], ...]:
@@ -67,6 +95,9 @@ def _periodic_disturbance_starting_points(
     spectrum = np.abs(np.fft.rfft(seen, 4 * fitted))
     frequencies = np.fft.rfftfreq(4 * fitted, context.dt)
     spectrum[frequencies < 2.0 / context.fit_end_time] = 0.0
+    spectrum[_find_input_harmonics(frequencies, context)] = 0.0
+    if not spectrum.any():
+        return ()
     strongest = float(frequencies[np.argmax(spectrum)])
     angle = 2 * np.pi * strongest * context.time[:fitted]
     waves = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -86,5 +117,5 @@ PERIODIC_DISTURBANCE = Effect(
     linear_parameters=2,
     extra_degrees_of_freedom=2,
     similar_to="resonance",
-    distinguished_by="a line in the spectrum that the input does not have",
+    distinguished_by="a line in the spectrum that is no multiple of the frequency of the input",
 )
