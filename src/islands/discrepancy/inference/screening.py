@@ -39,7 +39,7 @@ MIN_CALIBRATED_EFFECTS = 5
 
 #: Least number of effects that are calibrated to convergence, the best ones after a rough calibration, and
 #: distance from the best score within which all others are as well.
-MIN_CONVERGED_EFFECTS, MAX_DISTANCE = 3, 20.0
+MIN_CONVERGED_EFFECTS, MAX_DISTANCE = 6, 20.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,8 +103,7 @@ def screen_effects(
     ranked = sorted(rough, key=lambda each: -each.score_gain(base))
     gains = [each.score_gain(base) for each in ranked]
     count = sum(gain > gains[0] - MAX_DISTANCE for gain in gains)
-    least = MIN_CONVERGED_EFFECTS if target.effective_samples is None else 2 * MIN_CONVERGED_EFFECTS
-    best = ranked[: max(count, least)]
+    best = ranked[: max(count, MIN_CONVERGED_EFFECTS)]
     converged = _calibrate_starts(
         StartsCalibrator(target),
         [(each.effect, each.fit.simulation, [each.fit.values]) for each in rough if each in best],
