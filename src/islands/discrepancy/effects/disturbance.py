@@ -12,6 +12,9 @@ from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationCont
 #: Half width of a line in the spectrum and error of its frequency, relative to the resolution.
 LINE_WIDTH, LINE_ERROR = 2.0, 0.1
 
+#: Least number of periods of an input in the estimation part, so that there is space between its harmonics.
+MIN_PERIODS = 8
+
 #: Fraction of the power of the input in its largest line, from which it has one frequency only.
 MIN_LINE_POWER = 0.8
 
@@ -79,7 +82,8 @@ def _find_input_harmonics(
     spectrum = np.abs(np.fft.rfft((u - u.mean()) * np.hanning(u.size), 4 * u.size)) ** 2
     line = float(frequencies[np.argmax(spectrum)])
     is_near = np.abs(frequencies - line) < LINE_WIDTH * resolution
-    if not spectrum.any() or spectrum[is_near].sum() < MIN_LINE_POWER * spectrum.sum():
+    is_resolved = line >= MIN_PERIODS * resolution
+    if not is_resolved or spectrum[is_near].sum() < MIN_LINE_POWER * spectrum.sum():
         return np.zeros(frequencies.size, dtype=np.bool_)
     order = np.round(frequencies / line)
     distance = np.abs(frequencies - order * line)

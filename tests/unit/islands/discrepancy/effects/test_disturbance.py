@@ -34,3 +34,7 @@ def test_input_without_a_single_line_has_no_harmonics() -> None:
     noise = np.random.default_rng(1).standard_normal(TIME.size)
     assert find_frequencies(noise, 2.0) == pytest.approx([2.0], abs=0.02)
     assert find_frequencies(np.zeros(TIME.size), 2.0) == pytest.approx([2.0], abs=0.02)
+
+
+def test_short_record_of_a_few_periods_has_no_harmonics() -> None:
+    assert find_frequencies(np.sin(2 * np.pi * 0.3 * TIME), 0.9) == pytest.approx([0.9], abs=0.02)
