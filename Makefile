@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo test ci nightly soak fuzz load lint bench docs sbom licences audit wheel wheel-matrix clean
+.PHONY: setup demo collect test ci nightly soak fuzz load lint bench docs sbom licences audit wheel wheel-matrix clean
 
 setup: .venv/ready
 
@@ -22,6 +22,10 @@ PYTEST := $(BIN)/pytest --costs --dist loadfile --no-loadscope-reorder
 
 # Bytecode of rewritten assertions is kept between runs, whatever the environment says: it halves the collection.
 unexport PYTHONDONTWRITEBYTECODE
+
+# Compile the sources and rewrite the assertions of all tests once. Otherwise each worker of the first run does.
+collect: setup
+	$(BIN)/pytest --collect-only -q >/dev/null
 
 # Three workers on two cores: some tests wait for other processes.
 test: setup
