@@ -70,6 +70,11 @@ def _periodic_disturbance_parameters(context: SimulationContext) -> tuple[Parame
     )
 
 
+def _compute_spectrum(signal: Signal) -> NDArray[np.floating[Any]]:
+    """Return the spectrum of a signal; zero padding resolves frequencies between its bins."""
+    return np.abs(np.fft.rfft(signal * np.hanning(signal.size), 4 * signal.size))
+
+
 def _find_input_harmonics(
     frequencies: NDArray[np.floating[Any]], context: SimulationContext
 ) -> NDArray[np.bool_]:
@@ -79,7 +84,7 @@ def _find_input_harmonics(
     """
     resolution = 1.0 / context.fit_end_time
     u = context.u[: int(context.fit_end_time / context.dt)]
-    spectrum = np.abs(np.fft.rfft((u - u.mean()) * np.hanning(u.size), 4 * u.size)) ** 2
+    spectrum = _compute_spectrum(u - u.mean()) ** 2
     line = float(frequencies[np.argmax(spectrum)])
     is_near = np.abs(frequencies - line) < LINE_WIDTH * resolution
     is_resolved = line >= MIN_PERIODS * resolution
@@ -93,10 +98,8 @@ def _find_input_harmonics(
 def _periodic_disturbance_starting_points(
     context: SimulationContext, residual: Signal
 ) -> tuple[tuple[float, ...], ...]:
-    # Strongest line of the residual; zero padding resolves frequencies between the bins of the spectrum.
     fitted = int(context.fit_end_time / context.dt)
-    seen = residual[:fitted] * np.hanning(fitted)
-    spectrum = np.abs(np.fft.rfft(seen, 4 * fitted))
+    spectrum = _compute_spectrum(residual[:fitted])
     frequencies = np.fft.rfftfreq(4 * fitted, context.dt)
     spectrum[frequencies < 2.0 / context.fit_end_time] = 0.0
     spectrum[_find_input_harmonics(frequencies, context)] = 0.0

@@ -135,15 +135,15 @@ def _add_file(client: Client, monitor: str, path: Path, content: str, reading: R
 
 def _await_record(client: Client, job: JobView) -> int:
     """Wait until a record is analysed, show it, and return the number of alarms that it has raised."""
-    for job in client.progress(job):  # noqa: B020, PLR1704 - the current state replaces the old one
-        if job.state not in TERMINAL:
+    for current in client.progress(job):
+        if current.state not in TERMINAL:
             continue
-        if job.summary is None:
-            detail = (job.problem or {}).get("detail", f"job {job.id} was cancelled")
+        if current.summary is None:
+            detail = (current.problem or {}).get("detail", f"job {job.id} was cancelled")
             errors.print(f"{job.name}: {detail}", markup=False)
         else:
-            output.print(job.summary["words"], markup=False)
-            return int(job.summary["alarms"])
+            output.print(current.summary["words"], markup=False)
+            return int(current.summary["alarms"])
     return 0
 
 
