@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scipy
 
 from islands.data.dataset import Dataset, join
 from islands.discrepancy.calibration.preparation import make_context
@@ -14,6 +15,7 @@ from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.io.simulator_spec.factory import make_simulator
+from islands.io.simulator_spec.specification import LinearSpec
 from support.simulated_records import SAMPLES, made, names
 
 #: First sample of every recording, and the sample after the last.
@@ -113,3 +115,15 @@ def test_time_and_the_reference_of_a_channel_are_common_to_all_recordings(name: 
     parts = [effect.form(y[part], values, each) for part, each in zip(PARTS, context.split(), strict=True)]
     assert np.concatenate(parts) == pytest.approx(effect.form(y, values, context), rel=1e-12)
     assert np.ptp(np.concatenate(parts)) > 0.0
+
+
+def test_recordings_of_a_linear_model_have_one_level_at_any_first_input() -> None:
+    u = 3.0 + np.sign(np.sin(0.2 * np.arange(SAMPLES)))
+    y = scipy.signal.lfilter([0.2], [1.0, -0.8], u)
+    record = Dataset(u[:, None], y, 0.01)[50:]
+    cut = next(place for place in range(300, SAMPLES) if record.u[place, 0] != record.u[0, 0])
+    joined = join((replace(record[:cut], start=0.0), replace(record[cut:], start=0.0)))
+    simulator = make_simulator(LinearSpec(kind="linear", order=1), joined, {})
+    simulation = ExtendedSimulator(simulator, (), make_context(joined, simulator, joined.samples))
+    settled = slice(cut + 40, None)
+    assert simulation.simulate(simulation.nominal)[settled] == pytest.approx(joined.y[settled], abs=1e-3)

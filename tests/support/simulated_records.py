@@ -140,7 +140,13 @@ def made() -> Mapping[str, SpecAndRecord]:
         "ode": SpecAndRecord(OdeSpec.from_text("ode", str(EQUATIONS / "second-order.toml")), oscillator),
         "linear": SpecAndRecord(
             LinearSpec(
-                kind="linear", order=1, delay=2, numerator=(0.1, 0.05), denominator=(0.85,), level=0.3
+                kind="linear",
+                order=1,
+                delay=2,
+                numerator=(0.1, 0.05),
+                denominator=(0.85,),
+                level=0.3,
+                reference_input=0.2,
             ),
             plain,
         ),

@@ -23,7 +23,9 @@ _SCALE = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearSimulator:
-    """``A(q) (y - level) = B(q) u``, with as many poles as zeros, an input delay and an initial state.
+    """``A(q) (y - level) = B(q) (u - reference input)``, with an input delay and an initial state.
+
+    There are as many poles as zeros.
 
     Attributes
     ----------
@@ -31,7 +33,8 @@ class LinearSimulator:
         Coefficients of u(k - delay), u(k - delay - 1), ... and of y(k-1), y(k-2), ..., both on the right-hand
         side.
     level : float
-        Output at rest.
+        Output at rest, at the reference input.
+    reference_input : float
     delay : int
         Input delay in samples.
     unit : str
@@ -41,6 +44,7 @@ class LinearSimulator:
     numerator: Signal
     denominator: Signal
     level: float
+    reference_input: float
     delay: int
     unit: str
     name: str = "linear"
@@ -80,10 +84,22 @@ class LinearSimulator:
         delayed = np.concatenate([np.full(self.delay, x[0]), x[: x.size - self.delay]])
         level, state = values[2 * order + 1], values[2 * order + 2 :]
         # The input is constant before the first sample; the state is a deviation from that equilibrium.
+        state = state + (x[0] - self.reference_input) * self._state_at_rest
         filtered, _ = scipy.signal.lfilter(
-            numerator, np.concatenate([[1.0], -denominator]), delayed - x[0], zi=state
+            numerator, np.concatenate([[1.0], -denominator]), delayed - self.reference_input, zi=state
         )
         return level + filtered + add_output_forces(x, context, forces)
+
+    @property
+    def _state_at_rest(self) -> Signal:
+        """State of the filter at rest at an input of one, shape (order,); zero without such an equilibrium.
+
+        It is that of the nominal coefficients, so that it remains finite while a pole passes through one.
+        """
+        remainder = 1.0 - float(self.denominator.sum())
+        gain = float(self.numerator.sum()) / remainder if remainder > 0.0 else 0.0
+        state: Signal = np.cumsum((self.numerator[1:] + gain * self.denominator)[::-1])[::-1]
+        return state if remainder > 0.0 else np.zeros_like(state)
 
 
 def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
@@ -118,7 +134,7 @@ def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
             found, smallest = (numerator, denominator, level), mean_square
     if found is None:  # no iteration gave a stable model: use a static gain
         found = (np.append(np.ptp(y) / (np.ptp(u) or 1.0), np.zeros(order)), np.zeros(order), float(y.mean()))
-    return LinearSimulator(*found, delay, record.output_unit or "1")
+    return LinearSimulator(*found, float(u[0]), delay, record.output_unit or "1")
 
 
 def _least_squares(u: Signal, y: Signal, order: int, prefilter: Signal) -> tuple[Signal, Signal, float]:

@@ -60,8 +60,8 @@ _OUTPUT_LINES: Mapping[str, Callable[[_Values], tuple[float, float]]] = MappingP
 def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
     """Return an extended simulation as a model.
 
-    A linear simulation describes deviations from the equilibrium at its first sample. Its model is in
-    differences of samples, so that it continues the equilibrium of its start values.
+    A linear simulation without a reference input describes deviations from the equilibrium at its first
+    sample. Its model is in differences of samples, so that it continues the equilibrium of its start values.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
         case ModelSpec():
             return model_from_json(json.dumps(spec.model), spec.name)
         case ExtendedSpec(core=LinearSpec(numerator=tuple()) as core):
-            found = _in_differences(core, spec.inputs[0])
+            found = _make_linear_model(core, spec.inputs[0])
         case ExtendedSpec():
             found = closed_form(spec.core)
         case _:
@@ -95,16 +95,20 @@ def _refuse(what: str) -> ModelError:
     )
 
 
-def _in_differences(spec: LinearSpec, column: str) -> Model:
-    """Return a linear simulation as a model of the differences of its signals."""
+def _make_linear_model(spec: LinearSpec, column: str) -> Model:
+    """Return a linear simulation as a model, of the differences of its signals without a reference input."""
     assert spec.numerator is not None
     # Regressors read u(k-1) of the input that is read one sample early where the equation has u(k).
     lead = int(spec.delay == 0)
-    terms: _Terms = [(Lagged(0, 1), 1.0)]
-    for lag, coefficient in enumerate(spec.denominator, start=1):
-        terms += [(Lagged(0, lag), coefficient), (Lagged(0, lag + 1), -coefficient)]
-    for lag, coefficient in enumerate(spec.numerator, start=spec.delay + lead):
-        terms += [(Lagged(1, lag), coefficient), (Lagged(1, lag + 1), -coefficient)]
+    lagged = [(Lagged(0, lag), each) for lag, each in enumerate(spec.denominator, start=1)]
+    lagged += [(Lagged(1, lag), each) for lag, each in enumerate(spec.numerator, start=spec.delay + lead)]
+    terms: _Terms = list(lagged)
+    if spec.reference_input is None:
+        terms += [(Lagged(leaf.channel, leaf.lag + 1), -each) for leaf, each in lagged]
+        terms.append((Lagged(0, 1), 1.0))
+    else:
+        at_rest = spec.level * (1.0 - sum(spec.denominator)) - spec.reference_input * sum(spec.numerator)
+        terms.append((Constant(1.0), at_rest))
     return make_model(terms, (f"{column}{AT_ONCE * lead}",))
 
 

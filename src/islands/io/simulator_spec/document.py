@@ -131,6 +131,7 @@ def describe_extension(
                 numerator=coefficients[: order + 1],
                 denominator=coefficients[order + 1 : 2 * order + 1],
                 level=coefficients[2 * order + 1],
+                reference_input=simulator.reference_input,
             )
         case PythonFunctionSimulator():
             path, _, function = simulator.source.rpartition(":")

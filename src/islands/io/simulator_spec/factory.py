@@ -203,8 +203,9 @@ def make_linear(spec: LinearSpec, record: Dataset, _columns: Mapping[str, Any]) 
     if spec.numerator is None:
         _check_estimable(record)
         return estimate_linear(spec.order, spec.delay, estimation_part(record))
+    reference_input = float(record.u[0, 0]) if spec.reference_input is None else spec.reference_input
     return LinearSimulator(
-        *(np.array(spec.numerator), np.array(spec.denominator), spec.level, spec.delay),
+        *(np.array(spec.numerator), np.array(spec.denominator), spec.level, reference_input, spec.delay),
         record.output_unit or "1",
     )
 

@@ -46,7 +46,8 @@ class LinearSpec(SimulatorSpec):
     """A linear model, given by its coefficients or estimated from the estimation part of the record.
 
     It has ``order`` poles and as many zeros; the input is delayed by ``delay`` samples. The coefficients are
-    those of u(k - delay), u(k - delay - 1), ... and of y(k-1), y(k-2), ...; ``level`` is the output at rest.
+    those of u(k - delay), u(k - delay - 1), ... and of y(k-1), y(k-2), ...; ``level`` is the output at rest
+    at the input ``reference_input``, which is the first sample of the record if it is not given.
     """
 
     kind: Literal["linear"]
@@ -55,6 +56,7 @@ class LinearSpec(SimulatorSpec):
     numerator: tuple[FiniteFloat, ...] | None = Field(default=None, max_length=11)
     denominator: tuple[FiniteFloat, ...] = Field(default=(), max_length=10)
     level: FiniteFloat = 0.0
+    reference_input: FiniteFloat | None = None
 
     @model_validator(mode="after")
     def _check_number_of_coefficients(self) -> "LinearSpec":

@@ -127,7 +127,7 @@ def make_fit(segments: tuple[int, ...]) -> tuple[CalibrationResult, Target]:
     parts = draw_inputs(7)
     u = np.concatenate(parts)
     context = make_context(u, segments)
-    simulator = LinearSimulator(np.array([0.1, 0.0]), np.array([0.9]), 0.0, 0, "um")
+    simulator = LinearSimulator(np.array([0.1, 0.0]), np.array([0.9]), 0.0, 0.0, 0, "um")
     target = Target(np.roll(u, 3), np.arange(SAMPLES) < 750, None, {}, segments=segments)
     simulation = ExtendedSimulator(simulator, (), context)
     return evaluate_fit(simulation, target, simulation.nominal + 0.05), target

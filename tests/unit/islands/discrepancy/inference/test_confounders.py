@@ -17,7 +17,7 @@ from support.simulated_records import recorded
 Array = NDArray[np.float64]
 
 #: A simulation whose output is its input.
-UNIT_GAIN = LinearSimulator(np.ones(1), np.zeros(0), 0.0, 0, "um")
+UNIT_GAIN = LinearSimulator(np.ones(1), np.zeros(0), 0.0, 0.0, 0, "um")
 
 
 def test_mean_response_of_stick_slip_is_play_of_half_the_breakaway() -> None:

@@ -24,6 +24,14 @@ CORES = {
         "numerator": [0.1, 0, 0.2],
         "denominator": [1.1, -0.3],
     },
+    "referred": {
+        "kind": "linear",
+        "order": 1,
+        "numerator": [0.3, 0.1],
+        "denominator": [0.7],
+        "level": 2.0,
+        "reference_input": -0.4,
+    },
     "static": {"kind": "linear", "order": 0, "numerator": [0.5], "denominator": []},
 }
 
