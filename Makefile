@@ -9,7 +9,8 @@ setup: .venv/ready
 .venv/ready: requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "islands needs Python 3.11 or newer: make PYTHON=python3.11")'
 	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/pip install --disable-pip-version-check --no-compile --require-hashes -r requirements.lock
+	-$(BIN)/python -m compileall -qq -j 0 .venv/lib
 	$(BIN)/pip install --disable-pip-version-check --no-build-isolation --no-deps -e .
 	$(BIN)/python -c 'from islands.facade.warm_up import warm_up; warm_up()'
 	touch $@

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import sysconfig
 from importlib.resources import files
 from pathlib import Path
 
@@ -64,7 +65,7 @@ def test_packages_are_installed_with_their_data(folder: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, check=True, timeout=120
     )
-    assert Path(done.stdout.strip()).is_file()
+    assert Path(done.stdout.strip()).is_relative_to(sysconfig.get_path("purelib"))
 
 
 def test_help_lists_all_commands(folder: Path) -> None:
