@@ -13,7 +13,7 @@ from islands_service.liveness import StopRequest
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailableError
 from support.processes import eventually
-from support.stores import ALICE, child, claimed, job_in, submitted
+from support.stores import ALICE, child, claimed, job_in, submitted, turn_clock
 
 #: Seconds of a lease, in which it is renewed ten times.
 SECONDS = 0.3
@@ -41,6 +41,29 @@ def raised_by_check(heartbeat: Heartbeat) -> type[Exception] | None:
     return None
 
 
+class Clock:
+    """Clock of the heartbeats that the test advances. The load of the machine does not matter then."""
+
+    def __init__(self) -> None:
+        self.now, self.reads = 0.0, 0
+
+    def __call__(self) -> float:
+        self.reads += 1
+        return self.now
+
+    def await_beat(self) -> None:
+        """Wait for a whole beat, in which the clock is read twice, after the one that may be in progress."""
+        before = self.reads
+        eventually(lambda: self.reads >= before + 5, seconds=20.0)
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    made = Clock()
+    monkeypatch.setattr(heartbeats, "monotonic", made)
+    return made
+
+
 class Watched:
     """Leases that record the result of every renewal."""
 
@@ -56,17 +79,24 @@ class Watched:
         return getattr(self._leases, name)
 
 
-def test_heartbeat_keeps_the_lease_beyond_its_duration(store: Store) -> None:
+def test_heartbeat_keeps_the_lease_beyond_its_duration(
+    store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The job cannot be claimed while its lease is renewed, but can be afterwards."""
+    monkeypatch.setattr(heartbeats, "CANCEL_POLL", 0.02)
     submitted(store)
-    lease = claimed(store, 1.0)
     watched = Watched(store)
-    with Heartbeat(watched, lease, 1.0, StopRequest()) as heartbeat:  # type: ignore[arg-type]
-        while len(watched.renewals) < 12:  # a renewal is due every tenth of the lease
+    with Heartbeat(watched, claimed(store, 60.0), 60.0, StopRequest()) as heartbeat:  # type: ignore[arg-type]
+        for _ in range(12):  # a renewal is due every tenth of the lease
+            before = len(watched.renewals)
+            turn_clock(store, 6.0)
+            clock.now += 6.0
+            eventually(lambda before=before: len(watched.renewals) > before, seconds=20.0)
             assert store.leases.claim("another", SECONDS) is None
             heartbeat.check()
-            time.sleep(0.02)
-    eventually(lambda: store.leases.claim("another", SECONDS), seconds=20.0)
+    assert store.leases.claim("another", SECONDS) is None
+    turn_clock(store, 61.0)
+    assert store.leases.claim("another", SECONDS) is not None
 
 
 def test_heartbeat_thread_ends_with_the_block_after_an_error(store: Store, lease: Lease) -> None:
@@ -75,9 +105,12 @@ def test_heartbeat_thread_ends_with_the_block_after_an_error(store: Store, lease
     assert not heartbeat._thread.is_alive()
 
 
-def test_cancel_request_is_noticed_at_the_next_renewal(store: Store, lease: Lease) -> None:
+def test_cancel_request_is_noticed_at_the_next_renewal(
+    store: Store, lease: Lease, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(heartbeats, "CANCEL_POLL", 60.0)  # no checks between renewals
     watched = Watched(store)
-    with Heartbeat(watched, lease, 4.0, StopRequest()) as heartbeat:  # type: ignore[arg-type]
+    with Heartbeat(watched, lease, SECONDS, StopRequest()) as heartbeat:  # type: ignore[arg-type]
         heartbeat.check()
         store.jobs.cancel(ALICE, lease.job.id)
         before = len(watched.renewals)
@@ -122,14 +155,16 @@ def test_lost_lease_precedes_cancellation_and_that_precedes_a_stop(store: Store,
 
 
 def test_cancelled_job_without_checks_is_cancelled_by_the_heartbeat(
-    store: Store, lease: Lease, monkeypatch: pytest.MonkeyPatch
+    store: Store, lease: Lease, clock: Clock
 ) -> None:
-    monkeypatch.setattr(heartbeats, "CANCEL_GRACE", 0.3)
     with Heartbeat(store, lease, SECONDS, StopRequest()) as heartbeat:
         store.jobs.cancel(ALICE, lease.job.id)
-        asked = time.monotonic()
+        eventually(lambda: raised_by_check(heartbeat) is JobCancelled, seconds=20.0)
+        clock.now += heartbeats.CANCEL_GRACE
+        clock.await_beat()
+        assert store.jobs.get(ALICE, lease.job.id).state == JobState.RUNNING
+        clock.now += 0.01
         eventually(lambda: store.jobs.get(ALICE, lease.job.id).state == JobState.CANCELLED, seconds=20.0)
-        assert time.monotonic() - asked > 0.25
         eventually(lambda: raised_by_check(heartbeat) is LeaseLostError, seconds=20.0)
     with pytest.raises(LeaseLostError):
         store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {}))
@@ -175,7 +210,7 @@ def test_cancellation_is_noticed_soon_under_a_long_lease(store: Store) -> None:
 def test_cancelled_job_that_stops_in_time_stores_its_outcome(
     store: Store, lease: Lease, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(heartbeats, "CANCEL_GRACE", 5.0)
+    monkeypatch.setattr(heartbeats, "CANCEL_GRACE", 60.0)
     with Heartbeat(store, lease, SECONDS, StopRequest(), lambda: pytest.fail("abandoned")) as heartbeat:
         store.jobs.cancel(ALICE, lease.job.id)
         eventually(lambda: raised_by_check(heartbeat) is JobCancelled, seconds=20.0)
@@ -230,34 +265,43 @@ import sys, time
 from islands_service.liveness import StopRequest
 from islands_service.coordinator import heartbeat
 from islands_service.store import Store
-heartbeat.HANG_TIMEOUT = heartbeat.IDLE_TIMEOUT = 0.3
-heartbeat.IDLE_SHARE = 0.25  # so short a lease is renewed so often that the heartbeat itself takes 0.05
-def compute():
-    until = time.monotonic() + 0.6
-    while time.monotonic() < until:
-        pass
-    print("went on", flush=True)
-def silent():
-    time.sleep(20.0)
-    print("went on", flush=True)
+now = cpu = 0.0
+reads = 0
+def clock():
+    global reads
+    reads += 1
+    return now
+heartbeat.monotonic, heartbeat.process_time = clock, lambda: cpu
+def spend(seconds, share):
+    "Advance the clocks until the heartbeat has read them in two beats."
+    global now, cpu
+    cpu += share * seconds
+    now += seconds
+    before = reads
+    while reads < before + 5:
+        time.sleep(0.01)
 with Store(sys.argv[1]) as store:
     lease = store.leases.claim("hanging", 1.0)
     with heartbeat.Heartbeat(store, lease, 0.3, StopRequest()) as beating:
-        compute()  # reading a record
+        spend(4000.0, 0.06)  # reading a record
+        print("went on", flush=True)
         beating.check()
         with beating.search():
             for _ in range(12):
-                time.sleep(0.05)
+                spend(500.0, 0.0)
                 beating.check()
-        compute()  # refining
+        spend(4000.0, 0.06)  # refining
+        print("went on", flush=True)
         beating.check()
         if sys.argv[2:] == ["idle"]:
-            silent()
+            spend(4000.0, 0.04)
+            print("went on", flush=True)
         if sys.argv[2:] == ["lost"]:
             store.leases.finish(lease, heartbeat.JobOutcome(heartbeat.JobState.CANCELLED))
-            time.sleep(0.1)
+            spend(1.0, 1.0)
         with beating.search():
-            silent()
+            spend(700.0, 1.0)
+            print("went on", flush=True)
 """
 
 
