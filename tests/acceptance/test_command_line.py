@@ -111,6 +111,7 @@ def test_repeated_fit_gives_bit_identical_models(folder: Path) -> None:
     assert_same_files(folder / "fit", folder / "again")
 
 
+@pytest.mark.nightly
 def test_repeated_fit_draws_bit_identical_figures(records: Path) -> None:
     for out in ("drawn", "drawn again"):
         fit(records, out)

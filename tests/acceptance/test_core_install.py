@@ -86,6 +86,7 @@ def test_systems_make_records(folder):
     assert (folder / "system.csv").is_file()
 
 
+@pytest.mark.nightly
 def test_a_search_of_two_islands_runs_serially_and_says_so(folder):
     done = succeed(folder, "identify", "record.csv", *COLUMNS, *SEARCH, "--out", "found")
     assert "engine: serial, on one core" in done.stderr

@@ -43,8 +43,9 @@ def run(path: Path, *arguments: object, **environment: str) -> str:
     return done.stdout
 
 
-#: Examples that take five seconds of CPU and more and have a shorter one of the same kind.
-SLOW = ("02_", "04_", "05_", "07_", "09_")
+#: Examples that take five seconds of CPU and more and have a shorter one of the same kind, the one with a
+#: service, and the one that the test of a temporary folder runs.
+SLOW = ("02_", "03_", "04_", "05_", "07_", "08_", "09_")
 
 
 @pytest.mark.ci

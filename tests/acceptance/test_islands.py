@@ -49,7 +49,7 @@ def test_result_contains_the_settings_of_the_islands(folder: Path) -> None:
     assert (folder / "serial/figures/islands.svg").exists()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_engines_give_bit_identical_results(folder: Path, ray_address: str) -> None:
     assert set(ENGINES) == {"serial", "ray"}
     identify(folder, "ray", *ISLANDS, "--engine", "ray", "--ray-address", ray_address)

@@ -243,7 +243,7 @@ DEFECTIVE = {
 
 
 @pytest.mark.parametrize(
-    "case", [case if case == "NaN" else pytest.param(case, marks=pytest.mark.ci) for case in DEFECTIVE]
+    "case", [case if case == "NaN" else pytest.param(case, marks=pytest.mark.nightly) for case in DEFECTIVE]
 )
 def test_defect_of_a_record_is_reported_and_rejects_its_jobs(service, case):
     content, words = DEFECTIVE[case]

@@ -130,8 +130,14 @@ def test_most_injected_effects_are_found(
     assert found["false names on clean records"] <= false_names
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("noise", NOISES)
+#: Kinds of noise in the trials of every change.
+FEW = ("ar", "brown", "heavy-tailed")
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [pytest.param(noise, marks=pytest.mark.ci if noise in FEW else pytest.mark.nightly) for noise in NOISES],
+)
 def test_effects_are_named_and_noise_is_not(noise: str) -> None:
     """A random walk may be named a drift."""
     clean, faulty = (

@@ -12,9 +12,7 @@ from support.screen import Screen
 from support.service_processes import Service
 from support.stores import taken
 
-pytestmark = pytest.mark.ci
-
-SIZES = ((1280, 800), (360, 800))
+WIDE, NARROW = (1280, 800), (360, 800)
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +42,15 @@ def opened(screen: Screen, place: str) -> Any:
 
 
 @pytest.mark.parametrize("name", ["list", "empty", "failed", "running"])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize(("width", "height"), SIZES)
+@pytest.mark.parametrize(
+    ("scheme", "width", "height"),
+    [
+        pytest.param("light", *WIDE, marks=pytest.mark.ci),
+        pytest.param("dark", *NARROW, marks=pytest.mark.ci),
+        pytest.param("light", *NARROW, marks=pytest.mark.nightly),
+        pytest.param("dark", *WIDE, marks=pytest.mark.nightly),
+    ],
+)
 def test_every_page_fits_and_has_sufficient_contrast(
     quiet: Callable[..., Screen],
     desk: Service,
@@ -59,6 +64,7 @@ def test_every_page_fits_and_has_sufficient_contrast(
     assert unreadable(page) == []
 
 
+@pytest.mark.ci
 def test_numbers_are_aligned_in_columns(
     quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
 ) -> None:
@@ -67,6 +73,7 @@ def test_numbers_are_aligned_in_columns(
     assert "tabular-nums" in style
 
 
+@pytest.mark.ci
 def test_a_state_has_a_symbol_in_addition_to_its_colour(
     quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
 ) -> None:
@@ -78,6 +85,7 @@ def test_a_state_has_a_symbol_in_addition_to_its_colour(
     assert len({sign for _, sign in badges}) == 4
 
 
+@pytest.mark.ci
 def test_all_controls_are_reachable_by_keyboard(
     quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
 ) -> None:
@@ -100,6 +108,7 @@ def test_all_controls_are_reachable_by_keyboard(
     assert "Columns of the data set" in reached
 
 
+@pytest.mark.ci
 def test_times_are_shown_in_utc(quiet: Callable[..., Screen], desk: Service, places: dict[str, str]) -> None:
     """Independent of the time zone and the clock of the machine of the browser."""
     screen = quiet(desk.url, timezone_id="Asia/Tokyo")

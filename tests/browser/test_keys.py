@@ -63,9 +63,15 @@ def test_the_key_form_rejects_wrong_keys_and_keeps_a_valid_one(
     assert page.evaluate("sessionStorage.getItem('islands.key')") is None
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1280, 360])
+@pytest.mark.parametrize(
+    ("scheme", "width"),
+    [
+        pytest.param("light", 1280, marks=pytest.mark.ci),
+        pytest.param("dark", 360, marks=pytest.mark.ci),
+        pytest.param("light", 360, marks=pytest.mark.nightly),
+        pytest.param("dark", 1280, marks=pytest.mark.nightly),
+    ],
+)
 def test_the_key_form_has_sufficient_contrast(
     screens: Callable[..., Screen], locked: Service, width: int, scheme: str
 ) -> None:

@@ -154,9 +154,15 @@ def test_figures_are_loaded_when_they_scroll_into_view(
     expect(page.locator(".search img")).to_have_count(4, timeout=60_000)
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1280, 360])
+@pytest.mark.parametrize(
+    ("scheme", "width"),
+    [
+        pytest.param("light", 1280, marks=pytest.mark.ci),
+        pytest.param("dark", 360, marks=pytest.mark.ci),
+        pytest.param("light", 360, marks=pytest.mark.nightly),
+        pytest.param("dark", 1280, marks=pytest.mark.nightly),
+    ],
+)
 def test_the_models_panel_has_sufficient_contrast(
     opened: Callable[..., Any], finished: str, expect: Any, width: int, scheme: str
 ) -> None:

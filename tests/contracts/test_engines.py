@@ -200,7 +200,7 @@ def test_run_that_ended_between_stops_continues_to_the_same_stops(engine, histor
     )
 
 
-@separate_actors(pytest.mark.ci)
+@separate_actors(pytest.mark.nightly)
 def test_stopped_engine_yields_no_further_epochs(engine, history, search_problem):
     seen = []
     for epoch in engine.run(search_problem, empty_archipelago(3, 7), lambda: len(seen) == 2):
@@ -269,7 +269,7 @@ def test_errors_of_a_problem_are_raised_unchanged(engine, search_problem):
         assert type(raised.value) is RecordError
 
 
-@separate_actors(pytest.mark.ci)
+@separate_actors(pytest.mark.nightly)
 def test_more_islands_than_processors_are_evolved(engine, search_problem):
     many = replace(
         search_problem, settings=replace(SETTINGS, islands=9, topology="torus", migrants=1, generations=2)

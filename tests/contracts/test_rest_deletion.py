@@ -7,7 +7,7 @@ from support.service import csv, kept, problem_of, run_identification, spec
 from support.stores import job_in
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_figures_are_drawn_after_the_data_set_was_deleted(service):
     job = run_identification(service)
     dataset = f"/v1/datasets/{service.client.get(f'/v1/jobs/{job}').json()['spec']['dataset']}"

@@ -33,10 +33,19 @@ MOTIONS = {
     "linear-drift": 0.3 * TIME / TIME[-1],
 }
 
+#: Motions and levels of the input that are diagnosed for every change.
+ESSENTIAL = (*((name, 50.0) for name in MOTIONS), ("exponential-creep", 0.0))
+
 
 @pytest.mark.ci
-@pytest.mark.parametrize("level", [50.0, 0.1, 0.0])
-@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize(
+    ("name", "level"),
+    [
+        pytest.param(name, level, marks=() if (name, level) in ESSENTIAL else pytest.mark.nightly)
+        for name in MOTIONS
+        for level in (50.0, 0.1, 0.0)
+    ],
+)
 def test_motion_at_a_resting_input_is_named(name: str, level: float) -> None:
     found = islands.diagnose(
         rest(level, MOTIONS[name]), islands.function_simulator(static), tolerance={"k": 0.001}

@@ -43,7 +43,10 @@ def name_causes(found: Diagnosis) -> list[str]:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("case", LOST)
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(case, marks=pytest.mark.nightly) if case.startswith("every") else case for case in LOST],
+)
 @pytest.mark.parametrize(
     "noise", [WHITE, pytest.param(COLOURED, marks=pytest.mark.nightly)], ids=["white", "coloured"]
 )

@@ -125,8 +125,8 @@ def test_change_between_two_recordings_is_a_jump_at_the_boundary() -> None:
     assert found.effects[0].parameters["instant"].value == pytest.approx(5.0, abs=0.05)
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", [4, 5])
 def test_complete_catalogue_names_friction_only_if_there_is_some(seed: int) -> None:
     with_friction = islands.join(oscillator_recordings(seed, effect="coulomb-friction", value=0.5))
     found = islands.diagnose(with_friction, "second-order")

@@ -107,8 +107,14 @@ ERRORS: dict[str, tuple[Callable[[Dataset], Dataset], set[str], object, Callable
 }
 
 
+#: Injected errors of every change, one of each name.
+ESSENTIAL = ("milliseconds", "output in mm", "inverted output", "exchanged inputs", "late output")
+
+
 @pytest.mark.ci
-@pytest.mark.parametrize("case", ERRORS)
+@pytest.mark.parametrize(
+    "case", [case if case in ESSENTIAL else pytest.param(case, marks=pytest.mark.nightly) for case in ERRORS]
+)
 def test_gross_error_is_named_and_its_correction_leaves_no_discrepancy(case: str) -> None:
     spoil, names, value, correct = ERRORS[case]
     found = run(spoil(RECORD))

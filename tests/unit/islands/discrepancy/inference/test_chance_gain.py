@@ -41,7 +41,17 @@ def measure_gain(noise: np.ndarray, effect: Effect) -> tuple[float, float]:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("kind", ["white", "slow-ar", "pink", "multiplicative", "heavy-tailed", "brown"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "pink",
+        "heavy-tailed",
+        *(
+            pytest.param(kind, marks=pytest.mark.nightly)
+            for kind in ("white", "slow-ar", "multiplicative", "brown")
+        ),
+    ],
+)
 def test_noise_does_not_reach_its_own_threshold(kind: str) -> None:
     for seed in range(2):
         noise = NOISES[kind](np.random.default_rng(seed), wave(800))

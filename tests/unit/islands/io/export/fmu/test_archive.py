@@ -21,11 +21,17 @@ needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compil
 
 FORMATS = ("fmu", "fmu2")
 
+#: Blocks that are simulated for every change; others are at the nightly level.
+ESSENTIAL = ("many parts", "several inputs", "two masses")
+
 
 @pytest.mark.ci
 @needs_compiler
 @pytest.mark.parametrize("kind", FORMATS)
-@pytest.mark.parametrize("name", OF_BLOCKS)
+@pytest.mark.parametrize(
+    "name",
+    [name if name in ESSENTIAL else pytest.param(name, marks=pytest.mark.nightly) for name in OF_BLOCKS],
+)
 def test_fmpy_simulates_like_the_free_run(name, kind, tmp_path):
     case, path = block_case(name), tmp_path / "model.fmu"
     write_export(case.exported, kind, path)
