@@ -79,13 +79,19 @@ def test_a_finished_job_shows_its_models_with_their_metrics(
 
 
 @pytest.mark.ci
-def test_the_panel_begins_with_the_sentences_and_the_report(
+def test_the_panel_begins_with_the_sentences(
     opened: Callable[..., Any], service: Service, finished: str, expect: Any
 ) -> None:
     page = opened(f"#/jobs/{finished}")
     words = service.ask("GET", f"/v1/jobs/{finished}").json()["summary"]["words"].splitlines()
     expect(page.locator(".sentences > p, .sentences > code")).to_have_text([line.strip() for line in words])
     expect(page.locator(".sentences code")).to_have_text([words[1].strip()])
+
+
+@pytest.mark.nightly
+def test_the_report_is_saved_as_a_file(opened: Callable[..., Any], service: Service, finished: str) -> None:
+    page = opened(f"#/jobs/{finished}")
+    words = service.ask("GET", f"/v1/jobs/{finished}").json()["summary"]["words"].splitlines()
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save the report").click()
     assert words[0] in saved.value.path().read_text()

@@ -9,6 +9,7 @@ from islands.errors import SettingsError
 from islands_api.cli.app import Commands
 from islands_api.cli.options_file import match_options, read_option_tables
 from support.command_line import COLUMNS, succeed, write_hysteresis
+from support.undrawn import undrawn_figures
 
 FILE = Path("islands.toml")
 
@@ -58,7 +59,8 @@ def test_options_of_the_command_line_win(tmp_path, monkeypatch):
     write_hysteresis(tmp_path / "r.csv")
     lines = ["[fit]", 'library = "polynomial"', "max-terms = 2", "degree = 1", "lags = 1", 'out = "o"']
     FILE.write_text("\n".join(lines))
-    succeed("fit", "r.csv", *COLUMNS, "--max-terms", "1")
+    with undrawn_figures():
+        succeed("fit", "r.csv", *COLUMNS, "--max-terms", "1")
     settings = json.loads(Path("o/result.json").read_text())["settings"]
     assert (settings["library"], settings["max_terms"], settings["degree"]) == ("polynomial", 1, 1)
 

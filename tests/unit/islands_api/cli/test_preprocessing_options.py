@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from support.command_line import fail, stored, succeed
+from support.undrawn import undrawn_figures
 
 
 def write(path, seed, offset=0.0):
@@ -39,7 +40,8 @@ def folder(tmp_path_factory):
         "2",
     )
     steps = ("--decimate", "4", "--detrend", "constant", "--average", "1", "--feedthrough", "no")
-    succeed("fit", record, *columns, *steps, "--max-terms", "4", "--out", folder / "out")
+    with undrawn_figures():
+        succeed("fit", record, *columns, *steps, "--max-terms", "4", "--out", folder / "out")
     return folder
 
 
@@ -64,9 +66,9 @@ def test_simulation_repeats_the_steps_and_restores_the_offset(folder):
 
 def test_a_result_without_steps_has_none(tmp_path):
     record = write(tmp_path / "r.csv", 0)
-    succeed(
-        "fit", record, "--input", "u_V", "--output", "y_um", "--max-terms", "2", "--out", tmp_path / "out"
-    )
+    options = ("--input", "u_V", "--output", "y_um", "--max-terms", "2", "--out", tmp_path / "out")
+    with undrawn_figures():
+        succeed("fit", record, *options)
     assert json.loads((tmp_path / "out" / "result.json").read_text())["preprocessing"]["steps"] is None
 
 

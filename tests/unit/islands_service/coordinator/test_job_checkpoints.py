@@ -66,8 +66,12 @@ def frequent_reports(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.ci
 @pytest.mark.parametrize(
     "harm",
-    [Path.unlink, truncate, lambda path: path.write_bytes(b"{}"), lambda path: path.write_bytes(b"")],
-    ids=["lost", "truncated", "replaced", "empty"],
+    [
+        pytest.param(Path.unlink, id="lost"),
+        pytest.param(truncate, id="truncated"),
+        pytest.param(lambda path: path.write_bytes(b"{}"), id="replaced", marks=pytest.mark.nightly),
+        pytest.param(lambda path: path.write_bytes(b""), id="empty", marks=pytest.mark.nightly),
+    ],
 )
 def test_job_without_its_checkpoint_starts_again_with_the_same_result(
     store: Store, blobs: Blobs, job: Job, undisturbed: Found, harm: Callable[[Path], object]

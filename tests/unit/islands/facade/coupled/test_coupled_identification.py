@@ -16,6 +16,7 @@ from islands.io.export.coupled.coupled_document import read_coupled_model
 from islands.io.result_models import find_model_file
 from islands.simulation.coupled_free_run import coupled_free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
+from support.undrawn import undrawn_figures
 
 #: A small search.
 FAST = {"degree": 2, "lags": 2, "max_terms": 4, "average": 1, "certificate": 0}
@@ -51,7 +52,8 @@ def test_the_errors_are_those_of_the_common_free_run(found) -> None:
 
 @pytest.mark.ci
 def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> None:
-    folder = found.save(tmp_path / "result")
+    with undrawn_figures():
+        folder = found.save(tmp_path / "result")
     assert read_coupled_model(folder) == found.model
     document = json.loads((folder / "result.json").read_text())
     assert [each["name"] for each in document["outputs"]] == ["y1", "y2"]

@@ -8,6 +8,7 @@ import pytest
 
 from support.command_line import fail, succeed
 from support.coupled_systems import TWO_MASSES, make_coupled_record
+from support.undrawn import undrawn_figures
 
 #: A search that takes a second.
 SMALL = ("--lags", "2", "--degree", "1", "--max-terms", "4", "--certificate", "0", "--average", "1")
@@ -50,7 +51,8 @@ def test_a_fitted_model_is_simulated_and_shown(record, tmp_path) -> None:
 @pytest.mark.ci
 def test_several_outputs_are_identified_by_evolution(record, tmp_path) -> None:
     settings = ("--population", "6", "--generations", "1", "--max-terms", "3", "--average", "1")
-    printed = succeed("identify", record, *COLUMNS, *settings, "--out", tmp_path / "result")
+    with undrawn_figures():
+        printed = succeed("identify", record, *COLUMNS, *settings, "--out", tmp_path / "result")
     assert "2 outputs" in printed
 
 

@@ -210,7 +210,9 @@ def test_run_can_be_resumed_from_another_folder(run, interrupted, tmp_path, monk
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("changed", ["r.csv", "v.csv", "t.csv"])
+@pytest.mark.parametrize(
+    "changed", ["r.csv", *(pytest.param(name, marks=pytest.mark.nightly) for name in ("v.csv", "t.csv"))]
+)
 def test_changed_file_is_rejected_on_resuming(run, interrupted, tmp_path, changed):
     for seed, name in enumerate(("v.csv", "t.csv"), start=1):
         write_record(record(seed=seed), name)
@@ -268,7 +270,7 @@ def test_resume_rejects_record_and_settings(run, more):
         (1, (), ("serial", None)),
         (2, (), ("ray", None)),
         (2, ("--engine", "serial"), ("serial", None)),
-        (1, ("--engine", "ray"), ("ray", None)),
+        pytest.param(1, ("--engine", "ray"), ("ray", None), marks=pytest.mark.nightly),
         (1, ("--ray-address", "there:6379"), ("ray", "there:6379")),
     ],
 )

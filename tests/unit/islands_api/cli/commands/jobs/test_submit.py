@@ -119,7 +119,7 @@ def test_default_name_is_the_printable_file_name(run: Run, tmp_path: Path) -> No
     ("words", "expected"),
     [
         (("--rows", "0:100", "--validation", "100:"), {"dataset": "r.csv", "rows": "100:"}),
-        (("--validation", "v.csv"), {"dataset": "v.csv"}),
+        pytest.param(("--validation", "v.csv"), {"dataset": "v.csv"}, marks=pytest.mark.nightly),
     ],
     ids=["rows", "file"],
 )
@@ -184,7 +184,7 @@ def test_options_of_diagnose_reach_the_job(run: Run, service: Service, owner: st
     assert out.splitlines()[0] == f"job {job['id']}: queued"
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_recordings_of_a_diagnosis_are_uploaded(run: Run, tmp_path: Path) -> None:
     (tmp_path / "v.csv").write_bytes(csv(120))
     words = ("--simulation", "bouc-wen-piezo", "--rows", "0:110", "--json")
