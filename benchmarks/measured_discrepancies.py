@@ -212,14 +212,14 @@ def measured(case: Case, clean: int = 0, injected: int = 0) -> dict:
     found = islands.diagnose(record, case.simulation)
     wall, busy = time.perf_counter() - began, time.process_time() - cpu
     gain = found.gain
+    causes = [each for each in found.effects if each.explained_fraction is not None]
     return {
         "samples": record.samples,
         "simulation": case.simulation,
         "verdict": str(found.verdict),
-        "names": [each.name for each in found.effects if each.explained_fraction is not None],
-        "equivalents": [
-            list(each.equivalents) for each in found.effects if each.explained_fraction is not None
-        ],
+        "names": [each.name for each in causes if each.is_claimed],
+        "further": [each.name for each in causes if not each.is_claimed],
+        "equivalents": [list(each.equivalents) for each in causes],
         "candidates": [each.name for each in found.candidates[:3]],
         "locked": None
         if gain is None
@@ -246,7 +246,8 @@ def main() -> None:
         row = rows[name] = measured(CASES[name], asked.clean, asked.injected)
         print(f"{name} ({row['simulation']}, {row['samples']} samples, {row['cpu_s']:.0f} s of CPU)")
         names, first = ", ".join(row["names"]) or "-", ", ".join(row["candidates"])
-        print(f"    {row['verdict']}: {names}   (screened first: {first})")
+        further = f", not claimed: {', '.join(row['further'])}" if row["further"] else ""
+        print(f"    {row['verdict']}: {names}{further}   (screened first: {first})")
         if row["locked"] is not None:
             before, after, low, high = row["locked"]
             print(f"    held out {before:.4g} -> {after:.4g} {row['unit']} ({low:.0f} to {high:.0f} % less)")

@@ -19,7 +19,7 @@ from islands_service.reports.identification_report import TEMPLATES
 _VERDICTS = {
     Verdict.NOTHING: "No significant discrepancy: the simulation is correct within the noise of this record.",
     Verdict.NAMED: "The simulation lacks known effects, which explain the discrepancy.",
-    Verdict.REMAINDER: "The simulation lacks known effects, which explain most of the discrepancy.",
+    Verdict.REMAINDER: "The simulation lacks a known effect, which explains most of the discrepancy.",
     Verdict.UNKNOWN: "The simulation is wrong, and no known effect explains the discrepancy.",
     Verdict.FAMILY: "The simulation lacks an effect of this kind, whose shape is that of no known effect.",
     Verdict.DISCOVERED: "The equations lack terms, which were found. No known effect explains as much.",
@@ -44,7 +44,9 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     lines = [_verdict(found)]
     lines += [f"  {_finding(finding)}" for finding in found.effects]
     lines += [f"Record: {each.text}" for each in found.record_findings]
-    if found.discovery is not None:
+    if found.discovery is not None and found.verdict != Verdict.DISCOVERED:
+        lines.append(f"Equations that explain the record as well: {found.discovery.equations}")
+    elif found.discovery is not None:
         others, worse_by = " and ".join(found.discovery.nearest), found.discovery.worse_by
         lines.append(f"Equations: {found.discovery.equations}")
         if others:
@@ -100,7 +102,8 @@ def _finding(finding: Finding) -> str:
     )
     confounded = f"; confounded with {', '.join(finding.equivalents)}" if finding.equivalents else ""
     values = f": {values}" if values else ""
-    return f"{finding.name}{values}; confidence {finding.confidence:.2f}{share}{confounded}"
+    claim = "" if finding.is_claimed else "; improves the fit, but is not claimed as a cause"
+    return f"{finding.name}{values}; confidence {finding.confidence:.2f}{share}{confounded}{claim}"
 
 
 def summarise_self_test(tested: SelfTest) -> str:

@@ -64,7 +64,8 @@ class Diagnosis:
     record_findings : tuple of RecordFinding
         Channels that were left out, and other findings about the record.
     discovery : Discovery or None
-        Equations with missing terms that were found; None unless the verdict is "discovered".
+        Equations with missing terms. They are the cause if the verdict is "discovered", and equivalent to the
+        named cause otherwise. None if there are none.
     """
 
     verdict: Verdict

@@ -104,6 +104,7 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
         },
         "score": finding.score,
         "eta": finding.explained_fraction,
+        "claimed": finding.is_claimed,
     }
 
 

@@ -1,5 +1,6 @@
 """Discovery of missing terms: equations with more terms that explain a record better than the catalogue."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
 )
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.inference.confidence import CONFIDENCE_TEMPERATURE
-from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, Finding, Value
+from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, Finding, Rival, Value
 from islands.discrepancy.inference.holdout import cross_validate_gain
 from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
@@ -22,6 +23,9 @@ from islands.discrepancy.inference.verdict import explained_fraction
 #: Part of the gain of the terms by which they have to be better than effects. The catalogue has one form of
 #: each effect, and another one, such as a sign for a smoothed sign, is no other cause.
 MIN_RELATIVE_GAIN = 0.1
+
+#: Terms that are the law of an effect, which the catalogue has smoothed, as regular expressions.
+SMOOTHED_LAWS = {"coulomb-friction": r"sign\([^*]*\)"}
 
 #: Name and family of a discovered term in findings.
 MISSING_TERM, FAMILY = "missing-term", "discovered"
@@ -38,7 +42,7 @@ class Discovery:
     nearest : tuple of str
         Names of the effects that explain the record best.
     worse_by : float
-        Difference between their score and that of the equations; at least the margin of equivalents.
+        Difference between their score and that of the equations; negative if they explain the record better.
     """
 
     equations: str
@@ -46,15 +50,29 @@ class Discovery:
     worse_by: float
 
 
-def discover_terms(
-    base: CalibrationResult,
-    hypothesis: Hypothesis,
-    screened: Sequence[ScreenedEffect],
-    target: Target,
-    fitted: int,
-    rng: np.random.Generator,
-) -> tuple[TermSearchResult, Discovery] | None:
-    """Search for missing terms that explain a record better than the effects of the catalogue.
+@dataclass(frozen=True, slots=True)
+class MissingTerms:
+    """Result of a search for missing terms, compared with the effects of the catalogue."""
+
+    search: TermSearchResult
+    discovery: Discovery
+
+    @property
+    def rival(self) -> Rival | None:
+        """Missing terms as an alternative of the effects, at most as good; None if they are the same law.
+
+        If they were better by more than another form of an effect, they would replace it.
+        """
+        law = SMOOTHED_LAWS.get(" ".join(self.discovery.nearest))
+        if law is not None and all(re.fullmatch(law, each.term.text) for each in self.search.terms):
+            return None
+        return Rival(MISSING_TERM, self.search.fit, min(self.discovery.worse_by, 0.0))
+
+
+def find_missing_terms(
+    base: CalibrationResult, hypothesis: Hypothesis, screened: Sequence[ScreenedEffect], target: Target
+) -> MissingTerms | None:
+    """Search for missing terms, and compare them with the effects of the catalogue.
 
     Parameters
     ----------
@@ -66,14 +84,11 @@ def discover_terms(
         Single effects, the best first; the nearest one if the hypothesis has none.
     target : Target
         Target of ``base``.
-    fitted : int
-        Number of samples used for estimation.
 
     Returns
     -------
-    tuple or None
-        None if the simulator has no equations, if no term gains enough, also on blocks that are left out, or
-        if effects explain the record as well.
+    MissingTerms or None
+        None if the simulator has no equations, or if no term gains enough.
     """
     found = search_terms(base, target)
     if found is None:
@@ -83,16 +98,37 @@ def discover_terms(
     fit = nearest[0].fit if nearest else hypothesis.fit
     # The scores of a search with model error count other samples.
     scored = evaluate_fit(fit.simulation, target, fit.values)
-    named_cost = scored.score + sum(bic_penalty(effect, base) for effect in effects)
-    # A formula is preferred to a curve that explains as much.
-    has_names = not any(effect.is_free for effect in effects)
-    margin = max(EQUIVALENCE_MARGIN, MIN_RELATIVE_GAIN * (base.score - found.cost)) if has_names else 0.0
-    if found.cost > named_cost - margin:
-        return None
-    if cross_validate_gain(base, False, found.fit, target, fitted, rng) <= 0.0:
-        return None
+    cost = scored.score + sum(bic_penalty(effect, base) for effect in effects)
     names = tuple(dict.fromkeys(effect.cause for effect in effects))
-    return found, Discovery(found.describe(), names, named_cost - found.cost)
+    return MissingTerms(found, Discovery(found.describe(), names, cost - found.cost))
+
+
+def replaces_effects(
+    terms: MissingTerms,
+    base: CalibrationResult,
+    hypothesis: Hypothesis,
+    target: Target,
+    fitted: int,
+    rng: np.random.Generator,
+) -> bool:
+    """Return whether missing terms explain clearly more than effects, also on blocks that are left out.
+
+    Parameters
+    ----------
+    base, hypothesis, target
+        Arguments of `find_missing_terms`.
+    fitted : int
+        Number of samples used for estimation.
+    """
+    found = terms.search
+    margin = max(EQUIVALENCE_MARGIN, MIN_RELATIVE_GAIN * (base.score - found.cost))
+    if any(effect.is_free for effect in hypothesis.effects):
+        margin = 0.0  # A formula is preferred to a curve that explains as much.
+    elif len(found.terms) < len(hypothesis.effects):
+        margin = EQUIVALENCE_MARGIN  # Several names are no other form of fewer terms.
+    if terms.discovery.worse_by < margin:
+        return False
+    return cross_validate_gain(base, False, found.fit, target, fitted, rng) > 0.0
 
 
 def describe_terms(

@@ -12,7 +12,7 @@ import numpy as np
 
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, compute_form_chance
-from islands.discrepancy.inference.hypothesis import Hypothesis, with_effect, without_effect
+from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, with_effect, without_effect
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.stepwise_search import eliminate_backward, refit_with_ar_noise
 from islands.discrepancy.inference.strategies import SearchOutcome, assess_evidence
@@ -49,7 +49,7 @@ def compare_with_free_forms(
         has_forms = any(effect.is_free for effect in assessed.hypothesis.effects)
         if has_forms and assessed.verdict != Verdict.UNKNOWN:
             return assessed
-    return replace(outcome, screened=freer.screened)
+    return replace(outcome, screened=freer.screened, form_alternatives=freer.form_alternatives)
 
 
 def search_free_forms(
@@ -78,27 +78,36 @@ def search_free_forms(
     alone = Hypothesis(base, base.score, ())
     screened = screen_effects(base, outcome.target, forms, parallel_map)
     found, target = _replace_by_one_form(outcome, alone, screened)
+    alternatives: dict[str, Alternatives] = {}
     for _ in range(MAX_FORMS):
-        starts = [(alone, screened)]
-        others = [found] if found.effects else []
+        starts = [Alternatives(alone, screened)]
+        if found.effects:
+            starts.append(_screen_forms(found, forms, target, parallel_map))
         if len(found.effects) > 1:
-            others += [
-                without_effect(found, effect, target) for effect in found.effects if not effect.is_free
-            ]
-        for hypothesis in others:
-            unused = [form for form in forms if form not in hypothesis.effects]
-            starts.append((hypothesis, screen_effects(hypothesis.fit, target, unused, parallel_map)))
+            alternatives = {
+                effect.name: _screen_forms(without_effect(found, effect, target), forms, target, parallel_map)
+                for effect in found.effects
+                if not effect.is_free
+            }
         extended = [
-            eliminate_backward(with_effect(hypothesis, ranked[0]), target, EQUIVALENCE_MARGIN)
-            for hypothesis, ranked in starts
-            if ranked
+            eliminate_backward(with_effect(each.without, each.screened[0]), target, EQUIVALENCE_MARGIN)
+            for each in (*starts, *alternatives.values())
+            if each.screened
         ]
         beam, refitted = refit_with_ar_noise(sorted(extended, key=attrgetter("rank")), target)
         if not beam or not _explains_more(beam[0], found, outcome):
             break
-        found, target = beam[0], refitted
+        found, target, alternatives = beam[0], refitted, {}
     merged = _merge(base, outcome.screened, screened)
-    return replace(outcome, hypothesis=found, target=target, screened=merged)
+    return replace(outcome, hypothesis=found, target=target, screened=merged, form_alternatives=alternatives)
+
+
+def _screen_forms(
+    without: Hypothesis, forms: Sequence[Effect], target: Target, parallel_map: ParallelMap
+) -> Alternatives:
+    """Screen the free forms that a hypothesis does not have."""
+    unused = [form for form in forms if form not in without.effects]
+    return Alternatives(without, screen_effects(without.fit, target, unused, parallel_map))
 
 
 def _replace_by_one_form(

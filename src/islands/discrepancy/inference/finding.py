@@ -8,7 +8,6 @@ import scipy
 
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
-    Target,
     estimate_covariance,
 )
 from islands.discrepancy.inference.confidence import (
@@ -19,6 +18,7 @@ from islands.discrepancy.inference.confidence import (
 from islands.discrepancy.inference.confounders import Confounder, find_confounder
 from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, find_alternatives
 from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
+from islands.discrepancy.inference.strategies import SearchOutcome
 from islands.discrepancy.inference.verdict import choose_reference_fit, explained_fraction
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
@@ -64,6 +64,9 @@ class Finding:
         Score gain in minus twice the log-likelihood, less the BIC penalty.
     explained_fraction : float or None
         Fraction of the explainable misfit that the cause explains; None for a property of the noise.
+    is_claimed : bool
+        Whether it is claimed as a cause. If a remainder shows that the simulation is still wrong, only the
+        first effect is: further ones may follow its wrong form.
     """
 
     name: str
@@ -73,50 +76,82 @@ class Finding:
     parameters: Mapping[str, Value]
     score: float
     explained_fraction: float | None
+    is_claimed: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rival:
+    """Another explanation of a record than its effects.
+
+    Attributes
+    ----------
+    name : str
+    fit : CalibrationResult
+    lead : float
+        By how much its score exceeds that of the effects.
+    """
+
+    name: str
+    fit: CalibrationResult
+    lead: float
 
 
 def describe_effects(
-    hypothesis: Hypothesis,
-    base: CalibrationResult,
-    screened: Sequence[ScreenedEffect],
-    target: Target,
+    outcome: SearchOutcome,
     effects: Sequence[Effect],
-    floor: float,
+    rival: Rival | None = None,
     parallel_map: ParallelMap = map,
 ) -> tuple[tuple[Finding, ...], tuple[ScreenedEffect, ...]]:
-    """Return the findings of a hypothesis, and the alternatives that the record cannot distinguish from them.
+    """Return the findings of a search, and the alternatives that the record cannot distinguish from them.
 
-    The alternatives of each effect are those that were screened without it.
+    The alternatives of a single effect are all that were screened; those of each of several ones are screened
+    without it.
 
     Parameters
     ----------
-    base, screened : CalibrationResult, sequence of ScreenedEffect
-        The simulation without effects and the effects screened on it; they are the alternatives if the
-        hypothesis has a single effect.
-    floor : float
-        Mean square of the noise.
+    outcome : SearchOutcome
+    effects : sequence of Effect
+        Effects that were searched for.
+    rival : Rival, optional
+        Further alternative of a single effect.
     """
     findings, equivalents = [], []
+    base, hypothesis, target = outcome.base, outcome.hypothesis, outcome.target
     deviations = np.sqrt(np.maximum(np.diag(estimate_covariance(hypothesis.fit, target)), 0.0))
     if len(hypothesis.effects) == 1:
-        alternatives: Sequence[Alternatives] = (Alternatives(Hypothesis(base, base.score, ()), screened),)
+        alternatives: Sequence[Alternatives] = (
+            Alternatives(Hypothesis(base, base.score, ()), outcome.screened),
+        )
     else:
         alternatives = hypothesis.alternatives or find_alternatives(hypothesis, target, effects, parallel_map)
     for effect, alternative in zip(hypothesis.effects, alternatives, strict=True):
         without = alternative.without
-        rivals = [each for each in alternative.screened if effect.cause not in each.effect.special_cases]
+        compared = [alternative]
+        forms = outcome.form_alternatives.get(effect.name)
+        if forms is not None and {*forms.without.effects, effect} == {*hypothesis.effects}:
+            compared.append(forms)
+        rivals = [
+            (screened, each.without.fit)
+            for each in compared
+            for screened in each.screened
+            if effect.cause not in screened.effect.special_cases
+        ]
         scored = {
             each.effect.cause: ScoredAlternative(
-                _compute_score(each, effect, without.fit),
+                _compute_score(each, effect, reference),
                 sum_squares_by_block(each.fit, hypothesis.fit, target),
             )
-            for each in reversed(rivals)
+            for each, reference in reversed(rivals)
         }
         gain = without.cost - hypothesis.cost
         score = max(scored[effect.cause].score if effect.cause in scored else 0.0, gain)
         scored[effect.cause] = ScoredAlternative(
             score, sum_squares_by_block(hypothesis.fit, hypothesis.fit, target)
         )
+        if rival is not None and len(hypothesis.effects) == 1:
+            scored[rival.name] = ScoredAlternative(
+                score + rival.lead, sum_squares_by_block(rival.fit, hypothesis.fit, target)
+            )
         name, family, values = effect.cause, effect.family, _get_values(hypothesis.fit, effect, deviations)
         if (confounder := find_confounder(hypothesis.fit, effect, target)) is not None:
             scored[confounder.effect.cause] = ScoredAlternative(score + confounder.score_gain, None)
@@ -126,13 +161,13 @@ def describe_effects(
         nothing = ScoredAlternative(0.0, sum_squares_by_block(without.fit, hypothesis.fit, target))
         named = scored.pop(name)
         confidence = compute_confidence(named, [*scored.values(), nothing])
-        forms = {each.effect.cause for each in rivals if each.effect.is_free}
+        free = {each.effect.cause for each, _ in rivals if each.effect.is_free}
         equal = {
             each
             for each, other in scored.items()
-            if other.score > named.score - (0.0 if each in forms else EQUIVALENCE_MARGIN)
+            if other.score > named.score - (0.0 if each in free else EQUIVALENCE_MARGIN)
         }
-        equivalents += [each for each in rivals if each.effect.cause in equal]
+        equivalents += [each for each, _ in rivals if each.effect.cause in equal]
         reference = choose_reference_fit(hypothesis, without.fit, target)
         findings.append(
             Finding(
@@ -142,7 +177,7 @@ def describe_effects(
                 tuple(sorted(equal, key=lambda name: -scored[name].score)),
                 values,
                 named.score,
-                explained_fraction(reference, hypothesis.fit, floor),
+                explained_fraction(reference, hypothesis.fit, outcome.noise_floor),
             )
         )
     return tuple(findings), tuple(equivalents)

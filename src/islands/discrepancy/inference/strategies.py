@@ -6,7 +6,7 @@ unweighted residual and counts its effective sample size.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
 from islands.discrepancy.calibration.starts_calibrator import make_task_key
 from islands.discrepancy.inference.chance_gain import ForwardSelection
-from islands.discrepancy.inference.hypothesis import Hypothesis
+from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis
 from islands.discrepancy.inference.noise_floor import (
     MIN_FRACTION,
     explainable_variance,
@@ -72,6 +72,8 @@ class SearchOutcome:
     residual_structure : mapping of str to float
         Maps in which the residual is not random, with their distance in standard deviations.
     verdict : Verdict
+    form_alternatives : mapping of str to Alternatives
+        Free forms that could take the place of each of several effects.
     """
 
     base: CalibrationResult
@@ -82,6 +84,7 @@ class SearchOutcome:
     is_noise_floor_measured: bool
     residual_structure: Mapping[str, float]
     verdict: Verdict
+    form_alternatives: Mapping[str, Alternatives] = field(default_factory=dict)
 
 
 def search_with_ar_noise(
@@ -157,34 +160,56 @@ def assess_evidence(
     base, target = outcome.base, outcome.target
     hypothesis = remove_chance_effects(outcome.hypothesis, base, target, effects)
     hypothesis = validate_out_of_sample(hypothesis, base, target, fitted, rng)
-    if target.effective_samples is not None:
-        hypothesis = withdraw_effects(hypothesis, target, fitted, rng)
-    context, output = hypothesis.fit.simulation.context, hypothesis.fit.output[:fitted]
-    residual = target.y[:fitted] - output
-    explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
-    structure = find_residual_structure(residual, output, context, rng)
-    mean_square = float(np.mean(residual[target.estimation_part[:fitted]] ** 2))
-    measured_floor = noise_variance_from_periods(context.u[:fitted], target.y[:fitted], context.segments)
-    floor = max(mean_square - explainable, 0.0) if measured_floor is None else measured_floor
-    has_remainder = bool(structure) or explainable > MIN_FRACTION * mean_square
+    rest = _analyse_residual(hypothesis, target, fitted, rng)
+    if rest.is_structured or target.effective_samples is not None:
+        confirmed = withdraw_effects(hypothesis, target, fitted, rng)
+        if confirmed is not hypothesis:
+            hypothesis, rest = confirmed, _analyse_residual(confirmed, target, fitted, rng)
     # Under model error the noise floor is unknown: the fraction refers to the whole misfit.
     explained = explained_fraction(
         choose_reference_fit(hypothesis, base, target),
         hypothesis.fit,
-        floor if target.effective_samples is None else 0.0,
+        rest.noise_floor if target.effective_samples is None else 0.0,
     )
     verdict = classify(
-        explained, bool(hypothesis.effects), has_remainder, target.effective_samples is not None
+        explained, bool(hypothesis.effects), rest.is_structured, target.effective_samples is not None
     )
     if hypothesis.effects and hypothesis.effects[0].is_free and verdict != Verdict.UNKNOWN:
         verdict = Verdict.FAMILY
     return replace(
         outcome,
         hypothesis=hypothesis,
-        noise_floor=floor,
-        is_noise_floor_measured=measured_floor is not None,
-        residual_structure=structure,
+        noise_floor=rest.noise_floor,
+        is_noise_floor_measured=rest.is_noise_floor_measured,
+        residual_structure=rest.structure,
         verdict=verdict,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _ResidualAnalysis:
+    """Noise floor and structure of a residual; see `SearchOutcome`."""
+
+    noise_floor: float
+    is_noise_floor_measured: bool
+    structure: Mapping[str, float]
+    is_structured: bool
+
+
+def _analyse_residual(
+    hypothesis: Hypothesis, target: Target, fitted: int, rng: np.random.Generator
+) -> _ResidualAnalysis:
+    context, output = hypothesis.fit.simulation.context, hypothesis.fit.output[:fitted]
+    residual = target.y[:fitted] - output
+    explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
+    structure = find_residual_structure(residual, output, context, rng)
+    mean_square = float(np.mean(residual[target.estimation_part[:fitted]] ** 2))
+    measured_floor = noise_variance_from_periods(context.u[:fitted], target.y[:fitted], context.segments)
+    return _ResidualAnalysis(
+        max(mean_square - explainable, 0.0) if measured_floor is None else measured_floor,
+        measured_floor is not None,
+        structure,
+        bool(structure) or explainable > MIN_FRACTION * mean_square,
     )
 
 

@@ -99,8 +99,8 @@ def withdraw_effects(
 ) -> Hypothesis:
     """Remove further effects, the least important first, that do not reduce the error of the hold-out part.
 
-    An effect is kept if the hold-out part cannot show it, as a state that does not reach its limit there, and
-    if it is a gain or a parameter, which calibration replaces.
+    It is for simulations that are still wrong. An effect is kept if the hold-out part cannot show it, as a
+    state that does not reach its limit there, and if it is a gain or a parameter, which calibration replaces.
 
     Parameters
     ----------

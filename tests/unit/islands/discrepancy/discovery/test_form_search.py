@@ -78,4 +78,4 @@ def test_curve_of_another_kind_lowers_the_confidence_of_a_name() -> None:
     found = run_trial(Trial(("tanh-spring",), 7_715_008, "white", (1.0, 4.0), core="second-order"))
     assert found.named == ("second-hysteresis",)
     assert found.confidence < 0.5
-    assert found.equivalents == (("stiffness-curve",),)
+    assert "stiffness-curve" in found.equivalents[0]
