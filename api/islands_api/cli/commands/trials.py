@@ -123,7 +123,7 @@ def trials(
 def _report_case(core: str, simulated: SimulatedCase, outcomes: Sequence[TrialOutcome]) -> dict[str, Any]:
     """Print the scores of one simulation and return them as a document."""
     rows = score(outcomes, simulated.nameless, simulated.goals)
-    bins = reliability([each for each in outcomes if not set(each.trial.effects) & set(simulated.nameless)])
+    bins = reliability(outcomes)
     output.print(_make_table(core, rows))
     for each in bins:
         output.print(_format_bin(each), markup=False)

@@ -20,6 +20,9 @@ from islands.systems.ode.ode_system import OUTPUT, OdeParameter, OdeSystem
 #: Functions of one signal ``a``.
 UNARY = ("a", "a**2", "a**3", "a**5", "abs(a)", "abs(a)*a", "sign(a)", "max(a, 0)", "sqrt(abs(a))*sign(a)")
 
+#: Functions of the rate ``a`` of the input.
+RATE_FORMS = ("a", "abs(a)", "sign(a)", "abs(a)*a", "a**3")
+
 #: Factors of products of two signals.
 FACTORS = ("a", "a**2", "abs(a)", "sign(a)")
 
@@ -128,7 +131,7 @@ def list_candidate_terms(
 def _list_texts(signals: list[str], rate: str) -> Iterator[str]:
     for signal in signals:
         yield from (_insert(form, signal) for form in UNARY)
-    yield from (_insert(form, rate) for form in ("a", "abs(a)", "sign(a)"))
+    yield from (_insert(form, rate) for form in RATE_FORMS)
     yield TIME
     for signal in signals:
         yield f"{TIME}*{signal}"

@@ -66,7 +66,8 @@ class MissingTerms:
         law = SMOOTHED_LAWS.get(" ".join(self.discovery.nearest))
         if law is not None and all(re.fullmatch(law, each.term.text) for each in self.search.terms):
             return None
-        return Rival(MISSING_TERM, self.search.fit, min(self.discovery.worse_by, 0.0))
+        lead = min(self.discovery.worse_by, 0.0)
+        return Rival(MISSING_TERM, self.search.fit, lead, len(self.search.terms))
 
 
 def find_missing_terms(

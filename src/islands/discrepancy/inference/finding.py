@@ -89,11 +89,14 @@ class Rival:
     fit : CalibrationResult
     lead : float
         By how much its score exceeds that of the effects.
+    size : int
+        Number of its causes.
     """
 
     name: str
     fit: CalibrationResult
     lead: float
+    size: int
 
 
 def describe_effects(
@@ -113,7 +116,7 @@ def describe_effects(
     effects : sequence of Effect
         Effects that were searched for.
     rival : Rival, optional
-        Further alternative of a single effect.
+        Further alternative of a single effect, or of each of more effects than its size.
     """
     findings, equivalents = [], []
     base, hypothesis, target = outcome.base, outcome.hypothesis, outcome.target
@@ -148,7 +151,7 @@ def describe_effects(
         scored[effect.cause] = ScoredAlternative(
             score, sum_squares_by_block(hypothesis.fit, hypothesis.fit, target)
         )
-        if rival is not None and len(hypothesis.effects) == 1:
+        if rival is not None and (len(hypothesis.effects) == 1 or rival.size < len(hypothesis.effects)):
             scored[rival.name] = ScoredAlternative(
                 score + rival.lead, sum_squares_by_block(rival.fit, hypothesis.fit, target)
             )

@@ -22,6 +22,9 @@ STRONG_MISFIT = 1.0
 #: Number of bins of the confidence, of equal width.
 BINS = 10
 
+#: Confidence above which a name is taken for certain.
+SURE = 0.9
+
 #: Probability outside the confidence interval, half of it on either side.
 _OUTSIDE = 0.05
 
@@ -151,7 +154,7 @@ def score(
     detected = [each for each in single if each.noticed]
     named = [each for each in detected if each.named]
     gains = [each.gain_share for each in detected if each.gain_share is not None]
-    bins = reliability(known)
+    bins = reliability(outcomes)
 
     def proportion(
         name: str,
@@ -203,16 +206,25 @@ def score(
             goals.misnamed,
             True,
         ),
+        proportion(
+            f"unknown causes misnamed with a confidence above {SURE:g}",
+            open_set,
+            lambda each: each.verdict == "named" and bool(each.named) and each.confidence > SURE,
+            goals.misnamed,
+            True,
+        ),
     ]
 
 
 def reliability(outcomes: Sequence[TrialOutcome]) -> list[ReliabilityBin]:
     """Compare confidences with the frequency of correct first names, in non-empty bins of equal width.
 
-    A name on a clean record is wrong.
+    A name on a clean record is wrong, and so is one of a cause that is not in the catalogue. Discovered terms
+    and families are no names.
     """
-    said = np.array([each.confidence for each in outcomes if each.named])
-    right = np.array([each.first_right for each in outcomes if each.named])
+    claims = [each for each in outcomes if each.named and each.verdict.startswith("named")]
+    said = np.array([each.confidence for each in claims])
+    right = np.array([each.first_right for each in claims])
     place = np.minimum((BINS * said).astype(int), BINS - 1)
     return [
         ReliabilityBin(

@@ -66,6 +66,7 @@ def test_every_outcome_is_counted_in_its_scores() -> None:
         "pairs exact": (1, 2),
         "triples exact": (0, 0),
         "unknown causes silently misnamed": (2, 3),
+        "unknown causes misnamed with a confidence above 0.9": (0, 3),
     }
 
 
@@ -116,14 +117,17 @@ def test_confidences_are_compared_with_frequencies() -> None:
         outcome(("delay",), ("delay",), confidence=0.55),
         outcome(("delay",), ("jump",), confidence=0.55),
         outcome(("delay",), (), verdict="unknown"),
-        outcome(("ripple",), ("jump",), confidence=1.0),
+        outcome(("ripple",), ("missing-term",), verdict="discovered", confidence=1.0),
+        outcome(("ripple",), ("jump",), confidence=0.95),
     ]
     bins = reliability(outcomes[:-1])
     assert [(each.low, each.count, each.right) for each in bins] == [(0.5, 2, 0.5), (0.9, 4, 0.75)]
     assert [each.said for each in bins] == pytest.approx([0.55, 0.95])
     assert calibration_error(bins) == pytest.approx((2 * 0.05 + 4 * 0.2) / 6)
     row = measured(*outcomes)["calibration error of the confidence"]
-    assert (row.value, row.of) == (pytest.approx(0.15), 6)
+    assert (row.value, row.of) == (pytest.approx((2 * 0.05 + 5 * 0.35) / 7), 7)
+    misnamed = counted(*outcomes)["unknown causes misnamed with a confidence above 0.9"]
+    assert misnamed == (1, 2)
     assert row.kept is False
 
 
