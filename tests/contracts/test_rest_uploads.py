@@ -116,7 +116,7 @@ def test_uploads_in_progress_are_limited_per_owner_and_in_total(service):
 def test_a_body_that_stalls_or_is_too_slow_is_a_problem_and_frees_everything(impatient, trickle):
     with started(impatient, impatient.key()) as connection:
         start = time.monotonic()
-        while trickle and time.monotonic() - start < 5.0:
+        while trickle and time.monotonic() - start < 20.0:
             try:
                 connection.sendall(trickle)
             except OSError:
@@ -131,7 +131,7 @@ def test_a_body_that_stalls_or_is_too_slow_is_a_problem_and_frees_everything(imp
             finally:
                 connection.settimeout(10.0)
         status, kind, _, headers = answer(connection)
-        assert time.monotonic() - start < 3.0
+        assert time.monotonic() - start < 15.0
         assert (status, kind, headers["connection"]) == (408, "request-timeout", "close")
         assert connection.recv(1) == b""
     assert not receiving(impatient)
@@ -167,7 +167,7 @@ def test_a_body_of_undeclared_length_ends_at_the_quota(service):
     with started(service, service.key(), None) as connection:
         chunk = b"0" * 65536
         connection.sendall(b"%x\r\n%s\r\n" % (len(START), START))
-        connection.settimeout(2.0)
+        connection.settimeout(20.0)
         while sent < 8_000_000:
             connection.sendall(b"%x\r\n%s\r\n" % (len(chunk), chunk))
             sent += len(chunk)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -56,7 +57,7 @@ LIVE = heartbeat
 """
 
 #: Constants that reduce a test to tenths of a second.
-FAST = {"_POLL_SECONDS": 0.01, "_FIRST_BACKOFF": 0.05, "_STABLE_AFTER": 5.0, "_API_HEAD_START": 5.0}
+FAST = {"_POLL_SECONDS": 0.01, "_FIRST_BACKOFF": 0.05, "_STABLE_AFTER": 5.0, "_API_HEAD_START": 60.0}
 
 
 class Supervised:
@@ -134,7 +135,7 @@ def test_role_without_heartbeats_is_killed_and_restarted(supervised: Start) -> N
     (first, _, _, pid), (second, *_) = running.started(2)[:2]
     assert second - first > 0.3
     assert not alive([pid])
-    assert "api has sent no heartbeat for 0." in running.end()
+    assert re.search(r"api has sent no heartbeat for \d+\.\d s", running.end())
 
 
 def test_other_roles_wait_for_the_first_heartbeat_of_the_api(supervised: Start) -> None:

@@ -1,6 +1,7 @@
 """Connections: requests that are not HTTP, or never complete, and idle ones."""
 
 import json
+import select
 import socket
 import time
 from collections.abc import Iterator
@@ -26,23 +27,40 @@ def short_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(http_protocol, "HEADER_TIMEOUT", 0.5)
 
 
-def exchange(service: Service, *sent: bytes, pause: float = 0.0) -> tuple[int, dict[str, str], bytes, float]:
-    """Send bytes; return status, headers and body of everything received until the end, and the seconds."""
-    began = time.monotonic()
-    with socket.create_connection(("127.0.0.1", service.port), timeout=10.0) as connection:
-        for part in sent:
-            connection.sendall(part)
-            time.sleep(pause)
+def exchange(service: Service, sent: bytes = b"") -> tuple[int, dict[str, str], bytes]:
+    """Send bytes; return status, headers and body of everything received until the end."""
+    with socket.create_connection(("127.0.0.1", service.port), timeout=20.0) as connection:
+        connection.sendall(sent)
         received = b""
         while more := connection.recv(65_536):
             received += more
-    seconds = time.monotonic() - began
+    return read_answers(received)
+
+
+def exchange_slowly(service: Service, before: bytes) -> tuple[int, dict[str, str], bytes]:
+    """Send a request, then a byte every 0.05 s until the service closes the connection, for 20 s at most."""
+    with socket.create_connection(("127.0.0.1", service.port), timeout=20.0) as connection:
+        connection.sendall(before)
+        line = iter(b"GET /" + 400 * b"a")
+        received, until = b"", time.monotonic() + 20.0
+        while time.monotonic() < until:
+            if select.select([connection], [], [], 0.05)[0]:
+                if not (more := connection.recv(65_536)):
+                    break
+                received += more
+            elif PROBLEM.encode() not in received:
+                connection.sendall(bytes([next(line)]))
+    return read_answers(received)
+
+
+def read_answers(received: bytes) -> tuple[int, dict[str, str], bytes]:
+    """Return status, headers and body of the last one of some answers."""
     if not received:
-        return 0, {}, b"", seconds
+        return 0, {}, b""
     head, _, body = received.rpartition(b"\r\n\r\n")
     status, *lines = head.rpartition(b"HTTP/1.1 ")[2].decode().split("\r\n")
     headers = {name.lower(): value for name, _, value in (line.partition(": ") for line in lines)}
-    return int(status.split()[0]), headers, body, seconds
+    return int(status.split()[0]), headers, body
 
 
 @pytest.mark.parametrize(
@@ -62,7 +80,7 @@ def exchange(service: Service, *sent: bytes, pause: float = 0.0) -> tuple[int, d
 def test_a_request_that_is_not_http_is_a_problem(
     service: Service, sent: bytes, status: int, kind: str
 ) -> None:
-    found, headers, body, _ = exchange(service, sent)
+    found, headers, body = exchange(service, sent)
     document = json.loads(body)
     assert found == document["status"] == status
     assert document["type"] == f"/problems/{kind}"
@@ -75,29 +93,27 @@ def test_a_request_that_is_not_http_is_a_problem(
 
 
 def test_a_request_before_one_that_is_not_http_is_answered(service: Service) -> None:
-    status, headers, body, _ = exchange(
-        service, b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n?!\r\n\r\n"
-    )
+    status, headers, body = exchange(service, b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n?!\r\n\r\n")
     assert (status, json.loads(body)["status"]) == (200, "alive")
     assert headers["connection"] == "close"
 
 
 @pytest.mark.usefixtures("short_deadline")
 def test_a_connection_without_a_request_is_closed(service: Service) -> None:
-    status, _, body, seconds = exchange(service)
+    began = time.monotonic()
+    status, _, body = exchange(service)
     assert (status, body) == (0, b"")
-    assert 0.4 < seconds < 2.0
+    assert time.monotonic() - began > 0.4
 
 
 @pytest.mark.usefixtures("short_deadline")
 @pytest.mark.parametrize("before", [b"", b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"])
 def test_headers_that_arrive_byte_by_byte_time_out(service: Service, before: bytes) -> None:
     """Each byte must not extend the deadline, also not that of a later request of the connection."""
-    status, headers, body, seconds = exchange(service, before, b"G", b"E", b"T", pause=0.1)
+    status, headers, body = exchange_slowly(service, before)
     assert status == 408
     assert json.loads(body)["type"] == "/problems/request-timeout"
     assert headers["connection"] == "close"
-    assert seconds < 0.7  # the last byte was sent after 0.3 s
 
 
 @pytest.mark.usefixtures("short_deadline")
