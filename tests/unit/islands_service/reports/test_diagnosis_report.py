@@ -1,11 +1,51 @@
 """Sentences of the diagnosis report."""
 
-import pytest
+from dataclasses import replace
 
+import numpy as np
+import pytest
+import scipy
+
+import islands
 from islands.discrepancy.detectability import SelfTest, estimate_rate
-from islands_service.reports.diagnosis_report import summarise_self_test
+from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.discrepancy.discovery.discovery import Discovery
+from islands.discrepancy.inference.verdict import Verdict
+from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
+
+EQUATIONS = Discovery("dx/dt = -x + a1*x**3; a1 = 0.2", ("cubic-stiffness",), 2.0)
+
+
+@pytest.fixture(scope="module")
+def diagnosis() -> Diagnosis:
+    """A delay of three samples that a linear simulation lacks."""
+    rng = np.random.default_rng(0)
+    u = scipy.signal.lfilter([0.1], [1.0, -0.9], rng.standard_normal(600))
+    y = scipy.signal.lfilter([0.3], [1.0, -0.7], np.roll(u, 3)) + 0.02 * rng.standard_normal(600)
+    return islands.diagnose(islands.Dataset(u[:, None], y, 0.01), "linear:1")
 
 
 @pytest.mark.parametrize(("better", "said"), [(0, "of at most 0.024."), (1, "of 0.049."), (40, "of 1.")])
 def test_p_value_is_bounded_by_the_number_of_records(better: int, said: str) -> None:
     assert said in summarise_self_test(SelfTest({}, estimate_rate(0, 40), (1 + better) / 41, {}))
+
+
+@pytest.mark.ci
+def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis: Diagnosis) -> None:
+    as_cause = replace(diagnosis, verdict=Verdict.DISCOVERED, discovery=EQUATIONS)
+    as_equivalent = replace(diagnosis, verdict=Verdict.NAMED, discovery=EQUATIONS)
+    given = as_cause, as_equivalent, replace(diagnosis, discovery=None)
+    for texts in (
+        [summarise(each) for each in given],
+        [diagnosis_report("record", each).decode() for each in given],
+    ):
+        assert ["a1*x**3" in text for text in texts] == [True, True, False]
+        assert ["explain the record as well" in text for text in texts] == [False, True, False]
+        assert ["nearest known effect" in text for text in texts] == [True, False, False]
+
+
+@pytest.mark.ci
+def test_report_says_which_effects_are_not_claimed_as_causes(diagnosis: Diagnosis) -> None:
+    effects = (diagnosis.effects[0], replace(diagnosis.effects[0], name="jump", is_claimed=False))
+    lines = summarise(replace(diagnosis, effects=effects)).splitlines()
+    assert ["not claimed as a cause" in line for line in lines if line.startswith("  ")] == [False, True]
