@@ -11,7 +11,7 @@ from islands.discrepancy.inference.finding import Finding
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.surrogates import STRENGTHS
 from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
-from islands.figures.diagnosis.form_values import draw_free_forms, list_free_forms
+from islands.figures.diagnosis.form_values import draw_effect_shape, draw_free_forms, list_free_forms
 from islands.figures.style import save
 from islands_service.reports.identification_report import TEMPLATES
 
@@ -169,6 +169,9 @@ def diagnosis_report(
     ]
     if list_free_forms(found):
         figures.insert(1, ("Shape of the missing effect", _inline(draw_free_forms(found))))
+    if found.shape is not None:
+        caption = "Shape of the effect, and of a free curve in its place"
+        figures.insert(1, (caption, _inline(draw_effect_shape(found.shape))))
     text = TEMPLATES.get_template("diagnosis.html").render(
         name=name,
         found=found,

@@ -10,6 +10,7 @@ from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, evaluate_fit
 from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
 from islands.discrepancy.discovery.discovery import MISSING_TERM, MissingTerms, describe_terms
+from islands.discrepancy.discovery.effect_shape import compare_shapes
 from islands.discrepancy.findings import describe_gross_errors, describe_noise, list_record_findings
 from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.inference.experiment_design import suggest_experiment
@@ -90,6 +91,7 @@ def extend_equations(
         best=fit,
         noise_floor=floor,
         discovery=terms.discovery,
+        shape=None,
     )
 
 
@@ -162,6 +164,7 @@ def make_diagnosis(
         outcome.is_noise_floor_measured,
         compute_rmse((record.y - nominal)[holdout]),
         discovery=terms.discovery if terms is not None and _is_equivalent(findings) else None,
+        shape=compare_shapes(replace(outcome, hypothesis=hypothesis)) if findings else None,
     )
 
 

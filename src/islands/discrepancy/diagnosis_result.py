@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.discovery.discovery import Discovery
+from islands.discrepancy.discovery.effect_shape import EffectShape
 from islands.discrepancy.gross_errors.record_finding import RecordFinding
 from islands.discrepancy.inference.finding import Finding
 from islands.discrepancy.inference.holdout import HoldoutGain
@@ -66,6 +67,8 @@ class Diagnosis:
     discovery : Discovery or None
         Equations with missing terms. They are the cause if the verdict is "discovered", and equivalent to the
         named cause otherwise. None if there are none.
+    shape : EffectShape or None
+        Curve of a single named effect next to the free curve in its place; None if it has none.
     """
 
     verdict: Verdict
@@ -83,6 +86,7 @@ class Diagnosis:
     nominal_rmse: float
     record_findings: tuple[RecordFinding, ...] = ()
     discovery: Discovery | None = None
+    shape: EffectShape | None = None
 
     @property
     def held_out_part(self) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 from islands.discrepancy.detectability import SelfTest
 from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
+from islands.discrepancy.discovery.effect_shape import EffectShape
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.finding import Finding
 from islands.io.result_folder import record_document
@@ -37,6 +38,7 @@ def diagnosis_document(
         "verdict": str(diagnosis.verdict),
         "discovered": None if diagnosis.discovery is None else asdict(diagnosis.discovery),
         "effects": [_describe_finding(finding) for finding in diagnosis.effects],
+        "shape": None if diagnosis.shape is None else _describe_shape(diagnosis.shape),
         "gain": None if diagnosis.gain is None else asdict(diagnosis.gain),
         "decisive_experiment": diagnosis.suggested_experiment or None,
         "candidates": [_describe_candidate(each) for each in diagnosis.candidates],
@@ -105,6 +107,12 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
         "score": finding.score,
         "eta": finding.explained_fraction,
         "claimed": finding.is_claimed,
+    }
+
+
+def _describe_shape(shape: EffectShape) -> dict[str, Any]:
+    return {
+        name: value if isinstance(value, str) else value.tolist() for name, value in asdict(shape).items()
     }
 
 

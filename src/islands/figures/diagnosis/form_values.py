@@ -1,11 +1,12 @@
-"""Figure of free forms: the coefficients that describe the shape of an effect without a name."""
+"""Figures of free forms: the shape of an effect without a name, and next to that of a named one."""
 
 from matplotlib.figure import Figure
 
 from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.discrepancy.discovery.effect_shape import EffectShape
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.finding import Finding
-from islands.figures.style import FRAME, SIMULATED, blank, finish, house_style, label
+from islands.figures.style import FRAME, MEASURED, SIMULATED, blank, finish, house_style, label
 
 
 def list_free_forms(diagnosis: Diagnosis) -> list[Finding]:
@@ -31,4 +32,28 @@ def draw_free_forms(diagnosis: Diagnosis) -> Figure:
         axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
         axes.set_xticks(range(len(values)), list(form.parameters))
         axes.set_ylabel(label(form.name, values[0].unit))
+    return finish(figure)
+
+
+@house_style()
+def draw_effect_shape(shape: EffectShape) -> Figure:
+    """Draw the curve of an effect, and the values of the free curve with their 95 % intervals."""
+    figure = blank(2.8, f"Shape of {shape.name}, without gain and offset")
+    axes = figure.subplots()
+    axes.plot(shape.places, shape.named, color=SIMULATED, label=shape.name)
+    axes.errorbar(
+        shape.free_places,
+        shape.free,
+        shape.half_widths,
+        color=MEASURED,
+        ls="none",
+        marker="o",
+        ms=4,
+        capsize=3,
+        label=f"{shape.form}, 95 % intervals",
+    )
+    axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
+    axes.set_xlabel(label(shape.signal, shape.signal_unit))
+    axes.set_ylabel(label("added", shape.unit))
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return finish(figure)
