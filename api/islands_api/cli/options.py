@@ -128,7 +128,8 @@ def written_simulation(text: str) -> OdeSpec | FmuSpec | None:
     """Read equations, ``ode:FILE.toml``, or an FMU with all names filled in; None for anything else."""
     found = parse_spec(text) if text.startswith(("ode:", "fmu:")) else None
     if isinstance(found, FmuSpec):
-        return FmuSpec.from_model(found.make_model())
+        model = found.make_model()
+        return FmuSpec.from_system(model, found.make_system(model))
     return found if isinstance(found, OdeSpec) else None
 
 

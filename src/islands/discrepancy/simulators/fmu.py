@@ -1,25 +1,29 @@
 """Simulator of a Functional Mock-up Unit, the exchange format of simulation tools."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import isinf
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from islands.data.channel_names import is_unit, normalise_unit
 from islands.data.dataset import Dataset
-from islands.discrepancy.effects.time_variation import GAIN_EFFECTS, gain_over_time
-from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
-from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.force import add_output_forces
-from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import input_coordinate, peak_amplitude
-from islands.discrepancy.simulators.record_channels import find_channel, make_nominal_context, sample_channel
+from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.effect import Site
+from islands.discrepancy.interfaces.simulator import SimulationRun
+from islands.discrepancy.simulators.coordinates import peak_amplitude
+from islands.discrepancy.simulators.ode import OdeSimulator
+from islands.discrepancy.simulators.record_channels import find_channel, make_nominal_context
 from islands.errors import RecordError
 from islands.systems.fmu.fmi_description import FmiInterface
 from islands.systems.fmu.fmu_instance import FmuRun, load_fmu
-from islands.systems.fmu.fmu_model import FmuInitialValue, FmuModel, FmuParameter
-from islands.systems.ode.lane_simulation import SampledSignal, interpolate_linearly
+from islands.systems.fmu.fmu_model import FmuInitialValue, FmuModel
+from islands.systems.fmu.fmu_simulation import simulate_fmu
+from islands.systems.ode.lane_simulation import LaneInput
+from islands.systems.ode.ode_expression import FMU, OdeExpression, Operation, Symbol
+from islands.systems.ode.ode_program import OdeProgram, generate_program
+from islands.systems.ode.ode_system import OdeSystem
 
 #: Numbers of steps of the integrator per sample that are tried until a nominal simulation does not diverge.
 STEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
@@ -29,132 +33,64 @@ _STEP_ERROR = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FmuSimulator:
-    """Simulation by an FMU; forces are added to the output.
+class FmuSimulator(OdeSimulator):
+    """Simulation by an FMU with equations around it, by RK4 if the FMU gives derivatives.
 
     The FMU is loaded by the process that simulates, so that the simulator can be sent to other processes.
 
     Attributes
     ----------
     model : FmuModel
+    system : OdeSystem
+        Equations around the FMU, see `make_fmu_system`.
     initial : mapping
-        Nominal values at the first sample by name.
-    sizes : mapping
-        Largest absolute values of these variables in a nominal simulation.
-    channels : mapping
-        Channels of the record by the names of the inputs.
+        Nominal states by their names in the equations, and nominal start values by the names of the
+        variables, at the first sample.
     """
 
-    model: FmuModel
-    initial: Mapping[str, float]
-    sizes: Mapping[str, float]
-    channels: Mapping[str, str]
-    parameters: tuple[Parameter, ...] = field(init=False)
-    sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.PARAMETER, Site.OUTPUT))
-    supported_effects: frozenset[str] = GAIN_EFFECTS
-    built_in_effects: frozenset[str] = frozenset()
-    state_effects: tuple[Effect, ...] = ()
-
-    def __post_init__(self) -> None:
-        declared = (
-            *(_make_parameter(each) for each in self.model.parameters if not each.fixed),
-            *(self._make_initial(each) for each in self.model.initial),
-        )
-        object.__setattr__(self, "parameters", declared)
+    model: FmuModel = field(kw_only=True)
 
     @property
-    def name(self) -> str:
-        """Name of the file."""
-        return self.model.description.name
+    def sites(self) -> frozenset[Site]:
+        """All sites."""
+        return frozenset(Site)
 
-    @property
-    def is_continuous_time(self) -> bool:
-        """Whether steps can be shorter than the sampling time, so that the input between samples matters."""
-        description = self.model.description
-        return description.interface == FmiInterface.MODEL_EXCHANGE or (
-            description.has_variable_step and description.fixed_step is None
-        )
+    def _list_initial_states(self) -> tuple[Parameter, ...]:
+        found = []
+        for (name, nominal), each in zip(self.initial.items(), self.model.initial, strict=True):
+            lower, upper = min(each.variable.lower, nominal), max(each.variable.upper, nominal)
+            found.append(self._make_initial(name, each.variable.unit, lower, upper))
+        return tuple(found)
 
-    @property
-    def tolerances(self) -> Mapping[str, float]:
-        """Tolerances of the parameters that have one."""
-        return {
-            each.variable.name: each.tolerance
-            for each in self.model.parameters
-            if each.tolerance is not None and not each.fixed
-        }
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what the simulator is made of, since the functions of its effects cannot be pickled."""
+        arguments = self.system, self.initial, self.sizes, self.channels
+        make = partial(FmuSimulator, is_continuous_time=self.is_continuous_time, model=self.model)
+        return make, arguments
 
-    def _make_initial(self, given: FmuInitialValue) -> Parameter:
-        name, unit = given.variable.name, given.variable.unit
-        nominal = self.initial[name]
-        lower, upper = min(given.variable.lower, nominal), max(given.variable.upper, nominal)
-        return Parameter(
-            f"initial {name}", unit, nominal, 0.02 * self.sizes[name], lower, upper, initial=True
-        )
+    def run_nominal(self, context: SimulationContext, outputs: tuple[OdeExpression, ...]) -> FmuRun:
+        """Simulate expressions of the system at its nominal values; the result says why if it fails."""
+        program = generate_program(self.system, outputs)
+        run = SimulationRun(np.array([each.nominal for each in self.parameters]), context.u, {}, ())
+        (lane,) = self._make_lanes(program, (), [run], context)
+        dt = context.dt / max(self.system.steps, 1)
+        fmu = load_fmu(self.model.description)
+        return simulate_fmu(fmu, self.model, program, context.start_time, dt, lane)
 
-    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """Return the input as the coordinate."""
-        return input_coordinate(context, output)
-
-    def simulate(
-        self,
-        values: Signal,
-        x: Signal,
-        context: SimulationContext,
-        effect_parameters: Mapping[str, float],
-        forces: Forces,
+    def _simulate_lanes(
+        self, program: OdeProgram, start_time: float, dt: float, lanes: Sequence[LaneInput], _interval: int
     ) -> Signal:
-        """Simulate the output; NaN after a failure of the FMU. See `Simulator.simulate`."""
-        gain = gain_over_time(effect_parameters, context)
-        between = context.get_intersample_values(x) if self.is_continuous_time else np.stack([x, x])
-        driving = SampledSignal(x * gain, between[0] * gain, between[1] * gain)
-        y: Signal = self.run(values, driving, context).y[0]
-        return y + add_output_forces(x, context, forces)
-
-    def run(self, values: Signal, driving: SampledSignal, context: SimulationContext) -> FmuRun:
-        """Simulate the output and the variables of ``initial``.
-
-        Parameters
-        ----------
-        values : ndarray, shape (parameters,)
-        driving : SampledSignal
-            Input.
-        """
-        model, description = self.model, self.model.description
-        given = {each.name: float(value) for each, value in zip(self.parameters, values, strict=True)}
-        start_values = {
-            each.variable.reference: given.get(each.variable.name, each.value) for each in model.parameters
-        }
-        states: dict[int, float] = {}
-        for each in model.initial:
-            values_at_start, key = (
-                (start_values, each.variable.reference) if each.place < 0 else (states, each.place)
-            )
-            values_at_start[key] = given[f"initial {each.variable.name}"]
-        steps = max(model.steps, 1)
-        signals = {model.input.reference: driving, **self._sample_channels(driving.start.size, context)}
-        return load_fmu(description.path, description.digest, description.interface).simulate(
-            start_values,
-            states,
-            {reference: signal.refine(steps) for reference, signal in signals.items()},
-            [model.output.reference, *(each.variable.reference for each in model.initial)],
-            context.start_time,
-            context.dt / steps,
-            steps,
-        )
-
-    def _sample_channels(self, samples: int, context: SimulationContext) -> dict[int, SampledSignal]:
-        """Return the channels, which are linear between their samples, by value reference."""
-        found = {}
-        for variable in self.model.channels:
-            values = sample_channel(context, self.channels[variable.name], samples)
-            held = SampledSignal(values, values, values)
-            found[variable.reference] = interpolate_linearly(values) if self.is_continuous_time else held
-        return found
+        fmu = load_fmu(self.model.description)
+        return np.stack([simulate_fmu(fmu, self.model, program, start_time, dt, lane).y for lane in lanes])
 
 
-def make_fmu_simulator(model: FmuModel, record: Dataset) -> FmuSimulator:
+def make_fmu_simulator(model: FmuModel, system: OdeSystem, record: Dataset) -> FmuSimulator:
     """Make a simulator of an FMU for a record, which determines nominal values at the first sample.
+
+    Parameters
+    ----------
+    system : OdeSystem
+        Equations around the FMU.
 
     Raises
     ------
@@ -164,48 +100,66 @@ def make_fmu_simulator(model: FmuModel, record: Dataset) -> FmuSimulator:
     ModelError
         The FMU cannot be loaded.
     """
+    description, symbols = model.description, model.symbols
     _check_units(model, record)
     _check_sampling_time(model, record.dt)
-    name = model.description.name
-    channels = {each.name: find_channel(each.name, record, f"{name} reads") for each in model.channels}
+    channels = {
+        symbols[each.name]: find_channel(each.name, record, f"{description.name} reads")
+        for each in model.channels
+    }
     first = {"input": float(record.u[0, 0]), "output": float(np.nan_to_num(record.y[0]))}
-    initial = {each.variable.name: _find_initial(each, first) for each in model.initial}
-    rough = FmuSimulator(model, initial, dict.fromkeys(initial, 1.0), channels)
+    initial = {
+        symbols[each.variable.name] if each.place >= 0 else each.variable.name: _find_initial(each, first)
+        for each in model.initial
+    }
+    is_integrated = description.interface == FmiInterface.MODEL_EXCHANGE
+    # Steps can be shorter than the sampling time.
+    is_continuous_time = is_integrated or (description.has_variable_step and description.fixed_step is None)
+    states = [name for name, _ in system.derivatives]
+    ones = dict.fromkeys([*initial, *(f"d{name}/dt" for name in states)], 1.0)
+    rough = FmuSimulator(system, initial, ones, channels, is_continuous_time=is_continuous_time, model=model)
     context = make_nominal_context(record)
-    driving = SampledSignal(context.u, *context.get_intersample_values(context.u))
-    if not rough.is_continuous_time:
-        driving = SampledSignal(context.u, context.u, context.u)
-    nominal = np.array([each.nominal for each in rough.parameters])
-    is_integrated = model.description.interface == FmiInterface.MODEL_EXCHANGE
-    for steps in STEPS if is_integrated and not model.steps else (model.steps,):
-        rough = replace(rough, model=replace(model, steps=steps))
-        found = rough.run(nominal, driving, context)
+    values = [each.variable.name for each in model.initial if each.place < 0]
+    expressions: list[OdeExpression] = [system.output, *map(Symbol, states)]
+    expressions += [right for _, right in system.derivatives]
+    expressions += [Operation(FMU, (Symbol(name),)) for name in (*system.of_fmu, *values)]
+    for steps in STEPS if is_integrated and not system.steps else (system.steps,):
+        rough = replace(rough, system=replace(system, steps=steps))
+        found = rough.run_nominal(context, tuple(expressions))
         if np.isfinite(found.y).all():
             break
     else:
         why = f" ({found.failure})" if found.failure else ""
         raise RecordError(
-            f"the simulation {name} fails or diverges on this input{why}: check its parameters and units, "
-            f"and the sampling time {record.dt:g} s"
+            f"the simulation {description.name} fails or diverges on this input{why}: check its parameters "
+            f"and units, and the sampling time {record.dt:g} s"
         )
-    peaks = {"input": peak_amplitude(context.u), "output": peak_amplitude(found.y[0])}
-    sizes = {
-        each.variable.name: peaks[each.sample_of] if each.sample_of else peak_amplitude(simulated)
-        for each, simulated in zip(model.initial, found.y[1:], strict=True)
+    output, *signals = found.y
+    named = [*states, *(f"d{name}/dt" for name in states)]
+    named += [f"{FMU}({name})" for name in system.of_fmu] + values
+    simulated = dict(zip(named, signals, strict=True))
+    peaks = {"input": peak_amplitude(context.u), "output": peak_amplitude(output)}
+    sizes = {name: peak_amplitude(signal) for name, signal in simulated.items()}
+    sizes |= {
+        name: peaks[each.sample_of]
+        for name, each in zip(initial, model.initial, strict=True)
+        if each.sample_of
     }
-    return replace(rough, sizes=sizes)
+    definitions = tuple(name for name in states if _is_definition(name, states, simulated))
+    return replace(rough, system=replace(rough.system, definitions=definitions), sizes=sizes)
+
+
+def _is_definition(name: str, states: Sequence[str], simulated: Mapping[str, Signal]) -> bool:
+    """Return whether the derivative of a state that the FMU computes is another state."""
+    derivative = simulated[f"{FMU}({name})"]
+    others = (simulated[other] for other in states if other != name)
+    return bool(derivative.any()) and any(np.array_equal(derivative, other) for other in others)
 
 
 def _find_initial(given: FmuInitialValue, first: Mapping[str, float]) -> float:
     """Return a past sample of the record, or the start value of a variable."""
     value = first.get(given.sample_of, given.variable.start or 0.0)
     return min(max(value, given.variable.lower), given.variable.upper)
-
-
-def _make_parameter(given: FmuParameter) -> Parameter:
-    span = given.upper - given.lower
-    scale = 0.01 * (abs(given.value) or (1.0 if isinf(span) else span))
-    return Parameter(given.variable.name, given.variable.unit, given.value, scale, given.lower, given.upper)
 
 
 def _check_units(model: FmuModel, record: Dataset) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf
+from math import isinf
 
 import numpy as np
 
@@ -15,11 +15,11 @@ from islands.discrepancy.simulators.coordinates import input_coordinate, output_
 from islands.discrepancy.simulators.ode_effects import (
     add_force_laws,
     find_effects,
-    list_numbers,
-    list_states,
+    find_limits,
     list_terms,
+    list_values,
 )
-from islands.discrepancy.simulators.record_channels import sample_channel
+from islands.discrepancy.simulators.record_channels import sample_channels
 from islands.discrepancy.simulators.shooting import Shots
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.lane_simulation import (
@@ -32,7 +32,7 @@ from islands.systems.ode.lane_simulation import (
 from islands.systems.ode.ode_expression import OdeExpression, Symbol
 from islands.systems.ode.ode_program import OdeProgram, generate_program
 from islands.systems.ode.ode_system import OdeParameter, OdeSystem
-from islands.systems.ode.system_parts import OdeEffect, OdeState
+from islands.systems.ode.system_parts import OdeEffect
 
 #: Name of the factor of the parameter that is the gain; no name in equations has brackets.
 _GAIN = "gain(t)"
@@ -55,6 +55,8 @@ class OdeSimulator:
         Shooting intervals; None for a free run.
     parameters : tuple of Parameter
         Parameters that are not fixed, then the initial states that are not.
+    is_continuous_time : bool
+        Whether the input between samples matters; otherwise it is held.
     """
 
     system: OdeSystem
@@ -72,7 +74,7 @@ class OdeSimulator:
         system = self.system
         declared = (
             *(_make_parameter(each) for each in system.parameters if not each.fixed),
-            *(self._make_initial(each) for each in system.states if not (each.fixed or self.shots)),
+            *self._list_initial_states(),
         )
         supported, of_states = find_effects(system, self.sizes)
         object.__setattr__(self, "parameters", declared)
@@ -97,13 +99,19 @@ class OdeSimulator:
     @property
     def tolerances(self) -> Mapping[str, float]:
         """Tolerances of the parameters that have one."""
-        return {each.name: each.tolerance for each in self.system.parameters if each.tolerance is not None}
+        free = (each for each in self.system.parameters if not each.fixed)
+        return {each.name: each.tolerance for each in free if each.tolerance is not None}
 
-    def _make_initial(self, state: OdeState) -> Parameter:
-        nominal, size = self.initial[state.name], self.sizes[state.name]
-        return Parameter(
-            f"initial {state.name}", state.unit, nominal, 0.02 * size, state.lower, state.upper, initial=True
+    def _list_initial_states(self) -> tuple[Parameter, ...]:
+        return tuple(
+            self._make_initial(each.name, each.unit, each.lower, each.upper)
+            for each in self.system.states
+            if not (each.fixed or self.shots)
         )
+
+    def _make_initial(self, name: str, unit: str, lower: float, upper: float) -> Parameter:
+        scale = 0.02 * self.sizes[name]
+        return Parameter(f"initial {name}", unit, self.initial[name], scale, lower, upper, initial=True)
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """Return the coordinate of the table ``[force]``; the input if there is none, or if it says so."""
@@ -129,10 +137,8 @@ class OdeSimulator:
         forces: Forces,
     ) -> Signal:
         """Simulate the output; see `Simulator.simulate`."""
-        output: Signal = self.simulate_batch([SimulationRun(values, x, effect_parameters, forces)], context)[
-            0
-        ]
-        return output
+        run = SimulationRun(values, x, effect_parameters, forces)
+        return np.asarray(self.simulate_batch([run], context)[0])
 
     def simulate_batch(self, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
         """Simulate runs with the same effects and force laws; see `BatchSimulator.simulate_batch`."""
@@ -215,7 +221,29 @@ class OdeSimulator:
         if self.shots is not None:
             interval = self.shots.interval * steps * (runs[0].x.size // self.shots.measured.size)
             starts = starts or [self.shots.get_starts(self.initial)] * len(runs)
-        common = self._make_common_signals(program, runs[0].x.size, context)
+        lanes = self._make_lanes(program, active, runs, context, starts)
+        outputs = self._simulate_lanes(program, context.start_time, context.dt / steps, lanes, interval)
+        return outputs[:, :, ::steps]
+
+    def _simulate_lanes(
+        self, program: OdeProgram, _start_time: float, dt: float, lanes: Sequence[LaneInput], interval: int
+    ) -> Signal:
+        """Simulate the outputs of a program, shape (lanes, outputs, steps)."""
+        return simulate_lanes(program, dt, lanes, interval)
+
+    def _make_lanes(
+        self,
+        program: OdeProgram,
+        active: tuple[OdeEffect, ...],
+        runs: Sequence[SimulationRun],
+        context: SimulationContext,
+        starts: Sequence[Mapping[str, Signal]] | None = None,
+    ) -> list[LaneInput]:
+        steps = max(self.system.steps, 1)
+        samples = runs[0].x.size
+        common = make_time(context.start_time, samples, context.dt) if Symbol(TIME) in program.signals else {}
+        common |= sample_channels(context, self.channels, samples, is_held=not self.is_continuous_time)
+        common = {name: signal.refine(steps) for name, signal in common.items()}
         made: dict[bytes, SampledSignal] = {}
         lanes = []
         for index, run in enumerate(runs):
@@ -225,27 +253,23 @@ class OdeSimulator:
             if isinstance(gain, float) or self.system.gain:
                 key = run.x.tobytes()
                 if key not in made:
-                    made[key] = SampledSignal(run.x, *_get_between(run, context)).refine(steps)
+                    made[key] = SampledSignal(run.x, *self._get_between(run, context)).refine(steps)
                 signals[self.system.input] = made[key]
                 if not isinstance(gain, float):
                     signals[_GAIN] = interpolate_linearly(gain).refine(steps)
             else:
-                between = _get_between(run, context) * gain
+                between = self._get_between(run, context) * gain
                 signals[self.system.input] = SampledSignal(run.x * gain, *between).refine(steps)
             given = {each.name: float(v) for each, v in zip(self.parameters, run.values, strict=True)}
             laws = list(enumerate(run.forces)) if self._has_force_equation else []
             calls = [law for _, law in laws if not self._is_term(law[0])]
-            parameters, states = dict[str, float](), dict[str, float]()
-            for number, (law, values) in laws:
-                if self._is_term(law):
-                    parameters |= list_numbers(number, law, values, context)
-                    states |= list_states(number, law, values)
+            numbers, states = list_values([each for each in laws if self._is_term(each[1][0])], context)
             lanes.append(
                 LaneInput(
                     {
                         **{each.name: given.get(each.name, each.value) for each in self.system.parameters},
                         **{each.name: effects[each.name] for each in active},
-                        **parameters,
+                        **numbers,
                     },
                     {
                         **{name: given.get(f"initial {name}", value) for name, value in self.initial.items()},
@@ -253,45 +277,24 @@ class OdeSimulator:
                     },
                     signals,
                     pack_force_laws(calls, context, balance=True) if calls else None,
-                    *self._find_limits(effects),
+                    *find_limits(self.system, effects),
                     starts[index] if starts else None,
                 )
             )
-        return simulate_lanes(program, context.dt / steps, lanes, interval)[:, :, ::steps]
+        return lanes
 
-    def _make_common_signals(
-        self, program: OdeProgram, samples: int, context: SimulationContext
-    ) -> dict[str, SampledSignal]:
-        """Return the channels, which are linear between their samples, and the time if it is read."""
-        found = make_time(context.start_time, samples, context.dt) if Symbol(TIME) in program.signals else {}
-        for name, recorded in self.channels.items():
-            found[name] = interpolate_linearly(sample_channel(context, recorded, samples))
-        return {name: signal.refine(max(self.system.steps, 1)) for name, signal in found.items()}
-
-    def _find_limits(
-        self, effect_parameters: Mapping[str, float]
-    ) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[str, float]]]:
-        """Return the limits of states, and the receivers and fractions of their overflow."""
-        limits, spills = {}, {}
-        for state in self.system.states:
-            label = f"state-clip:{state.name}"
-            level = effect_parameters.get(label, inf)
-            lower, upper = max(state.lower, -level), min(state.upper, level)
-            if (lower, upper) != (-inf, inf):
-                limits[state.name] = (lower, upper)
-            if caught := effect_parameters.get(f"{label} caught", 0.0):
-                spills[state.name] = (state.spills_into, caught)
-        return limits, spills
-
-
-def _get_between(run: SimulationRun, context: SimulationContext) -> Signal:
-    """Return the values of the input between the samples, shape (2, samples)."""
-    return context.get_intersample_values(run.x) if run.intersample_values is None else run.intersample_values
+    def _get_between(self, run: SimulationRun, context: SimulationContext) -> Signal:
+        """Return the values of the input between the samples, shape (2, samples)."""
+        if not self.is_continuous_time:
+            return np.stack([run.x, run.x])
+        if run.intersample_values is None:
+            return context.get_intersample_values(run.x)
+        return run.intersample_values
 
 
 def _make_parameter(given: OdeParameter) -> Parameter:
     ends = (0.05 * given.value, 20.0 * given.value)
     lower = min(ends) if given.lower is None else given.lower
     upper = max(ends) if given.upper is None else given.upper
-    scale = 0.01 * (abs(given.value) or upper - lower)
+    scale = 0.01 * (abs(given.value) or (1.0 if isinf(upper - lower) else upper - lower))
     return Parameter(given.name, given.unit, given.value, scale, lower, upper, is_positive=given.positive)

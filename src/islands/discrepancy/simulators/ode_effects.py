@@ -7,6 +7,7 @@ instructions instead, which compute all lanes at once.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from math import inf
 
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.effects.baseline import input_offset
@@ -35,10 +36,9 @@ def list_terms(system: OdeSystem) -> tuple[OdeEffect, ...]:
     """
     if system.effects:
         return system.effects
-    balances = [name for name, right in system.derivatives if not isinstance(right, Symbol)]
     return (
-        *(OdeEffect(f"input-offset:{name}", name, Symbol(EFFECT_VALUE)) for name in balances),
-        *(OdeEffect(f"state-clip:{name}") for name in balances),
+        *(OdeEffect(f"input-offset:{name}", name, Symbol(EFFECT_VALUE)) for name in system.balances),
+        *(OdeEffect(f"state-clip:{name}") for name in system.balances),
     )
 
 
@@ -80,6 +80,22 @@ def find_effects(system: OdeSystem, sizes: Mapping[str, float]) -> tuple[frozens
     return frozenset(supported), tuple(found)
 
 
+def find_limits(
+    system: OdeSystem, effect_parameters: Mapping[str, float]
+) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[str, float]]]:
+    """Return the limits of states, and the receivers and fractions of their overflow."""
+    limits, spills = {}, {}
+    for state in system.states:
+        label = f"state-clip:{state.name}"
+        level = effect_parameters.get(label, inf)
+        lower, upper = max(state.lower, -level), min(state.upper, level)
+        if (lower, upper) != (-inf, inf):
+            limits[state.name] = (lower, upper)
+        if caught := effect_parameters.get(f"{label} caught", 0.0):
+            spills[state.name] = (state.spills_into, caught)
+    return limits, spills
+
+
 def add_force_laws(system: OdeSystem, laws: Sequence[tuple[int, ForceLaw]], has_others: bool) -> OdeSystem:
     """Return a system with force laws in its equations, each with its number; others remain calls."""
     assert system.force is not None
@@ -109,18 +125,18 @@ def add_force_laws(system: OdeSystem, laws: Sequence[tuple[int, ForceLaw]], has_
     )
 
 
-def list_numbers(
-    number: int, law: ForceLaw, values: Signal, context: SimulationContext
-) -> Mapping[str, float]:
-    """Return the parameters of a numbered law, by their names in the equations."""
-    given = (*values, *law.constants(context))
-    padded = [*map(float, given), *[0.0] * (WIDTH - len(given))]
-    return {_name_number(number, index): value for index, value in enumerate(padded)}
-
-
-def list_states(number: int, law: ForceLaw, values: Signal) -> Mapping[str, float]:
-    """Return the initial internal state of a numbered law, if it has one, by its name in the equations."""
-    return {_name_state(number): law.get_initial_state(values)} if law.state_equation else {}
+def list_values(
+    laws: Sequence[tuple[int, tuple[ForceLaw, Signal]]], context: SimulationContext
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the parameters and initial internal states of numbered laws, by their names in equations."""
+    numbers, states = dict[str, float](), dict[str, float]()
+    for number, (law, values) in laws:
+        given = (*values, *law.constants(context))
+        padded = [*map(float, given), *[0.0] * (WIDTH - len(given))]
+        numbers |= {_name_number(number, index): value for index, value in enumerate(padded)}
+        if law.state_equation:
+            states[_name_state(number)] = law.get_initial_state(values)
+    return numbers, states
 
 
 # No name in equations has brackets.

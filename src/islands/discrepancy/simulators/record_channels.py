@@ -1,11 +1,14 @@
 """Columns of a record that a simulator reads in addition to its input."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.context import Signal, SimulationContext
+from islands.discrepancy.interfaces.context import SimulationContext
 from islands.errors import RecordError
+from islands.systems.ode.lane_simulation import SampledSignal, interpolate_linearly
 
 
 def find_channel(name: str, record: Dataset, reader: str) -> str:
@@ -31,11 +34,25 @@ def find_channel(name: str, record: Dataset, reader: str) -> str:
     return found[0]
 
 
-def sample_channel(context: SimulationContext, name: str, samples: int) -> Signal:
-    """Return a channel with a given number of samples, interpolated linearly."""
-    signal = context.channels[name]
-    steps = np.arange(samples) * (signal.size / samples)
-    return np.interp(steps, np.arange(signal.size), signal)
+def sample_channels(
+    context: SimulationContext, channels: Mapping[str, str], samples: int, is_held: bool
+) -> dict[str, SampledSignal]:
+    """Return channels with a given number of samples, interpolated linearly.
+
+    Parameters
+    ----------
+    channels : mapping
+        Channels of the record by the names that a simulator gives to them.
+    is_held : bool
+        Whether a signal is constant within each step; otherwise it is linear.
+    """
+    found = {}
+    for name, recorded in channels.items():
+        signal = context.channels[recorded]
+        steps = np.arange(samples) * (signal.size / samples)
+        values = np.interp(steps, np.arange(signal.size), signal)
+        found[name] = SampledSignal(values, values, values) if is_held else interpolate_linearly(values)
+    return found
 
 
 def make_nominal_context(record: Dataset) -> SimulationContext:

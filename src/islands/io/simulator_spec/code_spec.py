@@ -13,9 +13,14 @@ from urllib.parse import parse_qsl
 from pydantic import BeforeValidator, Field, FiniteFloat
 
 from islands.errors import SettingsError
+from islands.io.simulator_spec.ode_spec import OdeForceSpec, OdeParameterSpec
 from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
 from islands.systems.fmu.fmi_description import read_description
 from islands.systems.fmu.fmu_model import FmuModel, FmuParameterChoice, choose_variables
+from islands.systems.fmu.fmu_system import make_fmu_system, render_extension
+from islands.systems.ode.equation_parser import MAX_CHARACTERS
+from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.system_document import MAX_PARAMETERS, describe_system, make_force, make_parameter
 
 _Name = Annotated[str, Field(min_length=1, max_length=500)]
 
@@ -69,6 +74,11 @@ class FmuSpec(SimulatorSpec):
     )
     initial: Annotated[tuple[_Name, ...], Field(max_length=100)] | None = None
     steps: Annotated[int, Field(ge=0, le=256)] = 0
+    equations: Annotated[str, Field(max_length=MAX_CHARACTERS)] = ""
+    coefficients: dict[_Name, Annotated[OdeParameterSpec, BeforeValidator(_allow_number)]] = Field(
+        default_factory=dict, max_length=MAX_PARAMETERS
+    )
+    force: OdeForceSpec | None = None
 
     @property
     def name(self) -> str:
@@ -98,9 +108,28 @@ class FmuSpec(SimulatorSpec):
             self.steps,
         )
 
+    def make_system(self, model: FmuModel) -> OdeSystem:
+        """Return the equations around the FMU.
+
+        Raises
+        ------
+        ModelError
+            The equations, their coefficients or the coordinate of forces are invalid.
+        """
+        coefficients = [make_parameter(name, each.model_dump()) for name, each in self.coefficients.items()]
+        force = (
+            None
+            if self.force is None
+            else make_force(model.symbols[model.input.name], self.force.model_dump())
+        )
+        return make_fmu_system(model, self.equations, coefficients, force)
+
     @classmethod
-    def from_model(cls, model: FmuModel) -> "FmuSpec":
-        """Return the specification of an FMU with its variables."""
+    def from_system(cls, model: FmuModel, system: OdeSystem) -> "FmuSpec":
+        """Return the specification of an FMU with its variables and the equations around it."""
+        values = {each.name: each.value for each in system.parameters}
+        own = {each.variable.name for each in model.parameters}
+        described = describe_system(system)
         return cls(
             kind="fmu",
             file=model.description.path,
@@ -110,7 +139,7 @@ class FmuSpec(SimulatorSpec):
             channels=tuple(each.name for each in model.channels),
             parameters={
                 each.variable.name: FmuParameterSpec(
-                    value=each.value,
+                    value=values[each.variable.name],
                     tolerance=each.tolerance,
                     lower=None if isinf(each.lower) else each.lower,
                     upper=None if isinf(each.upper) else each.upper,
@@ -119,7 +148,16 @@ class FmuSpec(SimulatorSpec):
                 for each in model.parameters
             },
             initial=tuple(each.variable.name for each in model.initial),
-            steps=model.steps,
+            steps=system.steps,
+            equations=render_extension(model, system),
+            coefficients={
+                name: OdeParameterSpec.model_validate(entry)
+                for name, entry in described.get("parameters", {}).items()
+                if name not in own
+            },
+            force=OdeForceSpec.model_validate(described["force"])
+            if system.force and system.force.rate
+            else None,
         )
 
     @classmethod

@@ -115,10 +115,10 @@ def describe_extension(
         case NarxSimulator():
             model = simulator.with_shape(values, shape) if shape else simulator.with_values(values)
             return ModelSpec(kind="model", model=json.loads(model_json(model)), name=simulator.name)
+        case FmuSimulator():
+            return FmuSpec.from_system(simulator.model, simulator.system.with_values(named))
         case OdeSimulator() if not simulator.system.is_built_in:
             return OdeSpec.from_system(simulator.system.with_values(named))
-        case FmuSimulator():
-            return FmuSpec.from_model(simulator.model.with_values(named))
         case RecordedOutput():
             return ColumnSpec(kind="column", column=simulator.column)
         case LinearSimulator():

@@ -236,8 +236,9 @@ def make_python_function(spec: ProgramSpec, _record: Dataset, _columns: Mapping[
 
 
 def make_fmu(spec: FmuSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
-    """Read an FMU and make a simulator of it."""
-    return make_fmu_simulator(spec.make_model(), record)
+    """Read an FMU and make a simulator of it and of the equations around it."""
+    model = spec.make_model()
+    return make_fmu_simulator(model, spec.make_system(model), record)
 
 
 def make_identified_model(spec: ModelSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:

@@ -7,7 +7,7 @@ import sys
 import tempfile
 import threading
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from islands.errors import ModelError
 from islands.systems.fmu.fmi_calls import TERMINATED, FmiFunctions
 from islands.systems.fmu.fmi_description import FmiDescription, FmiInterface, import_fmpy, read_description
-from islands.systems.fmu.fmi_kernel import integrate, take_steps
+from islands.systems.fmu.fmi_kernel import FmuEquations, integrate, take_steps
 from islands.systems.ode.lane_simulation import SampledSignal
 
 #: Largest number of FMUs that a process keeps loaded.
@@ -59,6 +59,10 @@ class FmuInstance:
     ----------
     description : FmiDescription
 
+    Attributes
+    ----------
+    description : FmiDescription
+
     Raises
     ------
     ModelError
@@ -66,7 +70,7 @@ class FmuInstance:
     """
 
     def __init__(self, description: FmiDescription) -> None:
-        self._description = description
+        self.description = description
         self._lock = threading.Lock()
         self._messages: list[str] = []
         self._resources = _Resources()
@@ -82,30 +86,24 @@ class FmuInstance:
     def simulate(
         self,
         values: Mapping[int, float],
-        states: Mapping[int, float],
         signals: Mapping[int, SampledSignal],
-        outputs: Sequence[int],
+        equations: FmuEquations,
         start_time: float,
         dt: float,
-        every: int = 1,
     ) -> FmuRun:
-        """Simulate the outputs from the start values of the FMU.
+        """Simulate the outputs of equations from the start values of the FMU.
 
         Parameters
         ----------
         values : mapping
             Start values by value reference.
-        states : mapping
-            States at the first sample by their place; model exchange only.
         signals : mapping
             Inputs by value reference; a co-simulation takes their values at the start and in the middle of
-            each step. They have ``every`` steps per sample.
-        outputs : sequence of int
-            Value references.
+            each step.
+        equations : FmuEquations
+            A co-simulation has no states in them.
         start_time, dt : float
             Time of the first sample, and step, in seconds.
-        every : int
-            Steps per sample.
 
         Returns
         -------
@@ -120,15 +118,15 @@ class FmuInstance:
             except Exception as error:  # a status of the FMU that is not OK, or an instance that fails
                 self._is_fresh = False
                 self._recover(getattr(error, "status", 0))
-                size = next(iter(signals.values())).start.size // every
-                return FmuRun(np.full((len(outputs), size), np.nan), self._describe(str(error)))
-            return self._run(states, signals, outputs, start_time, dt, every)
+                size = next(iter(signals.values())).start.size, equations.instructions.outputs.size
+                return FmuRun(np.full(size[::-1], np.nan), self._describe(str(error)))
+            return self._run(signals, equations, start_time, dt)
 
     def _instantiate(self) -> None:
         from fmpy.simulation import instantiate_fmu  # noqa: PLC0415 - only if an FMU is used
 
         self._resources.release()
-        description = self._description
+        description = self.description
         folder = self._resources.extract(description)
         found = import_fmpy().read_model_description(folder, validate=False)
         log = _make_log(self._messages)
@@ -161,7 +159,7 @@ class FmuInstance:
                 fmu = self._fmu
         self._is_fresh = False
         first = {reference: float(signal.start[0]) for reference, signal in signals.items()}
-        if self._description.version == 2:
+        if self.description.version == 2:
             fmu.setupExperiment(startTime=start_time)
             fmu.setReal(list(values), list(values.values()))
             fmu.enterInitializationMode()
@@ -173,35 +171,26 @@ class FmuInstance:
         fmu.exitInitializationMode()
 
     def _run(
-        self,
-        states: Mapping[int, float],
-        signals: Mapping[int, SampledSignal],
-        outputs: Sequence[int],
-        start_time: float,
-        dt: float,
-        every: int,
+        self, signals: Mapping[int, SampledSignal], equations: FmuEquations, start_time: float, dt: float
     ) -> FmuRun:
         def stack(part: str) -> NDArray[np.float64]:
             return np.column_stack([getattr(signal, part) for signal in signals.values()])
 
-        references = np.array(list(signals), dtype=np.uint32), np.array(outputs, dtype=np.uint32)
+        inputs = np.array(list(signals), dtype=np.uint32)
         start, middle = stack("start"), stack("middle")
-        y = np.full((len(start) // every, len(outputs)), np.nan)
-        description = self._description
+        y = np.full((len(start), equations.instructions.outputs.size), np.nan)
+        description = self.description
         if description.interface == FmiInterface.MODEL_EXCHANGE:
             done, status = integrate(
-                *(self._functions, start_time, dt, start, middle, stack("end"), *references),
-                np.array(list(states), dtype=np.int64),
-                np.array(list(states.values()), dtype=np.float64),
-                *(np.empty(len(description.states)), np.empty(description.indicators)),
-                *(description.completes, every, y),
+                *(self._functions, equations, start_time, dt, start, middle, stack("end"), inputs),
+                *(len(description.states), description.indicators, description.completes, y),
             )
         else:
-            done, status = take_steps(self._functions, start_time, dt, start, middle, *references, y)
+            done, status = take_steps(self._functions, equations, start_time, dt, start, middle, inputs, y)
         failure = ""
         if done < len(y):
             reason = "it ends the simulation" if status == TERMINATED else f"it fails with status {status}"
-            failure = self._describe(f"{reason} after {start_time + done * dt * every:g} s")
+            failure = self._describe(f"{reason} after {start_time + done * dt:g} s")
         y[done:] = np.nan
         self._recover(status)
         return FmuRun(np.ascontiguousarray(y.T), failure)
@@ -240,8 +229,7 @@ class _Resources:
         self.delete_folder()
 
 
-@lru_cache(maxsize=_LOADED)
-def load_fmu(path: str, digest: str, interface: FmiInterface) -> FmuInstance:
+def load_fmu(description: FmiDescription) -> FmuInstance:
     """Return the instance of an FMU in this process.
 
     Raises
@@ -249,6 +237,11 @@ def load_fmu(path: str, digest: str, interface: FmiInterface) -> FmuInstance:
     ModelError
         The file is not the one that was described, or cannot be loaded.
     """
+    return _load(description.path, description.digest, description.interface)
+
+
+@lru_cache(maxsize=_LOADED)
+def _load(path: str, digest: str, interface: FmiInterface) -> FmuInstance:
     return FmuInstance(replace(read_description(path, interface), digest=digest))
 
 

@@ -3,12 +3,14 @@
 import difflib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from math import inf
 from typing import TypeVar
 
 from islands.errors import SettingsError
 from islands.systems.fmu.fmi_description import FmiDescription, FmiInterface, FmiVariable
+from islands.systems.ode.equation_parser import is_free_name
+from islands.systems.ode.ode_system import OUTPUT
 
 T = TypeVar("T")
 
@@ -84,6 +86,10 @@ class FmuModel:
         Values at the first sample that are calibrated.
     steps : int
         Steps of the integrator per sample; 0 if the simulation chooses it.
+    symbols : mapping
+        Names in equations of the input, the channels, the states with initial values, and the output. They
+        are those of the variables, with ``_`` for characters that no name in equations has, and behind a
+        name that has a meaning already.
     """
 
     description: FmiDescription
@@ -94,15 +100,21 @@ class FmuModel:
     initial: tuple[FmuInitialValue, ...]
     steps: int = 0
 
-    def with_values(self, values: Mapping[str, float]) -> "FmuModel":
-        """Return the model with other nominal values of parameters; other names are ignored."""
-        return replace(
-            self,
-            parameters=tuple(
-                replace(each, value=float(values.get(each.variable.name, each.value)))
-                for each in self.parameters
-            ),
-        )
+    symbols: Mapping[str, str] = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        taken = {OUTPUT, *(each.variable.name for each in self.parameters)}
+        symbols: dict[str, str] = {}
+        states = (each.variable for each in self.initial if each.place >= 0)
+        for variable in (self.input, *self.channels, *states, self.output):
+            if variable.name in symbols:
+                continue
+            symbol = re.sub(r"\W", "_", variable.name, flags=re.ASCII)
+            while symbol in taken or not is_free_name(symbol):
+                symbol = f"{symbol}_" if symbol[:1].isidentifier() else f"_{symbol}"
+            symbols[variable.name] = symbol
+            taken.add(symbol)
+        object.__setattr__(self, "symbols", symbols)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 from islands.errors import ModelError
 from islands.systems.ode.ode_expression import (
+    FMU,
     FUNCTIONS,
     SIGNAL_FUNCTIONS,
     Number,
@@ -35,6 +36,9 @@ TIME = "t"
 
 #: Name of the sum of the forces of force laws.
 FORCE = "force"
+
+#: Names that have a meaning in every equation.
+_MEANINGS = frozenset((*FUNCTIONS, *SIGNAL_FUNCTIONS, *CONSTANTS, TIME, FORCE))
 
 _DERIVATIVE = re.compile(r"d\s*([A-Za-z_]\w*)\s*/\s*dt")
 
@@ -114,8 +118,13 @@ def check_name(name: str, place: str) -> None:
     """Raise `ModelError` if a name cannot be given to a signal, a state, a variable or a parameter."""
     if not (name.isascii() and name.isidentifier()) or keyword.iskeyword(name):
         raise ModelError(f"{place}: {name!r} is not a name: use letters, digits and _, and no word of Python")
-    if name in FUNCTIONS or name in SIGNAL_FUNCTIONS or name in CONSTANTS or name in (TIME, FORCE):
+    if name in _MEANINGS:
         raise ModelError(f"{place}: {name!r} already has a meaning in equations: take another name")
+
+
+def is_free_name(name: str) -> bool:
+    """Return whether a name can be given to something in equations, if nothing else there has it."""
+    return name.isascii() and name.isidentifier() and not keyword.iskeyword(name) and name not in _MEANINGS
 
 
 def parse_expression(text: str, place: str = "") -> OdeExpression:
@@ -201,6 +210,9 @@ def _make_call(name: str, arguments: tuple[OdeExpression, ...], place: str) -> O
             f"{place}: write rate(F) and delay(F, tau) with the name of the input or of a channel; "
             "tau is a parameter or a number, in seconds"
         )
+    match name, arguments:
+        case (called, (Symbol(),)) if called == FMU:
+            return Operation(FMU, arguments)
     if name not in NAMED_FUNCTIONS:
         raise ModelError(f"{place}: unknown function {name!r}: take one of {', '.join(NAMED_FUNCTIONS)}")
     if name in ("min", "max") and len(arguments) > 2:

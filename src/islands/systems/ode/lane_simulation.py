@@ -138,12 +138,24 @@ def _simulate_eight(
 ) -> NDArray[np.float64]:
     instructions = program.instructions
     full = [*lanes, *[lanes[0]] * (VECTOR - len(lanes))]
-    arena = padded_size(VECTOR * instructions.rows)
+    arena = pack_arena(program, full)
+    shared, own, order = pack_signals(program.signals, dt, full)
+    samples = len(next(iter(lanes[0].signals.values())).start)
+    out = np.empty((samples, instructions.outputs.size, VECTOR))
+    instructions = instructions._replace(signals=instructions.signals[order])
+    limits = pack_limits(program.states, full)
+    restarts = _pack_restarts(program.states, full, samples, interval)
+    integrate(instructions, arena, shared, own, dt, limits, restarts, pack_elements(full), len(lanes), out)
+    return np.ascontiguousarray(out.transpose(2, 1, 0)[: len(lanes)])
+
+
+def pack_arena(program: OdeProgram, lanes: Sequence[LaneInput]) -> NDArray[np.float64]:
+    """Return the rows of a program with its constants, and the parameters and states of eight lanes."""
+    arena: NDArray[np.float64] = padded_size(VECTOR * program.instructions.rows)
     rows = arena.reshape(-1, VECTOR)
-    count = len(program.constants)
+    count, states = len(program.constants), program.instructions.states
     rows[:count] = program.constants[:, None]
-    states = instructions.states
-    for lane, each in enumerate(full):
+    for lane, each in enumerate(lanes):
         rows[count : count + len(program.parameters), lane] = [
             each.parameters[name] for name in program.parameters
         ]
@@ -153,17 +165,10 @@ def _simulate_eight(
         if each.elements is not None:
             first = states + len(program.states)
             rows[first : first + each.elements.forces.size, lane] = each.elements.initial_states
-    shared, own, order = _pack_signals(program.signals, dt, full)
-    samples = len(next(iter(lanes[0].signals.values())).start)
-    out = np.empty((samples, instructions.outputs.size, VECTOR))
-    instructions = instructions._replace(signals=instructions.signals[order])
-    limits = _pack_limits(program.states, full)
-    restarts = _pack_restarts(program.states, full, samples, interval)
-    integrate(instructions, arena, shared, own, dt, limits, restarts, _pack_elements(full), len(lanes), out)
-    return np.ascontiguousarray(out.transpose(2, 1, 0)[: len(lanes)])
+    return arena
 
 
-def _pack_signals(
+def pack_signals(
     expressions: Sequence[OdeExpression], dt: float, lanes: Sequence[LaneInput]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Return the shared signals, those of each lane, and the order of both among all signals."""
@@ -213,7 +218,8 @@ def _make_signal(
     return made[key]
 
 
-def _pack_limits(states: Sequence[str], lanes: Sequence[LaneInput]) -> LaneLimits:
+def pack_limits(states: Sequence[str], lanes: Sequence[LaneInput]) -> LaneLimits:
+    """Return the limits of the states in eight lanes."""
     receivers, none = np.zeros(len(states), dtype=np.int64), np.empty(0)
     if not any(lane.limits for lane in lanes):
         return LaneLimits(none, none, receivers, none)
@@ -238,7 +244,8 @@ def _pack_restarts(
     return LaneRestarts(first, np.ascontiguousarray(np.array(values).reshape(-1, first.size).T))
 
 
-def _pack_elements(lanes: Sequence[LaneInput]) -> LaneForces:
+def pack_elements(lanes: Sequence[LaneInput]) -> LaneForces:
+    """Return the force laws of eight lanes that are calls."""
     first = lanes[0].elements
     if first is None:
         none = np.empty(0, dtype=np.int64)

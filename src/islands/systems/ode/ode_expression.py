@@ -32,6 +32,9 @@ class Operation:
 
 OdeExpression: TypeAlias = Number | Symbol | Operation
 
+#: Function of the name of a state or an output: its derivative or its value according to an FMU.
+FMU = "fmu"
+
 #: Functions of a signal as a whole: its rate and its delay. They are evaluated before the integration.
 SIGNAL_FUNCTIONS: Mapping[str, int] = MappingProxyType({"rate": 1, "delay": 2})
 
@@ -135,11 +138,14 @@ def _bracket(expression: OdeExpression, least: int) -> str:
 
 
 def find_symbols(expression: OdeExpression) -> Iterator[str]:
-    """Yield the names in an expression from left to right, also those of delayed signals and their delays."""
+    """Yield the names in an expression from left to right, also those of delayed signals and their delays.
+
+    What an FMU computes has no names of the equations.
+    """
     match expression:
         case Symbol(name):
             yield name
-        case Operation(_, arguments):
+        case Operation(function, arguments) if function != FMU:
             for argument in arguments:
                 yield from find_symbols(argument)
 
@@ -161,8 +167,8 @@ def evaluate(expression: OdeExpression, values: Mapping[str, Any]) -> Any:
     ----------
     expression : expression
     values : mapping
-        Values of the names, numbers or arrays of equal shape; the values of ``rate(F)`` and ``delay(F, tau)``
-        by their text.
+        Values of the names, numbers or arrays of equal shape; the values of ``rate(F)``, ``delay(F, tau)``
+        and ``fmu(y)`` by their text.
 
     Returns
     -------
@@ -173,7 +179,7 @@ def evaluate(expression: OdeExpression, values: Mapping[str, Any]) -> Any:
             return value
         case Symbol(name):
             return values[name]
-        case Operation(function, _) if function in SIGNAL_FUNCTIONS:
+        case Operation(function, _) if function in SIGNAL_FUNCTIONS or function == FMU:
             return values[render(expression)]
         case Operation(function, arguments):
             given = [evaluate(argument, values) for argument in arguments]

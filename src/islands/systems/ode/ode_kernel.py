@@ -139,6 +139,20 @@ def _sum_forces(arena, laws, states, slopes, target, coordinate, rate, lanes):
 
 
 @kernel(forceinline=True)
+def execute_code(instructions, begin, end, base, arena, laws, lanes):
+    """Execute the instructions from ``begin`` to ``end`` on an arena at the address ``base``."""
+    code, states, slopes = instructions.code, instructions.states, instructions.slopes
+    for i in range(begin, end):
+        operation = code[i, 0]
+        if operation < POWER:
+            _execute(operation, base, code[i, 1], code[i, 2], code[i, 3], code[i, 4])
+        elif operation < FORCES:
+            _apply(operation, arena, code[i, 1], code[i, 2], code[i, 3], lanes)
+        else:
+            _sum_forces(arena, laws, states, slopes, code[i, 1], code[i, 2], code[i, 3], lanes)
+
+
+@kernel(forceinline=True)
 def _advance(stage, dt, slope, before, total, state):
     """Finish a stage for one state: write its value at the next stage, or at the next sample.
 
@@ -188,7 +202,7 @@ def integrate(instructions, arena, shared, own, dt, limits, restarts, laws, lane
     (samples, 3, signals, 8) the others, which follow them. ``out`` is (samples, outputs, 8); only the first
     ``lanes`` lanes are computed. All outputs of a lane that diverges are NaN.
     """
-    code, ends, states = instructions.code, instructions.ends, instructions.states
+    ends, states = instructions.ends, instructions.states
     signals, slopes, outputs = instructions.signals, instructions.slopes, instructions.outputs
     size = slopes.size * VECTOR
     before, total = arena[VECTOR * states : VECTOR * states + size].copy(), np.empty(size)
@@ -211,14 +225,9 @@ def integrate(instructions, arena, shared, own, dt, limits, restarts, laws, lane
                 for s in range(own.shape[2]):
                     for lane in range(lanes):
                         arena[VECTOR * signals[shared.shape[2] + s] + lane] = own[k, moment, s, lane]
-            for i in range(0 if k == 0 and stage == 0 else begin, end):
-                operation = code[i, 0]
-                if operation < POWER:
-                    _execute(operation, base, code[i, 1], code[i, 2], code[i, 3], code[i, 4])
-                elif operation < FORCES:
-                    _apply(operation, arena, code[i, 1], code[i, 2], code[i, 3], lanes)
-                else:
-                    _sum_forces(arena, laws, states, slopes, code[i, 1], code[i, 2], code[i, 3], lanes)
+            if k == 0 and stage == 0:
+                begin = 0
+            execute_code(instructions, begin, end, base, arena, laws, lanes)
             if stage == 0:
                 for output in range(outputs.size):
                     for lane in range(lanes):

@@ -17,6 +17,7 @@ from islands.systems.ode import ode_kernel
 from islands.systems.ode.equation_parser import FORCE, TIME
 from islands.systems.ode.kernel_arguments import Instructions
 from islands.systems.ode.ode_expression import (
+    FMU,
     SIGNAL_FUNCTIONS,
     Number,
     OdeExpression,
@@ -79,7 +80,7 @@ class OdeProgram:
     parameters : tuple of str
         Names of the parameters, whose rows follow those of the constants.
     signals : tuple of expression
-        Time, signals, and their rates and delays, in the order of their rows.
+        Time, signals, their rates and delays, and what an FMU computes, in the order of their rows.
     states : tuple of str
     """
 
@@ -121,8 +122,7 @@ def generate_program(system: OdeSystem, outputs: Sequence[OdeExpression] = (), l
 
 class _Generator:
     def __init__(self, system: OdeSystem, laws: int) -> None:
-        self.system = system
-        self.laws = laws
+        self.system, self.laws = system, laws
         self.nodes: list[_Node] = []
         self.constants: list[float] = []
         self.signals: list[OdeExpression] = []
@@ -208,8 +208,8 @@ class _Generator:
                 return self._signal(expression)
             case Symbol(name):
                 raise ModelError(f"unknown name {name!r} in an equation")
-            case Operation(function, _) if function in SIGNAL_FUNCTIONS:
-                return self._signal(expression)
+            case Operation(function, _) if function in SIGNAL_FUNCTIONS or function == FMU:
+                return self._signal(expression, _STATES if function == FMU else _SIGNALS)
             case Operation("pow", (base, Number(power))) if power in range(2, MAX_MULTIPLIED_POWER + 1):
                 return self._multiply(self._make(base), int(power))
             case Operation(function, arguments):
@@ -221,10 +221,10 @@ class _Generator:
             self.constants.append(value)
         return self._known["number", value]
 
-    def _signal(self, expression: OdeExpression) -> int:
+    def _signal(self, expression: OdeExpression, level: int = _SIGNALS) -> int:
         key = "signal", render(expression)
         if key not in self._known:
-            self._known[key] = self._leaf(_SIGNALS)
+            self._known[key] = self._leaf(level)
             self.signals.append(expression)
         return self._known[key]
 

@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from islands.errors import ModelError
 from islands.systems.ode.equation_parser import FORCE, TIME, check_name, parse_expression
 from islands.systems.ode.ode_expression import (
+    FMU,
     SIGNAL_FUNCTIONS,
     OdeExpression,
     Operation,
@@ -88,6 +89,10 @@ class OdeSystem:
         free run.
     is_built_in : bool
         Whether these are the equations of the built-in simulator of this name.
+    of_fmu : tuple of str
+        States whose derivatives, and outputs whose values, an FMU computes: ``fmu(NAME)`` in the equations.
+    definitions : tuple of str
+        States whose derivatives by the FMU are merely other states.
     """
 
     name: str
@@ -108,6 +113,17 @@ class OdeSystem:
     effects: tuple[OdeEffect, ...] = ()
     shooting: float = 0.0
     is_built_in: bool = False
+    of_fmu: tuple[str, ...] = ()
+    definitions: tuple[str, ...] = ()
+
+    @property
+    def balances(self) -> tuple[str, ...]:
+        """Names of the states whose equations do not merely define a rate, as ``dx/dt = v`` does."""
+        return tuple(
+            name
+            for name, right in self.derivatives
+            if not isinstance(right, Symbol) and name not in self.definitions
+        )
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -263,6 +279,10 @@ def _check_signals(expression: OdeExpression, system: OdeSystem, place: str) -> 
             for other in others:
                 if isinstance(other, Symbol) and system.find_names()[other.name] != "a parameter":
                     raise ModelError(f"{place}: the delay {other.name} has to be a parameter or a number")
+        case Operation(function, (Symbol(name),)) if function == FMU:
+            if name not in system.of_fmu:
+                known = ", ".join(system.of_fmu) or "none here, since the simulation is no FMU"
+                raise ModelError(f"{place}: an FMU does not compute {name}: take one of {known}")
         case Operation(_, arguments):
             for argument in arguments:
                 _check_signals(argument, system, place)

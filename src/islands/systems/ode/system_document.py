@@ -52,7 +52,7 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
             raise ModelError(
                 f"[states] {name}: there is no equation d{name}/dt = ...: add it, or remove the state"
             )
-    parameters = tuple(_make_parameter(name, entry) for name, entry in document.get("parameters", {}).items())
+    parameters = tuple(make_parameter(name, entry) for name, entry in document.get("parameters", {}).items())
     system = OdeSystem(
         name=document["name"],
         summary=document.get("summary", ""),
@@ -63,7 +63,7 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
         output=parse_expression(document["output"], f"output, {document['output']!r}"),
         parameters=parameters,
         states=tuple(_make_state(name, declared.get(name, {})) for name in names),
-        force=_make_force(document),
+        force=make_force(document["input"], document.get("force")),
         input_unit=document.get("input_unit", ""),
         output_unit=document.get("output_unit", ""),
         steps=document.get("steps", 0),
@@ -87,7 +87,8 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
     return system
 
 
-def _make_parameter(name: str, entry: Any) -> OdeParameter:
+def make_parameter(name: str, entry: Any) -> OdeParameter:
+    """Make a parameter of its value or of a document; raise `ModelError` if it is invalid."""
     found = OdeParameter(name, **(entry if isinstance(entry, Mapping) else {"value": entry}))
     place = f"[parameters] {name}"
     lower, upper = (
@@ -116,15 +117,15 @@ def _make_state(name: str, entry: Mapping[str, Any]) -> OdeState:
     return found
 
 
-def _make_force(document: Mapping[str, Any]) -> OdeForce | None:
-    entry = document.get("force")
+def make_force(driving: str, entry: Mapping[str, Any] | None) -> OdeForce | None:
+    """Make the coordinate of forces; raise `ModelError` if it is invalid. ``driving`` is the input."""
     if not entry:
         return None
-    drive = entry.get("drive") or document["input"]
+    drive = entry.get("drive") or driving
     unit = entry.get("unit", "")
-    if drive != document["input"] and not unit:
+    if drive != driving and not unit:
         raise ModelError("[force]: give the unit of a force, since its drive is not the input")
-    if bool(entry.get("rate")) == (entry["coordinate"] == document["input"]):
+    if bool(entry.get("rate")) == (entry["coordinate"] == driving):
         raise ModelError(
             "[force]: give coordinate and rate, or the input as the coordinate and no rate, if forces are "
             "added to the output"

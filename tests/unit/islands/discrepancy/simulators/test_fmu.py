@@ -124,7 +124,7 @@ def test_steps_are_refined_until_a_simulation_does_not_diverge() -> None:
     record = oscillation()
     found = make_simulator(f"fmu:{oscillator()}?parameters=k=1e6", record)
     assert isinstance(found, FmuSimulator)
-    assert found.model.steps > 1
+    assert found.system.steps > 1
     with pytest.raises(RecordError, match=r"ends the simulation after .*check its parameters and units"):
         make_simulator(f"fmu:{oscillator()}?parameters=k=1e6&steps=1", record)
 

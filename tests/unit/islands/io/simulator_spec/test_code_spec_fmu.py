@@ -8,6 +8,7 @@ from islands.errors import SettingsError
 from islands.io.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.code_spec import FmuParameterSpec, FmuSpec
 from islands.io.simulator_spec.specification import parse_spec
+from islands.systems.fmu.fmu_system import make_fmu_system
 from support.simulated_records import write_fmu
 
 
@@ -65,6 +66,6 @@ def test_an_invalid_text_is_refused(text: str, message: str) -> None:
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 def test_a_specification_with_all_names_has_the_same_variables() -> None:
     model = FmuSpec(kind="fmu", file=write_fmu()).make_model()
-    spec = FmuSpec.from_model(model)
+    spec = FmuSpec.from_system(model, make_fmu_system(model))
     assert (spec.input, spec.output, spec.initial) == ("u", "x", ("x", "v"))
     assert FmuSpec.model_validate_json(spec.model_dump_json()).make_model() == model
