@@ -1,4 +1,7 @@
-"""Candidate terms of an equation: small expressions of states, input, the rate of the input, and time."""
+"""Candidate terms of an equation: small expressions of states, input, the rate of the input, and time.
+
+The output of an FMU is one more signal, in terms that are added to it.
+"""
 
 import itertools
 from collections.abc import Iterator, Mapping
@@ -8,6 +11,7 @@ import numpy as np
 
 from islands.systems.ode.equation_parser import TIME, parse_expression
 from islands.systems.ode.ode_expression import (
+    FMU,
     OdeExpression,
     Operation,
     Symbol,
@@ -25,6 +29,9 @@ RATE_FORMS = ("a", "abs(a)", "sign(a)", "abs(a)*a", "a**3")
 
 #: Factors of products of two signals.
 FACTORS = ("a", "a**2", "abs(a)", "sign(a)")
+
+#: Largest number of signals of which products are candidates: these grow with the cube of the number.
+MAX_MULTIPLIED_SIGNALS = 8
 
 #: Functions with a scale that is fitted: a saturation.
 SATURATION = "tanh({signal}/{scale})"
@@ -109,15 +116,16 @@ def list_candidate_terms(
     duration : float
         Duration of the record in seconds.
     """
-    signals = [*(name for name, _ in system.derivatives), system.input]
+    states = [name for name, _ in system.derivatives]
+    # Only the output can depend on the output of an FMU, which is computed once for each sample.
+    outputs = [f"{FMU}({name})" for name in system.of_fmu if name not in states]
     rate = f"rate({system.input})"
-    texts = list(dict.fromkeys(_list_texts(signals, rate)))
     values = {**sizes, TIME: duration}
-    targets = [name for name, right in system.derivatives if not isinstance(right, Symbol)]
     terms = []
-    for target in (*targets, OUTPUT):
+    for target in (*system.balances, OUTPUT):
         own = system.output if target == OUTPUT else dict(system.derivatives)[target]
-        for text in texts:
+        signals = [*states, *(outputs if target == OUTPUT else ()), system.input]
+        for text in dict.fromkeys(_list_texts(signals, rate)):
             expression = parse_expression(text)
             if render(expression) == render(own):
                 continue
@@ -137,6 +145,8 @@ def _list_texts(signals: list[str], rate: str) -> Iterator[str]:
         yield f"{TIME}*{signal}"
         yield f"{rate}*{signal}"
         yield f"abs({rate})*{signal}"
+    if len(signals) > MAX_MULTIPLIED_SIGNALS:
+        return
     for one, other in itertools.combinations(signals, 2):
         for first in FACTORS:
             for second in FACTORS:

@@ -123,7 +123,10 @@ def search_terms(base: CalibrationResult, target: Target) -> TermSearchResult | 
     rate = peak_amplitude(context.take_differences(context.u)) / context.dt
     sizes = {**equations.sizes, system.input: context.input_peak, f"rate({system.input})": rate}
     candidates = list_candidate_terms(system, sizes, context.duration)
-    target_sizes = {OUTPUT: context.output_peak, **{name: sizes[f"d{name}/dt"] for name in equations.initial}}
+    target_sizes = {
+        OUTPUT: context.output_peak,
+        **{name: sizes[f"d{name}/dt"] for name, _ in system.derivatives},
+    }
     found = TermSearchResult(base, ())
     while len(found.terms) < MAX_TERMS:
         target = whiten_target(target, found.fit)

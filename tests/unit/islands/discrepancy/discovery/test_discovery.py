@@ -12,7 +12,11 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, make_target
 from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.discovery.candidate_terms import find_free_numbers, list_candidate_terms
+from islands.discrepancy.discovery.candidate_terms import (
+    MAX_MULTIPLIED_SIGNALS,
+    find_free_numbers,
+    list_candidate_terms,
+)
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -131,6 +135,17 @@ def test_definition_of_a_rate_gets_no_terms() -> None:
     assert {each.target for each in terms} == {"v", "output"}
     assert len({(each.target, each.text) for each in terms}) == len(terms)
     assert {each.size for each in terms if each.text == "x**2*v"} == {2.0}
+
+
+def test_many_signals_have_no_products() -> None:
+    names = [f"x{index}" for index in range(MAX_MULTIPLIED_SIGNALS)]
+    equations = "".join(f"d{name}/dt = F - c*{name}\n" for name in names)
+    document = {**DOCUMENT, "equations": equations, "parameters": {"c": 1.0}, "states": {}, "output": "x0"}
+    system = OdeSpec.model_validate({"kind": "ode", **document, "force": None}).make_system()
+    sizes = {**dict.fromkeys([*names, "F"], 1.0), "rate(F)": 1.0}
+    texts = {each.text for each in list_candidate_terms(system, sizes, 10.0)}
+    assert {"x0**2", "t*x7", "rate(F)*x3"} < texts
+    assert not any("x0*x1" in text for text in texts)
 
 
 @cache
