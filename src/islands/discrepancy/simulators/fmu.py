@@ -10,7 +10,6 @@ import numpy as np
 from islands.data.channel_names import is_unit, normalise_unit
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
-from islands.discrepancy.interfaces.effect import Site
 from islands.discrepancy.interfaces.simulator import SimulationRun
 from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.ode import OdeSimulator
@@ -49,11 +48,6 @@ class FmuSimulator(OdeSimulator):
     """
 
     model: FmuModel = field(kw_only=True)
-
-    @property
-    def sites(self) -> frozenset[Site]:
-        """All sites."""
-        return frozenset(Site)
 
     def _list_initial_states(self) -> tuple[Parameter, ...]:
         found = []
