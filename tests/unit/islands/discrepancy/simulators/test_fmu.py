@@ -162,14 +162,14 @@ def test_a_fixed_step_leaves_no_choice_between_samples() -> None:
 @pytest.mark.ci
 def test_a_hidden_effect_is_named_and_a_clean_record_has_none(tmp_path: Path) -> None:
     """The output of the FMU is cut off at 0.15 m; the result is saved, and simulated and diagnosed again."""
-    clean = oscillation(500, 0.001)
+    clean = oscillation(250, 0.001)
     path = tmp_path / "axis.toml"
     tolerances = "\n".join(f"{name} = {{ tolerance = 0.05 }}" for name in ("m", "c", "k"))
     path.write_text(f'file = "{oscillator()}"\n[parameters]\n{tolerances}\n')
     simulator = make_simulator(f"fmu:{path}", clean)
     assert get_tolerances(simulator) == {"m": 0.05, "c": 0.05, "k": 0.05}
     assert islands.diagnose(clean, simulator).verdict == Verdict.NOTHING
-    limited = replace(clean, y=np.clip(oscillation(500).y, -0.15, 0.15) + clean.y - oscillation(500).y)
+    limited = replace(clean, y=np.clip(oscillation(250).y, -0.15, 0.15) + clean.y - oscillation(250).y)
     found = islands.diagnose(limited, f"fmu:{path}")
     assert found.verdict == Verdict.NAMED
     assert [each.name for each in found.effects] == ["output-saturation"]
