@@ -125,7 +125,8 @@ def diagnose(
         model_error = search_with_model_error(base, target, effects, progress, parallel_map)
         second = assess_evidence(model_error, fitted, effects, rng)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome
-    if outcome.verdict != Verdict.NOTHING:
+    # Coloured noise may hide a discrepancy that no effect of the catalogue explains.
+    if outcome.verdict != Verdict.NOTHING or outcome.hypothesis.fit.noise.order:
         progress("comparing with free forms", 0.9)
         forms = select_effects(simulator, context, prior_std, catalogue, free=True)
         outcome = compare_with_free_forms(outcome, forms, fitted, (*effects, *forms), rng, parallel_map)
