@@ -48,7 +48,6 @@ def test_job_whose_checkpoint_was_lost_restarts_to_the_same_result(
     service.ask("POST", f"/v1/jobs/{job}/cancel")
     assert service.ended(job)["versions"]["checkpoint"] is not None
 
-
     def list_checkpoints() -> list[Path]:
         return [path for path in service.folder.glob("blobs/??/*") if path.read_bytes()[:2] == b"\x1f\x8b"]
 

@@ -163,6 +163,9 @@ class Projection:
             prior = np.zeros(values.size)
             prior[index] = inverse_std[index] * scale
             response = (moved - base.output) / DIFFERENCE_STEP
+            # A simulation that is almost unstable diverges for some changes, and has no response to them.
+            if not np.isfinite(response).all():
+                continue
             # The estimation part does not depend on the initial states of recordings in the hold-out part; an
             # orthogonal basis of columns that are zero would contain arbitrary directions.
             if not simulation.is_copy[index] or response[target.estimation_part].any():
