@@ -1,6 +1,7 @@
 """Screening: effects are judged by what the parameters of a simulation cannot reproduce."""
 
 import numpy as np
+import pytest
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import Target, evaluate_fit
@@ -12,6 +13,7 @@ from islands.discrepancy.simulators.linear import LinearSimulator
 SAMPLES = 200_000
 
 
+@pytest.mark.ci
 def test_parameter_whose_change_lets_the_simulation_diverge_absorbs_nothing() -> None:
     """An integrator is finite over a record, and a pole slightly above one is not."""
     u = np.random.default_rng(0).standard_normal(SAMPLES)
