@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from support.played import advance, stored
-from support.reading import unreadable
+from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
 from support.service_processes import Service
 from support.stores import taken
@@ -63,15 +63,7 @@ def test_the_key_form_rejects_wrong_keys_and_keeps_a_valid_one(
     assert page.evaluate("sessionStorage.getItem('islands.key')") is None
 
 
-@pytest.mark.parametrize(
-    ("scheme", "width"),
-    [
-        pytest.param("light", 1280, marks=pytest.mark.ci),
-        pytest.param("dark", 360, marks=pytest.mark.ci),
-        pytest.param("light", 360, marks=pytest.mark.nightly),
-        pytest.param("dark", 1280, marks=pytest.mark.nightly),
-    ],
-)
+@pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_key_form_has_sufficient_contrast(
     screens: Callable[..., Screen], locked: Service, width: int, scheme: str
 ) -> None:

@@ -12,7 +12,7 @@ from islands_service.settings import ServiceSettings
 from islands_service.store.blobs import Blobs
 from support.played import stored
 from support.processes import eventually
-from support.reading import unreadable
+from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
 from support.service_processes import Service
 from support.stores import LONG, taken
@@ -160,15 +160,7 @@ def test_figures_are_loaded_when_they_scroll_into_view(
     expect(page.locator(".search img")).to_have_count(4, timeout=60_000)
 
 
-@pytest.mark.parametrize(
-    ("scheme", "width"),
-    [
-        pytest.param("light", 1280, marks=pytest.mark.ci),
-        pytest.param("dark", 360, marks=pytest.mark.ci),
-        pytest.param("light", 360, marks=pytest.mark.nightly),
-        pytest.param("dark", 1280, marks=pytest.mark.nightly),
-    ],
-)
+@pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_models_panel_has_sufficient_contrast(
     opened: Callable[..., Any], finished: str, expect: Any, width: int, scheme: str
 ) -> None:

@@ -2,6 +2,16 @@
 
 from typing import Any
 
+import pytest
+
+#: Colour schemes and widths of a page, the two most different ones at the level ci.
+APPEARANCES = [
+    pytest.param("light", 1280, marks=pytest.mark.ci),
+    pytest.param("dark", 360, marks=pytest.mark.ci),
+    pytest.param("light", 360, marks=pytest.mark.nightly),
+    pytest.param("dark", 1280, marks=pytest.mark.nightly),
+]
+
 #: Minimum contrast of a text (WCAG 2.2, 1.4.3).
 _CONTRAST = 4.5
 

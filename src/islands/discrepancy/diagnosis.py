@@ -126,12 +126,12 @@ def diagnose(
         second = assess_evidence(model_error, fitted, effects, rng)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome
     # Coloured noise may hide a discrepancy that no effect of the catalogue explains.
-    if outcome.verdict != Verdict.NOTHING or outcome.hypothesis.fit.noise.order:
+    is_clean = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
+    if not is_clean:
         progress("comparing with free forms", 0.9)
         forms = select_effects(simulator, context, prior_std, catalogue, free=True)
         outcome = compare_with_free_forms(outcome, forms, fitted, (*effects, *forms), rng, parallel_map)
         effects = [*effects, *(form for form in forms if form in outcome.hypothesis.effects)]
-    is_clean = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
     progress("searching for missing terms", 0.92)
     terms = None if is_clean else find_missing_terms(base, outcome.hypothesis, outcome.screened, target)
     progress("screening alternative causes", 0.95)

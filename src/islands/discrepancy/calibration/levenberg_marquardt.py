@@ -264,6 +264,12 @@ def estimate_covariance(fit: CalibrationResult, target: Target) -> NDArray[np.fl
     return inverse
 
 
+def estimate_deviations(fit: CalibrationResult, target: Target) -> Signal:
+    """Estimate the standard deviations of the fitted values, shape (parameters,)."""
+    deviations: Signal = np.sqrt(np.maximum(np.diag(estimate_covariance(fit, target)), 0.0))
+    return deviations
+
+
 def prior_precision(simulation: ExtendedSimulator, tolerance: Mapping[str, float]) -> tuple[Signal, Signal]:
     """Return the prior of a simulation's values.
 

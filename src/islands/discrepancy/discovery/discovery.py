@@ -9,7 +9,7 @@ import numpy as np
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
     Target,
-    estimate_covariance,
+    estimate_deviations,
     evaluate_fit,
 )
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
@@ -143,7 +143,7 @@ def describe_terms(
         Mean square of the noise.
     """
     fit = found.fit
-    deviations = np.sqrt(np.maximum(np.diag(estimate_covariance(fit, target)), 0.0))
+    deviations = estimate_deviations(fit, target)
     places = {parameter.name: index for index, parameter in enumerate(fit.simulation.parameters)}
     confidence = 1.0 / (1.0 + float(np.exp(-discovery.worse_by / (2 * CONFIDENCE_TEMPERATURE))))
     findings = []

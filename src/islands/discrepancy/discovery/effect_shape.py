@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import estimate_covariance
+from islands.discrepancy.calibration.levenberg_marquardt import estimate_deviations
 from islands.discrepancy.effects.free_forms import PLACES, RATE_RANGE
 from islands.discrepancy.inference.strategies import SearchOutcome
 from islands.discrepancy.interfaces.context import Signal, SimulationContext
@@ -73,8 +73,8 @@ def compare_shapes(outcome: SearchOutcome) -> EffectShape | None:
             effect, fit.values[fit.simulation.get_slice(effect)], context, name, peak * GRID
         )
         part = each.fit.simulation.get_slice(each.effect)
-        variances = np.diag(estimate_covariance(each.fit, outcome.target))[part]
-        free, half_widths = each.fit.values[part], 1.96 * np.sqrt(np.maximum(variances, 0.0))
+        free = each.fit.values[part]
+        half_widths = 1.96 * estimate_deviations(each.fit, outcome.target)[part]
         units = (unit, each.effect.parameters(context)[0].unit)
         return EffectShape(
             *(effect.cause, each.effect.name, name, *units),

@@ -3,12 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import scipy
 
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
-    estimate_covariance,
+    estimate_deviations,
 )
 from islands.discrepancy.inference.confidence import (
     ScoredAlternative,
@@ -120,7 +119,7 @@ def describe_effects(
     """
     findings, equivalents = [], []
     base, hypothesis, target = outcome.base, outcome.hypothesis, outcome.target
-    deviations = np.sqrt(np.maximum(np.diag(estimate_covariance(hypothesis.fit, target)), 0.0))
+    deviations = estimate_deviations(hypothesis.fit, target)
     if len(hypothesis.effects) == 1:
         alternatives: Sequence[Alternatives] = (
             Alternatives(Hypothesis(base, base.score, ()), outcome.screened),
