@@ -58,6 +58,22 @@ def test_long_tick_labels_do_not_cover_the_title_of_the_axis(page: Any) -> None:
         assert tick.bounding_box()["x"] > title["x"] + title["width"]
 
 
+@pytest.mark.parametrize(
+    ("value", "half", "written"),
+    [
+        (99.8312, 0.0617, "99.831 ± 0.062"),
+        (-0.99988, 3.6e-4, "−0.99988 ± 0.00036"),
+        (1234.5, 250.0, "1235 ± 250"),
+        (2.5e-9, 3e-11, "2.500×10⁻⁹ ± 3.0×10⁻¹¹"),
+        (1.0, 0.0, "1.00"),
+    ],
+)
+def test_an_interval_has_two_digits_and_its_value_as_many_decimals(
+    page: Any, value: float, half: float, written: str
+) -> None:
+    assert call(page, "lib/numbers.js", "formatInterval", value, half) == written
+
+
 def test_equal_ratios_are_equal_distances_on_a_logarithmic_axis(page: Any) -> None:
     points = [[at, 10.0**-at] for at in range(5)]
     drawn = heights(draw(page, [{"name": "a", "points": points}], **LOG), "a")

@@ -106,8 +106,19 @@ def test_the_simulation_and_columns_of_a_diagnosis_are_monitored(service, order,
     assert answer.status_code == 201, answer.text
     found = answer.json()["spec"]
     assert (found["input"], found["output"], found["dt"], found["training"]) == ("u_V", "y_um", 0.5, 30)
+    assert found["diagnosis"] == job.id
     assert found["channels"] == (["T_K", "p"] if extended is None else ["T_K"])
     assert found["simulation"]["kind"] == ("bouc-wen-piezo" if extended is None else "extended")
+
+
+def test_a_monitor_is_sent_again_only_if_it_has_changed(service, order):
+    monitor = create(service)
+    path = f"/v1/monitors/{monitor['id']}"
+    tag = {"If-None-Match": service.client.get(path).headers["etag"]}
+    assert service.client.get(path, headers=tag).status_code == 304
+    add(service, monitor, order["dataset"])
+    changed = service.client.get(path, headers=tag)
+    assert (changed.status_code, changed.json()["pending"]) == (200, 1)
 
 
 REFUSED = {

@@ -6,6 +6,8 @@ import { el } from "./lib/dom.js";
 import { mountJob } from "./pages/job.js";
 import { mountJobs } from "./pages/jobs.js";
 import { mountKeyForm } from "./pages/key.js";
+import { mountMonitor } from "./pages/monitor.js";
+import { mountMonitors } from "./pages/monitors.js";
 
 const SCROLL_ITEM = "islands.place";
 
@@ -21,6 +23,16 @@ const ROUTES = [
     pattern: /^\/jobs$/,
     view: (_match, query) => `jobs ${query}`,
     mount: (host, _match, query, signal) => mountJobs(host, Object.fromEntries(query), signal),
+  },
+  {
+    pattern: /^\/monitors\/([^/]+)$/,
+    view: ([, id]) => `monitor ${id}`,
+    mount: (host, [, id], query, signal) => mountMonitor(host, { id }, signal),
+  },
+  {
+    pattern: /^\/monitors$/,
+    view: (_match, query) => `monitors ${query}`,
+    mount: (host, _match, query, signal) => mountMonitors(host, Object.fromEntries(query), signal),
   },
 ];
 
@@ -54,6 +66,7 @@ function show() {
   const page = target.mount(main, target.match, target.query, controller.signal);
   current = { view: target.view, controller, ...page };
   renderTools();
+  markSection();
   if (first) return;
   scrollTo(0, 0);
   main.querySelector("h1")?.focus({ preventScroll: true });
@@ -65,11 +78,20 @@ function showKeyForm({ detail }) {
   key.forget();
   current = { view: "key", controller: new AbortController() };
   renderTools();
+  markSection();
   document.title = "Key · islands";
   mountKeyForm(main, detail, () => {
     current = { view: null, controller: new AbortController() };
     show();
   });
+}
+
+/** Mark the section of the page that is shown. */
+function markSection() {
+  for (const link of document.querySelectorAll(".sections a")) {
+    if (current.view?.startsWith(link.dataset.section)) link.setAttribute("aria-current", "true");
+    else link.removeAttribute("aria-current");
+  }
 }
 
 function renderTools() {

@@ -15,7 +15,7 @@ from math import isfinite
 from operator import itemgetter
 from typing import Annotated, Any, ClassVar
 
-from fastapi import Query, Request, Response
+from fastapi import Header, Query, Request, Response
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 
@@ -172,6 +172,19 @@ Cursor = Annotated[str | None, Query(max_length=200, description="`next` of the 
 
 #: Query parameter of a route that lists: the size of the page.
 Limit = Annotated[int, Query(ge=1, le=200, description="Maximum number of entries of a page.")]
+
+
+#: Header of a route whose response has an entity tag.
+IfNoneMatch = Annotated[str | None, Header(max_length=1000, description="The `ETag` of the last response.")]
+
+#: `Cache-Control` of a response with an entity tag: a cache has to ask whether it is still valid.
+REVALIDATE = "private, no-cache"
+
+
+def matches_etag(if_none_match: str | None, tag: str) -> bool:
+    """Return whether If-None-Match contains an entity tag; it may list several tags, and weak ones."""
+    tags = [each.strip().removeprefix("W/") for each in (if_none_match or "").split(",")]
+    return "*" in tags or tag in tags
 
 
 def encode_cursor(position: tuple[float, str] | None) -> str | None:

@@ -86,10 +86,17 @@ Line = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
 
 
 class MonitorSpec(BaseModel):
-    """Simulation to follow from record to record, and the rate of false alarms."""
+    """Simulation to follow from record to record, and the rate of false alarms.
+
+    Attributes
+    ----------
+    diagnosis : str or None
+        Id of the job whose simulation this is.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    diagnosis: str | None = None
     simulation: SimulationSpec
     input: Annotated[Name, BeforeValidator(check_single)]
     output: Name

@@ -5,7 +5,7 @@
  */
 
 import { el, setText, svg } from "../lib/dom.js";
-import { formatNumber, formatShort } from "../lib/numbers.js";
+import { formatInterval, formatNumber, formatShort } from "../lib/numbers.js";
 import { makeScale } from "../lib/scale.js";
 
 const MARGIN = { right: 12, top: 10, bottom: 36 };
@@ -65,7 +65,15 @@ export function makePath(points, x, y) {
 }
 
 /** Replace values that cannot be drawn by null: NaN, infinity, and on a logarithmic axis zero and below. */
-const maskUndrawable = (log) => ([x, y]) => [x, Number.isFinite(y) && (!log || y > 0) ? y : null];
+const maskUndrawable = (log) => ([x, y, half]) =>
+  [x, Number.isFinite(y) && (!log || y > 0) ? y : null, half];
+
+/** Format the ordinate of a point, with its interval if it has one. */
+const formatPoint = ([, y, half] = []) =>
+  half === undefined ? formatNumber(y) : formatInterval(y, half);
+
+/** Return the ordinates of a point and of the ends of its interval. */
+const getExtent = ([, y, half = 0]) => (half ? [y - half, y + half] : [y]);
 
 const circle = (kind, r, cx, cy) => svg("circle", { class: kind, r, cx, cy });
 
@@ -73,17 +81,21 @@ const circle = (kind, r, cx, cy) => svg("circle", { class: kind, r, cx, cy });
  * Make a chart.
  *
  * `title` is its heading; `x` and `y` are `{label, log, integer}`; with `marks`, points are drawn as circles.
- * `draw(series)` takes `[{name, points: [[x, y], ...], faint}]` with increasing abscissas. Faint series form
- * the background and have no entry in the legend.
+ * `x.describe(at)` replaces the label and number of an abscissa in texts.
+ * `draw(series, events)` takes `[{name, points: [[x, y, half], ...], faint, bare}]`, abscissas increasing.
+ * `half` is half the length of the interval of a point, if it has one and the axis is linear. Faint series
+ * form the background and have no entry in the legend; bare ones have no circles. Events are vertical lines
+ * `{kind, at}` and bands `{kind, from, to}` behind the series.
  */
 export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
+  const describe = xAxis.describe ?? ((at) => `${xAxis.label} ${formatShort(at)}`);
   const drawing = svg("svg", { "aria-hidden": "true" });
   const plot = el("div", { class: "plot", tabindex: "0", role: "slider", "aria-label": title }, drawing);
   const legend = el("ul", { class: "legend" });
   const position = el("p", { class: "position soft" });
   const caption = el("figcaption", {}, el("h3", {}, title), position);
   const node = el("figure", { class: "chart", hidden: true }, caption, plot, legend);
-  let series = [];
+  let [series, events] = [[], []];
   let scales = null;
   let pointedX = null;
 
@@ -92,7 +104,7 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
 
   function updateScales(width) {
     const points = series.flatMap((each) => each.points);
-    const values = points.map((point) => point[1]).filter((value) => value !== null);
+    const values = points.filter(([, value]) => value !== null).flatMap(getExtent);
     const y = makeScale(values, [HEIGHT - MARGIN.bottom, MARGIN.top], { log: yAxis.log, padding: 0.05 });
     const longest = Math.max(0, ...y.ticks.map((value) => formatShort(value).length));
     const left = Math.max(LEFT.least, LEFT.space + LEFT.character * longest);
@@ -136,16 +148,35 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
     ];
   }
 
+  function makeEvent({ kind, at, from = at, to = at }) {
+    const [left, right] = [scales.x.at(from), scales.x.at(to)];
+    const [y, height] = [MARGIN.top, HEIGHT - MARGIN.bottom - MARGIN.top];
+    // A band of a single abscissa would be invisible.
+    return at === undefined
+      ? svg("rect", { class: kind, x: left - 3, width: right - left + 6, y, height })
+      : svg("line", { class: kind, x1: left, x2: left, y1: y, y2: y + height });
+  }
+
+  function makeInterval(kind, [at, y, half]) {
+    const x = scales.x.at(at);
+    return svg("line", { class: kind, x1: x, x2: x, y1: scales.y.at(y - half), y2: scales.y.at(y + half) });
+  }
+
   function makeLines(width) {
     let at = 0;
     const stretches = Math.max(60, Math.min(width, 60_000 / series.length));
-    return series.flatMap(({ points, faint, name }) => {
+    return series.flatMap(({ points, faint, name, bare }) => {
       const kind = faint ? "faint" : `line s${at % COLOURS}${at >= COLOURS ? " dashed" : ""}`;
       if (!faint) at += 1;
-      const d = makePath(downsample(points, stretches), scales.x, scales.y);
-      const marked = marks ? points.filter((point) => point[1] !== null) : [];
+      const shown = downsample(points, stretches);
+      const d = makePath(shown, scales.x, scales.y);
+      const known = shown.filter((point) => point[1] !== null);
       const dot = ([px, py]) => circle(kind, 3.5, scales.x.at(px), scales.y.at(py));
-      return [svg("path", { class: kind, "data-name": name, d }), ...marked.map(dot)];
+      return [
+        ...known.filter(([, , half]) => half).map((point) => makeInterval(`${kind} interval`, point)),
+        svg("path", { class: kind, "data-name": name, d }),
+        ...(marks && !bare ? known.map(dot) : []),
+      ];
     });
   }
 
@@ -156,7 +187,12 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
     drawing.setAttribute("width", width);
     drawing.setAttribute("height", HEIGHT);
     updateScales(width);
-    drawing.replaceChildren(...makeAxes(width), ...makeLines(width), svg("g", { class: "pointer" }));
+    drawing.replaceChildren(
+      ...events.map(makeEvent),
+      ...makeAxes(width),
+      ...makeLines(width),
+      svg("g", { class: "pointer" }),
+    );
     updatePointer();
   }
 
@@ -166,14 +202,14 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
     if (!points.length || scales === null) return;
     const [x] = pointedX === null ? points.at(-1) : findNearest(points, pointedX);
     const found = getNamedSeries().map((each) => findNearest(each.points, x));
-    setText(position, `${xAxis.label} ${formatShort(x)}`);
+    setText(position, describe(x));
     const values = [...legend.querySelectorAll("data")];
     found.forEach((value, at) => {
       values[at].value = value?.[1] ?? "";
-      setText(values[at], formatNumber(value?.[1]));
+      setText(values[at], formatPoint(value));
     });
-    const texts = getNamedSeries().map((each, at) => `${each.name} ${formatNumber(found[at]?.[1])}`);
-    const text = `${xAxis.label} ${formatShort(x)}: ${texts.join(", ")}`;
+    const texts = getNamedSeries().map((each, at) => `${each.name} ${formatPoint(found[at])}`);
+    const text = `${describe(x)}: ${texts.join(", ")}`;
     const aria = { min: points[0][0], max: points.at(-1)[0], now: x, text };
     for (const [name, value] of Object.entries(aria)) plot.setAttribute(`aria-value${name}`, value);
     const at = scales.x.at(x);
@@ -211,7 +247,8 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
     });
   new ResizeObserver(render).observe(plot);
 
-  function draw(newSeries) {
+  function draw(newSeries, newEvents = []) {
+    events = newEvents;
     series = newSeries.map((each) => ({ ...each, points: each.points.map(maskUndrawable(yAxis.log)) }));
     const names = getNamedSeries().map((each) => each.name);
     if (names.join("\n") !== [...legend.children].map((item) => item.dataset.name).join("\n"))

@@ -100,9 +100,10 @@ function formatValidation({ validation: value }) {
 }
 
 /** Format the kind and the parameters of a simulation. */
-function formatSimulation({ kind, name, column, ...options }) {
+export function formatSimulation({ kind, name, column, ...options }) {
   const parameters = Object.entries(options.parameters ?? {}).map(
-    ([each, value]) => `${each} = ${formatShort(value)}`,
+    // A parameter of equations has a value, a unit and a tolerance.
+    ([each, value]) => `${each} = ${formatShort(value.value ?? value)}`,
   );
   return [kind, name ?? column, parameters.join(", ")].filter(Boolean).join(": ");
 }
@@ -123,6 +124,8 @@ const listSearchFacts = (spec) => [
   ["Validated on", formatValidation(spec)],
 ];
 
+const makeMonitorLink = (id) => el("a", { href: `#/monitors/${id}` }, id.slice(0, 8));
+
 /** Make the panel of the settings of a job. Settings that are not given have the default of the service. */
 export function makeSettingsPanel(spec) {
   const changed = Object.entries(spec.settings ?? {}).map(([name, value]) => [
@@ -134,7 +137,7 @@ export function makeSettingsPanel(spec) {
     { class: "card" },
     el("h2", {}, "Settings"),
     makeFacts([
-      ["Monitor", spec.monitor],
+      ["Monitor", spec.monitor && makeMonitorLink(spec.monitor)],
       ["Record", spec.name],
       ["Time", spec.time],
       ["Inputs", getInputs(spec).join(", ")],

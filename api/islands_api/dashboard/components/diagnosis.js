@@ -1,6 +1,7 @@
 /** Result in words of a discrepancy job, with its report, or of a record of a monitor. */
 
 import { el } from "../lib/dom.js";
+import { makeMonitorForm } from "./monitoring/monitor_form.js";
 import { makeReportButtons, makeSaveButton } from "./report.js";
 
 /** Return whether a job is a discrepancy diagnosis. */
@@ -31,5 +32,6 @@ export function makeFindingsPanel(job) {
       isDiagnosis(job) ? makeReportButtons(job) : null,
       isNamed ? makeSaveButton(job, "Save the extended simulation", "extended", file) : null,
     ),
+    isDiagnosis(job) ? makeMonitorForm(job) : null,
   );
 }

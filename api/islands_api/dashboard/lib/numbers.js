@@ -4,6 +4,9 @@ export const NONE = "–";
 
 const SUPERSCRIPTS = { "-": "⁻", ...[..."⁰¹²³⁴⁵⁶⁷⁸⁹"] };
 
+/** Maximum number of decimals of a value with an interval that is written without a power of ten. */
+const MAX_DECIMALS = 8;
+
 /** Format a number with a number of significant digits; a dash if it is not finite. */
 export function formatNumber(value, digits = 3) {
   if (typeof value !== "number" || !Number.isFinite(value)) return NONE;
@@ -25,6 +28,17 @@ export function formatShort(value) {
   const [mantissa, exponent] = text.split("×");
   const trimmed = mantissa.includes(".") ? mantissa.replace(/\.?0+$/, "") : mantissa;
   return exponent === undefined ? trimmed : `${trimmed}×${exponent}`;
+}
+
+/** Format a value and half the length of its interval, both to two digits of the latter: `99.831 ± 0.062`. */
+export function formatInterval(value, half) {
+  if (!Number.isFinite(value) || !(half > 0)) return formatNumber(value);
+  const size = Math.max(Math.abs(value), half);
+  const decimals = 1 - Math.floor(Math.log10(half));
+  if (decimals >= 0 && decimals <= MAX_DECIMALS && size < 1e6)
+    return `${value.toFixed(decimals).replace("-", "−")} ± ${half.toFixed(decimals)}`;
+  const digits = Math.floor(Math.log10(size)) + decimals + 1;
+  return `${formatNumber(value, Math.min(12, Math.max(2, digits)))} ± ${formatNumber(half, 2)}`;
 }
 
 /** Format a count with thousands separators. */

@@ -1,4 +1,4 @@
-/** Polling of the service, and following the events of a job. */
+/** Polling of the service, and following a job or a monitor. */
 
 import { clearBanner, showProblem } from "../components/banner.js";
 import { isEnded } from "../components/job_state.js";
@@ -9,6 +9,9 @@ const ENDED_POLL_SECONDS = 5;
 
 /** Minimum number of seconds until the next attempt after a problem. */
 const PROBLEM_RETRY_SECONDS = 5;
+
+/** Seconds between two requests for a monitor while records are analysed, and otherwise. */
+const [ANALYSIS_POLL_SECONDS, MONITOR_POLL_SECONDS] = [1, 4];
 
 function waitUntilVisible(signal) {
   return new Promise((resolve) => {
@@ -92,18 +95,42 @@ export function followJob(id, { show, lost }, signal) {
     return 0;
   }
 
-  const wake = poll(async () => {
-    try {
-      return await followUntilEnd();
-    } catch (error) {
-      if (error.status !== 404) throw error;
-      lost(error);
-      return Infinity;
-    }
-  }, signal);
+  const wake = poll(endIfLost(followUntilEnd, lost), signal);
 
   return (job) => {
     update(job);
     wake();
   };
+}
+
+/** Return a task that ends if its resource does not exist. */
+const endIfLost = (task, lost) => async () => {
+  try {
+    return await task();
+  } catch (error) {
+    if (error.status !== 404) throw error;
+    lost(error);
+    return Infinity;
+  }
+};
+
+/**
+ * Follow the monitor at a path: call `show(monitor)` at each change, `lost(problem)` if it does not exist.
+ * Return a function that asks for it immediately.
+ */
+export function followMonitor(path, { show, lost }, signal) {
+  let [current, tag] = [null, null];
+
+  async function check() {
+    const headers = tag === null ? {} : { "If-None-Match": tag };
+    const response = await sendRequest(path, { headers, signal });
+    if (response.status !== 304) {
+      current = await response.json();
+      tag = response.headers.get("etag");
+      if (!signal.aborted) show(current);
+    }
+    return current.pending ? ANALYSIS_POLL_SECONDS : MONITOR_POLL_SECONDS;
+  }
+
+  return poll(endIfLost(check, lost), signal);
 }

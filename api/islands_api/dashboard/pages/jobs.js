@@ -12,6 +12,7 @@ import {
   makeBadge,
   makeProgressBar,
 } from "../components/job_state.js";
+import { makePagedTable } from "../components/paged_table.js";
 import { getJson } from "../lib/api.js";
 import { makeAge } from "../lib/clock.js";
 import { announce, el, setText } from "../lib/dom.js";
@@ -70,23 +71,6 @@ function makeRow(job) {
   }
   show(job);
   return { node, show };
-}
-
-/** Update the rows of the table body. Rows that remain are not moved, because one may have the focus. */
-function updateRows(body, rows, jobs) {
-  const wanted = new Set(jobs.map((job) => job.id));
-  for (const [id, { node }] of rows) {
-    if (!wanted.has(id)) {
-      node.remove();
-      rows.delete(id);
-    }
-  }
-  jobs.forEach((job, at) => {
-    if (rows.has(job.id)) rows.get(job.id).show(job);
-    else rows.set(job.id, makeRow(job));
-    const { node } = rows.get(job.id);
-    if (body.children[at] !== node) body.insertBefore(node, body.children[at] ?? null);
-  });
 }
 
 const makeCommandBlock = (title, text) =>
@@ -148,43 +132,26 @@ function makeEmptyMessage(state, cursor) {
 /** Show the list in a host until the signal aborts. */
 export function mountJobs(host, { state = "", cursor = "" }, signal) {
   document.title = "Jobs · islands";
-  const headings = ["State", "Job", "Progress", "Best error", "Submitted", "Attempt"];
-  const body = el("tbody");
-  const table = el(
-    "table",
-    { class: "jobs" },
-    el("caption", { class: "visually-hidden" }, "Jobs, newest first"),
-    el("thead", {}, el("tr", {}, headings.map((name, at) =>
-      el("th", { scope: "col", class: at > 2 ? "figure" : null }, name)))),
-    body,
-  );
-  const list = el("div", {}, el("p", { class: "loading" }, "Loading…"));
-  const pages = el("nav", { class: "pages", "aria-label": "Pages" });
-  const rows = new Map();
-  let isEmpty = null;
-
-  function show({ items, next }) {
-    updateRows(body, rows, items);
-    if (isEmpty !== (items.length === 0)) {
-      isEmpty = items.length === 0;
-      list.replaceChildren(isEmpty ? makeEmptyMessage(state, cursor) : table);
-    }
-    const links = [cursor && ["← Newest", makeAddress(state)], next && ["Older →", makeAddress(state, next)]];
-    const wanted = links.filter(Boolean);
-    if (wanted.map(String).join() !== [...pages.children].map((a) => [a.textContent, a.hash]).join())
-      pages.replaceChildren(...wanted.map(([name, href]) => el("a", { class: "button", href }, name)));
-  }
-
+  const table = makePagedTable({
+    caption: "Jobs, newest first",
+    headings: [
+      ...["State", "Job", "Progress"],
+      ...["Best error", "Submitted", "Attempt"].map((name) => [name, "figure"]),
+    ],
+    makeRow,
+    makeEmptyMessage: () => makeEmptyMessage(state, cursor),
+    makeAddress: (next) => makeAddress(state, next),
+    cursor,
+  });
   host.replaceChildren(
     el("div", { class: "heading" }, el("h1", { tabindex: "-1" }, "Jobs"), makeFilters(state)),
-    list,
-    pages,
+    ...table.nodes,
   );
   poll(async () => {
     const filter = { ...(state && { state }), ...(cursor && { cursor }) };
     const query = new URLSearchParams({ limit: PAGE_SIZE, ...filter });
     const page = await getJson(`v1/jobs?${query}`, { signal });
-    if (!signal.aborted) show(page);
+    if (!signal.aborted) table.show(page);
     return page.items.every(isEnded) ? IDLE_POLL_SECONDS : ACTIVE_POLL_SECONDS;
   }, signal);
   return {};

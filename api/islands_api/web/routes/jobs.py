@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Path, Query, Response
+from fastapi import APIRouter, Path, Query, Response
 
 from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView
 from islands_api.web.auth import Reader, Writer
@@ -18,7 +18,16 @@ from islands_api.web.job_submission import (
     submit_job,
 )
 from islands_api.web.problems import RESPONSES
-from islands_api.web.requests import Cursor, JSONRoute, Limit, decode_cursor, encode_cursor
+from islands_api.web.requests import (
+    REVALIDATE,
+    Cursor,
+    IfNoneMatch,
+    JSONRoute,
+    Limit,
+    decode_cursor,
+    encode_cursor,
+    matches_etag,
+)
 from islands_api.web.responses import JSONDocument, JSONItems, job_document
 from islands_service.domain.job import IDENTIFICATION, TERMINAL, Job, JobState
 
@@ -86,21 +95,19 @@ async def job(
     wait: Annotated[
         float, Query(ge=0.0, le=60.0, description="Seconds to wait for a change since `If-None-Match`.")
     ] = 0.0,
-    if_none_match: Annotated[
-        str | None, Header(max_length=1000, description="The `ETag` of the last response.")
-    ] = None,
+    if_none_match: IfNoneMatch = None,
 ) -> Any:
     """Return a job. With `If-None-Match`, the status is 304 if the job has not changed.
 
     `progress.position` of a queued job changes with other jobs: read it without `If-None-Match`.
     """
     found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
-    if wait and _matches_etag(if_none_match, found) and found.state not in TERMINAL:
+    if wait and matches_etag(if_none_match, etag(found)) and found.state not in TERMINAL:
         found = await _wait_for_change(state, found, wait)
-    headers = {"ETag": etag(found), "Cache-Control": "private, no-cache"}
+    headers = {"ETag": etag(found), "Cache-Control": REVALIDATE}
     if found.state not in TERMINAL:
         headers["Retry-After"] = "1"
-    if _matches_etag(if_none_match, found):
+    if matches_etag(if_none_match, etag(found)):
         return Response(status_code=304, headers=headers)
     return JSONDocument(await describe_job(state, found), headers=headers)
 
@@ -156,9 +163,3 @@ async def _wait_for_change(state: AppState, job: Job, seconds: float) -> Job:
     with state.hub.subscribe(job.id, job.version) as feed:
         await state.hub.wait(feed, job.version, seconds)
     return await state.run_blocking(state.store.jobs.get, job.owner, job.id)
-
-
-def _matches_etag(if_none_match: str | None, job: Job) -> bool:
-    """Return whether If-None-Match contains the tag of a job; it may list several tags, and weak ones."""
-    tags = [tag.strip().removeprefix("W/") for tag in (if_none_match or "").split(",")]
-    return "*" in tags or etag(job) in tags

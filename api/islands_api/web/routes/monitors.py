@@ -18,7 +18,16 @@ from islands_api.web.job_submission import (
     get_result,
 )
 from islands_api.web.problems import RESPONSES, ResourceNotFoundError
-from islands_api.web.requests import Cursor, JSONRoute, Limit, decode_cursor, encode_cursor
+from islands_api.web.requests import (
+    REVALIDATE,
+    Cursor,
+    IfNoneMatch,
+    JSONRoute,
+    Limit,
+    decode_cursor,
+    encode_cursor,
+    matches_etag,
+)
 from islands_api.web.responses import JSONDocument, json_text, monitor_summary
 from islands_service.domain.job import DISCREPANCY, EXTENDED, MONITORING, Submission
 from islands_service.domain.job_spec import parse_discrepancy
@@ -43,6 +52,13 @@ _CREATED: dict[int | str, dict[str, Any]] = {
         "description": "Created.",
         "headers": {"Location": {"description": "Path of the monitor.", "schema": {"type": "string"}}},
     }
+}
+
+_ETAG = {"description": "Version of the monitor, for `If-None-Match`.", "schema": {"type": "string"}}
+
+_CONDITIONAL: dict[int | str, dict[str, Any]] = {
+    200: {"headers": {"ETag": _ETAG}},
+    304: {"description": "Not changed.", "headers": {"ETag": _ETAG}},
 }
 
 
@@ -77,11 +93,18 @@ async def monitors(caller: Reader, state: AppStateDep, cursor: Cursor = None, li
     return JSONDocument({"items": [monitor_summary(each) for each in page], "next": encode_cursor(after)})
 
 
-@router.get("/{monitor}", response_model=MonitorView)
-async def monitor(monitor: Id, caller: Reader, state: AppStateDep) -> Any:
-    """Return a monitor: the states of the effects in each record, and the alarms with their beginning."""
+@router.get("/{monitor}", response_model=MonitorView, responses=_CONDITIONAL)
+async def monitor(monitor: Id, caller: Reader, state: AppStateDep, if_none_match: IfNoneMatch = None) -> Any:
+    """Return a monitor: the states of the effects in each record, and the alarms with their beginning.
+
+    With `If-None-Match`, the status is 304 if the monitor has not changed.
+    """
+    found = await state.run_blocking(state.store.monitors.get, caller.owner, monitor)
+    if matches_etag(if_none_match, tag := _make_etag(found)):
+        return Response(status_code=304, headers={"ETag": tag, "Cache-Control": REVALIDATE})
     found, document = await state.run_blocking(state.store.monitors.result, caller.owner, monitor)
-    return Response(_render(found, document), media_type="application/json")
+    headers = {"ETag": _make_etag(found), "Cache-Control": REVALIDATE}
+    return Response(_render(found, document), headers=headers, media_type="application/json")
 
 
 @router.get("/{monitor}/state", response_model=dict[str, Any])
@@ -149,10 +172,20 @@ async def _make_spec(state: AppState, caller: Principal, request: MonitorRequest
         text = await state.run_blocking(state.blobs.read, blob)
         simulation = ExtendedSpec.model_validate(json.loads(text))
         columns = simulation.inputs
-    known: dict[str, Any] = {"input": columns[0], "output": asked.output, "channels": columns[1:]}
+    known: dict[str, Any] = {
+        "diagnosis": job.id,
+        "input": columns[0],
+        "output": asked.output,
+        "channels": columns[1:],
+    }
     if asked.dt is not None:
         known["dt"] = asked.dt
     return MonitorSpec.model_validate({"simulation": simulation, **known, **given})
+
+
+def _make_etag(monitor: Monitor) -> str:
+    """Return the tag of a monitor; records that are submitted change it as well."""
+    return f'"{monitor.version}-{monitor.pending}"'
 
 
 def _render(monitor: Monitor, document: str | None) -> bytes:

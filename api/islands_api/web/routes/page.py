@@ -22,6 +22,7 @@ FILES = {
     "icon.svg": "image/svg+xml",
     "islands.css": _STYLE,
     "job.css": _STYLE,
+    "monitor.css": _STYLE,
     "islands.js": _SCRIPT,
     "components/banner.js": _SCRIPT,
     "components/chart.js": _SCRIPT,
@@ -33,6 +34,12 @@ FILES = {
     "components/figures.js": _SCRIPT,
     "components/job_state.js": _SCRIPT,
     "components/models.js": _SCRIPT,
+    "components/monitoring/monitor_form.js": _SCRIPT,
+    "components/monitoring/monitor_status.js": _SCRIPT,
+    "components/monitoring/record_table.js": _SCRIPT,
+    "components/monitoring/record_upload.js": _SCRIPT,
+    "components/monitoring/state_charts.js": _SCRIPT,
+    "components/paged_table.js": _SCRIPT,
     "components/report.js": _SCRIPT,
     "lib/api.js": _SCRIPT,
     "lib/clock.js": _SCRIPT,
@@ -43,6 +50,8 @@ FILES = {
     "pages/job.js": _SCRIPT,
     "pages/jobs.js": _SCRIPT,
     "pages/key.js": _SCRIPT,
+    "pages/monitor.js": _SCRIPT,
+    "pages/monitors.js": _SCRIPT,
 }
 
 

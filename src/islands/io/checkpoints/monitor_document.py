@@ -5,6 +5,7 @@ from typing import Any
 
 from islands.discrepancy.monitoring.record_follower import Alarm, MonitoredRecord, MonitorState
 from islands.io.checkpoints.monitor_state import SavedMonitor
+from islands.io.result_text.monitor_text import describe_change
 
 SCHEMA = "islands.monitor/1"
 
@@ -70,7 +71,7 @@ def describe_record(state: MonitorState, record: MonitoredRecord) -> dict[str, A
 
 
 def describe_alarm(state: MonitorState, alarm: Alarm) -> dict[str, Any]:
-    """Return an alarm with the names and times of its records."""
+    """Return an alarm with the names and times of its records, and in words."""
 
     def place(index: int) -> dict[str, Any]:
         record = state.records[index]
@@ -79,6 +80,7 @@ def describe_alarm(state: MonitorState, alarm: Alarm) -> dict[str, Any]:
     return {
         "record": place(alarm.record),
         "kind": str(alarm.kind),
+        "words": describe_change(state, alarm),
         "cause": alarm.cause or None,
         "since": place(alarm.since),
         "since_ci95": [place(alarm.earliest), place(alarm.latest)],

@@ -25,6 +25,11 @@ def describe_last_record(state: MonitorState) -> str:
 
 
 def describe_alarm_text(state: MonitorState, alarm: Alarm) -> str:
+    """Return one line on an alarm, as `describe_change`."""
+    return f"ALARM: {describe_change(state, alarm)}"
+
+
+def describe_change(state: MonitorState, alarm: Alarm) -> str:
     """Return an alarm in words: cause, since when, size, and causes that explain it as well."""
     is_ramp = alarm.form == ChangeForm.RAMP
     match alarm.kind:
@@ -48,7 +53,7 @@ def describe_alarm_text(state: MonitorState, alarm: Alarm) -> str:
     if alarm.earliest != alarm.latest:
         since += f" (95 %: {_name(state, alarm.earliest)} to {_name(state, alarm.latest)})"
     also = f"; {', '.join(alarm.equivalents[:4])} would explain it as well" if alarm.equivalents else ""
-    return f"ALARM: {what}, {since}{also}"
+    return f"{what}, {since}{also}"
 
 
 def _name(state: MonitorState, index: int) -> str:
