@@ -116,6 +116,10 @@ class MonitorSummary(ResponseModel):
     priority: int
     created: datetime
     updated: datetime = Field(description="Time at which the last record was analysed.")
+    last_alarm: dict[str, Any] | None = Field(
+        default=None,
+        description="The last alarm: its record, kind and cause, since when, and `words`. None without one.",
+    )
 
 
 class MonitorView(MonitorSummary):
@@ -124,8 +128,17 @@ class MonitorView(MonitorSummary):
     spec: dict[str, Any] = Field(description="Simulation, columns and settings.")
     result: dict[str, Any] | None = Field(
         default=None,
-        description="As `monitor.json` of the command line: parameters, states of the effects in each "
-        "record, alarms with their beginning, and rejected records; null before the first record.",
+        description="As `monitor.json` of the command line without its records: parameters, effects, and "
+        "alarms with their beginning; null before the first record.",
+    )
+
+
+class MonitorRecordPage(ResponseModel):
+    """Page of the records of a monitor, in the order in which they were analysed."""
+
+    items: tuple[dict[str, Any], ...] = Field(
+        description="As in `monitor.json`: states of the effects of an analysed record, or the reason of a "
+        "rejected one, and the `index` of the record."
     )
 
 

@@ -1,6 +1,5 @@
 """Pages of monitors; the test acts as the coordinator and stores the states of real records."""
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -9,10 +8,10 @@ from typing import Any
 import pytest
 
 from islands.io.checkpoints.monitor_document import describe_status, monitor_document
-from islands.io.checkpoints.monitor_state import SavedMonitor, monitor_to_json
+from islands.io.checkpoints.monitor_state import SavedMonitor
 from islands.io.records import write_record
 from islands_service.domain.job import JobOutcome, JobState
-from islands_service.domain.monitoring import MonitorStatus, MonitorUpdate
+from support.monitor_updates import store_monitor
 from support.monitored_oscillator import ONSET, follow, make_records, undisturbed_monitor
 from support.monitoring_jobs import OSCILLATOR
 from support.played import stored
@@ -53,18 +52,9 @@ def store_states(desk: Service, monitor: str, job: str, saved: SavedMonitor) -> 
     """End the job of a record with the states of a monitor."""
     with stored(desk) as store:
         lease = taken(store, job)
-        update = MonitorUpdate(
-            monitor,
-            store.monitors.get(lease.job.owner, monitor).version,
-            MonitorStatus(describe_status(saved.state)),
-            len(saved.state.records),
-            len(saved.state.alarms),
-            monitor_to_json(saved),
-            json.dumps(monitor_document(saved)),
-            False,
-        )
-        summary = {"status": update.status, "words": "analysed"}
-        store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {}, summary=summary, monitor=update))
+        store_monitor(store, monitor, saved)
+        summary = {"status": describe_status(saved.state), "words": "analysed"}
+        store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {}, summary=summary))
 
 
 @pytest.fixture(scope="module")
@@ -133,4 +123,6 @@ def test_the_page_of_a_monitor_follows_its_records_and_marks_the_alarm(
     read = re.compile(rf"^record 1, 2026-11-01 00:00: k {re.escape(value)}\d* ± 0\.\d+$")
     expect(slider).to_have_attribute("aria-valuetext", read)
     page.get_by_role("link", name="← Monitors").click()
-    expect(page.locator(f"tr[data-monitor='{monitor}'] td.figure").first).to_have_text(str(COUNT))
+    row = page.locator(f"tr[data-monitor='{monitor}']")
+    expect(row.locator(".change")).to_contain_text(alarm["words"].split(",")[0])
+    expect(row.locator("td.figure").first).to_have_text(str(COUNT))

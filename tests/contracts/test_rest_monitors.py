@@ -8,11 +8,13 @@ import islands
 from islands.discrepancy.monitoring import alarm_rate, record_follower
 from islands.errors import RecordError
 from islands.facade.record_monitor import reject_record
+from islands.io.checkpoints import monitor_state
 from islands.io.checkpoints.monitor_document import monitor_document
 from islands.io.checkpoints.monitor_state import monitor_to_json
 from islands_api.client import Client
 from islands_service.domain import monitor_spec
 from islands_service.domain.job import DISCREPANCY, EXTENDED, JobOutcome, JobState
+from islands_service.store import monitor_states
 from islands_service.store.blobs import Blobs
 from support.monitored_oscillator import make_records
 from support.monitoring_jobs import OSCILLATOR, add_file, analyse_next, write_records
@@ -61,6 +63,7 @@ def test_the_defaults_of_the_service_are_those_of_the_library():
         record_follower.TRAINING,
         record_follower.MIN_TRAINING,
     )
+    assert monitor_states.STATE_SCHEMA == monitor_state.SCHEMA
 
 
 def test_the_client_creates_reads_lists_and_deletes_monitors(service):
@@ -156,7 +159,7 @@ def test_a_monitor_of_another_owner_is_not_found(service, order):
     monitor = create(service)
     foreign = service.key("read", "write", owner="other")
     path = f"/v1/monitors/{monitor['id']}"
-    for method, where in (("GET", ""), ("GET", "/state"), ("DELETE", "")):
+    for method, where in (("GET", ""), ("GET", "/state"), ("GET", "/records"), ("DELETE", "")):
         answer = service.client.request(method, path + where, headers=foreign)
         problem_of(answer, 404, "no-such-monitor")
     problem_of(add(service, monitor, order["dataset"], foreign), 404, "no-such-monitor")
@@ -198,13 +201,19 @@ def test_records_over_rest_give_the_bits_of_the_library(service, tmp_path):
                 saved = islands.monitor_record(saved, record, path.name, "2026-11-23T01:00:00")
         found = client.monitor(monitor)
         assert client.monitor_state(monitor) == monitor_to_json(saved)
-        assert found.result == json.loads(json.dumps(monitor_document(saved)))
+        document = json.loads(json.dumps(monitor_document(saved)))
+        analysed, rejected = document.pop("records"), document.pop("rejected")
+        assert found.result == document
+        for listed, is_rejected in ((analysed, False), (rejected, True)):
+            page = client.monitor_records(monitor, rejected=is_rejected).items
+            assert page == tuple({"index": at, **each} for at, each in enumerate(listed))
+            assert client.monitor_records(monitor, 0, rejected=is_rejected).items == page[1:]
         assert (found.status, found.records, found.alarms, found.pending) == ("training", 2, 0, 0)
         states = [each.state for each in outcomes]
         assert states == ["succeeded", "failed", "succeeded", "succeeded"]
         assert "at least 200" in client.job(jobs[1]).problem["detail"]
         assert client.job(jobs[2]).summary["words"] == "hour-0.csv was analysed before"
         result = client.result(jobs[3])
-        assert result["record"] == found.result["records"][-1]
+        assert result["record"] == {"index": 1, **analysed[-1]}
         assert result["alarms"] == []
         problem_of(service.client.get(f"/v1/jobs/{jobs[3]}/report"), 404, "not-found")

@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from islands_service.domain.job import MONITORING, JobOutcome, JobState, LeaseLostError, QuotaError, Requester
-from islands_service.domain.monitoring import MonitorNotFoundError, MonitorStatus, MonitorUpdate
+from islands_service.domain.monitoring import MonitorNotFoundError, MonitorStatus
+from support.monitor_updates import make_entry, make_update
 from support.stores import (
     ALICE,
     BOB,
@@ -35,23 +36,15 @@ def added(store, monitor, number=0, **changes):
 
 def analysed(store, lease, is_alarm=False):
     """Return the outcome of a record that is added to the current state of its monitor."""
-    monitor, state = store.monitors.load(lease.job.owner, lease.job.spec["monitor"])
-    records = [*json.loads(state or "[]"), lease.job.spec["number"]]
-    update = MonitorUpdate(
-        monitor.id,
-        monitor.version,
-        MonitorStatus.ALARM if is_alarm else MonitorStatus.NORMAL,
-        len(records),
-        monitor.alarms + is_alarm,
-        json.dumps(records),
-        json.dumps({"records": len(records)}),
-        is_alarm,
-    )
+    monitor = store.monitors.get(lease.job.owner, lease.job.spec["monitor"])
+    records = [*records_of(store, monitor), lease.job.spec["number"]]
+    update = make_update(monitor, records, is_alarm)
     return JobOutcome(JobState.SUCCEEDED, {"number": lease.job.spec["number"]}, monitor=update)
 
 
 def records_of(store, monitor):
-    return json.loads(store.monitors.load(monitor.owner, monitor.id)[1] or "[]")
+    _, states = store.monitors.load(monitor.owner, monitor.id)
+    return [] if states is None else [json.loads(each) for each in states.records]
 
 
 def test_a_new_monitor_waits_for_its_first_record(store):
@@ -143,6 +136,57 @@ def test_an_update_of_an_earlier_version_of_the_monitor_changes_nothing(store):
     store.leases.finish(lease, outcome)
 
 
+def analyse(store, monitor, **changes):
+    """Submit and analyse one more record."""
+    added(store, monitor, store.monitors.get(ALICE, monitor.id).records)
+    lease = claimed(store)
+    outcome = analysed(store, lease)
+    store.leases.finish(lease, replace(outcome, monitor=replace(outcome.monitor, **changes)))
+
+
+def test_a_record_is_stored_once_and_later_ones_do_not_change_its_row(store):
+    monitor = created(store)
+    analyse(store, monitor)
+    (first,) = contents(store)["monitor_records"]
+    for _ in range(2):
+        analyse(store, monitor)
+    rows = contents(store)["monitor_records"]
+    assert len(rows) == 3
+    assert first in rows
+
+
+def test_only_the_records_since_the_start_are_loaded(store):
+    monitor = created(store)
+    analyse(store, monitor)
+    analyse(store, monitor)
+    analyse(store, monitor, start=2)
+    _, states = store.monitors.load(ALICE, monitor.id)
+    assert (states.start, states.records) == (2, ("2",))
+    assert json.loads(store.monitors.saved(ALICE, monitor.id))["state"]["records"] == [0, 1, 2]
+
+
+def test_records_are_read_in_pages_and_found_by_name_and_content(store):
+    monitor = created(store)
+    for _ in range(3):
+        analyse(store, monitor)
+    rejected = make_entry(9, 0, is_rejected=True)
+    analyse(store, monitor, records=3, entry=rejected)
+    found, after = [], -1
+    while page := store.monitors.records(ALICE, monitor.id, False, after, 2):
+        found += page
+        after = json.loads(page[-1])["index"]
+    assert [json.loads(each)["index"] for each in found] == [0, 1, 2]
+    assert store.monitors.records(ALICE, monitor.id, True) == [rejected.document]
+    same = ("record 1", f"{1:064x}")
+    assert store.monitors.find_record(monitor.id, *same, is_rejected=False) == found[1]
+    for name, sha256, is_rejected in ((*same, True), ("record 1", "", False), ("other", same[1], False)):
+        assert store.monitors.find_record(monitor.id, name, sha256, is_rejected=is_rejected) is None
+    with pytest.raises(MonitorNotFoundError):
+        store.monitors.records(BOB, monitor.id, False)
+    store.monitors.delete(ALICE, monitor.id)
+    assert contents(store)["monitor_records"] == []
+
+
 def test_an_alarm_is_delivered_once_to_every_webhook_that_asks_for_it(store):
     webhook, _ = store.webhooks.create(ALICE, "https://hooks.example.org/a", ("monitor.alarm",), 9)
     other, _ = store.webhooks.create(ALICE, "https://hooks.example.org/b", ("job.failed",), 9)
@@ -161,6 +205,7 @@ def test_an_alarm_is_delivered_once_to_every_webhook_that_asks_for_it(store):
     assert body["data"]["links"]["monitor"] == f"/v1/monitors/{monitor.id}"
     statistics = store.monitors.statistics()
     assert (statistics.counts[MonitorStatus.ALARM], statistics.alarms) == (1, 1)
+    assert store.monitors.get(ALICE, monitor.id).last_alarm["record"] == {"index": 1}
 
 
 def test_deletion_of_a_monitor_cancels_its_waiting_records(store):
@@ -183,7 +228,8 @@ def test_deletion_of_a_monitor_cancels_its_waiting_records(store):
 
 def test_a_monitor_of_another_owner_is_not_found(store):
     monitor = created(store, BOB).id
-    for operation in (store.monitors.get, store.monitors.load, store.monitors.result, store.monitors.delete):
+    reads = (store.monitors.get, store.monitors.load, store.monitors.result, store.monitors.saved)
+    for operation in (*reads, store.monitors.delete):
         with pytest.raises(MonitorNotFoundError, match=monitor):
             operation(ALICE, monitor)
     with pytest.raises(MonitorNotFoundError):

@@ -28,7 +28,7 @@ def follow(records: tuple[Dataset, ...], saved: SavedMonitor | None = None) -> S
         saved = saved or create_monitor(
             record, SIMULATION, false_alarms="1 per 720 records", training=TRAINING
         )
-        index = len(saved.state.records)
+        index = saved.state.count
         time = f"2026-11-{1 + index // 24:02d}T{index % 24:02d}:00:00"
         saved = monitor_record(saved, record, f"record {index}", time)
     assert saved is not None

@@ -92,6 +92,7 @@ class BaseClient(Generic[H]):
     create_monitor = Endpoint(monitor_calls.create_monitor)
     monitors = Endpoint(monitor_calls.monitors)
     monitor = Endpoint(monitor_calls.monitor)
+    monitor_records = Endpoint(monitor_calls.monitor_records)
     monitor_state = Endpoint(monitor_calls.monitor_state)
     add_record = Endpoint(monitor_calls.add_record)
     delete_monitor = Endpoint(monitor_calls.delete_monitor)

@@ -7,7 +7,7 @@ from urllib.parse import quote
 from islands_api.client.calls import DatasetRef, JobRef, RequestSpec, as_list, get_id, make_submission
 from islands_api.client.diagnosis_calls import parse_simulation
 from islands_api.client.response_parsing import read_as
-from islands_api.monitor_schemas import MonitorPage, MonitorSummary, MonitorView
+from islands_api.monitor_schemas import MonitorPage, MonitorRecordPage, MonitorSummary, MonitorView
 from islands_api.schemas import JobView
 
 #: Monitor or its id.
@@ -82,8 +82,22 @@ def monitors(cursor: str | None = None, limit: int = 50) -> RequestSpec[MonitorP
 
 
 def monitor(which: MonitorRef) -> RequestSpec[MonitorView]:
-    """Return a monitor with the states of its effects and its alarms."""
+    """Return a monitor with its parameters, effects and alarms."""
     return RequestSpec("GET", _path(which), read_as(MonitorView))
+
+
+def monitor_records(
+    which: MonitorRef, after: int = -1, limit: int = 1000, *, rejected: bool = False
+) -> RequestSpec[MonitorRecordPage]:
+    """Return a page of the records of a monitor after an index. After the last page an empty one follows.
+
+    Parameters
+    ----------
+    rejected : bool
+        Return the records that could not be analysed instead.
+    """
+    params = {"after": after, "limit": limit, "rejected": rejected}
+    return RequestSpec("GET", f"{_path(which)}/records", read_as(MonitorRecordPage), params=params)
 
 
 def monitor_state(which: MonitorRef) -> RequestSpec[str]:

@@ -122,6 +122,7 @@ def monitor_summary(monitor: Monitor) -> dict[str, Any]:
         "priority": monitor.priority,
         "created": _format_time(monitor.created),
         "updated": _format_time(monitor.updated),
+        "last_alarm": monitor.last_alarm,
     }
 
 

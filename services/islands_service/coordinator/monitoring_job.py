@@ -2,26 +2,39 @@
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import asdict, replace
 from typing import Any
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import Signal
 from islands.errors import RecordError
 from islands.evolution.engine import Engine
-from islands.facade.record_monitor import create_monitor, monitor_record, reject_record
+from islands.facade.record_monitor import create_monitor, monitor_record
 from islands.io.checkpoints.monitor_document import (
     describe_alarm,
+    describe_monitor,
     describe_record,
     describe_status,
-    monitor_document,
 )
-from islands.io.checkpoints.monitor_state import SavedMonitor, monitor_from_json, monitor_to_json
+from islands.io.checkpoints.monitor_state import (
+    RejectedRecord,
+    SavedMonitor,
+    head_to_json,
+    monitor_from_head,
+    record_to_json,
+)
 from islands.io.result_text.monitor_text import describe_alarm_text, describe_last_record
 from islands_service.coordinator.job_failures import check_readable, make_problem_document
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.monitor_spec import MonitorSpec, name_record, parse_monitor, parse_monitor_record
-from islands_service.domain.monitoring import Monitor, MonitorStatus, MonitorUpdate
+from islands_service.domain.monitoring import (
+    Monitor,
+    MonitorStates,
+    MonitorStatus,
+    MonitorUpdate,
+    RecordEntry,
+)
 from islands_service.intake.job_inputs import read_record_and_columns
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -57,8 +70,8 @@ def run_monitoring_job(
         The monitor or the first record is unusable, or any error that ``check`` raises.
     """
     identity, asked = parse_monitor_record(lease.job.spec)
-    monitor, state = store.monitors.load(lease.job.owner, identity)
-    saved = _parse_state(monitor, state)
+    monitor, states = store.monitors.load(lease.job.owner, identity)
+    saved = _parse_states(monitor, states)
     stored = store.datasets.get(lease.job.owner, asked.dataset, deleted=True)
     store.leases.report(lease, ProgressReport({"phase": "analysis of the record"}))
     spec, name = parse_monitor(monitor.spec), name_record(asked, stored.name)
@@ -68,28 +81,38 @@ def run_monitoring_job(
         record, columns = read_record_and_columns(reading, {asked.dataset: stored}, blobs)
         check()
         sha256 = record.sha256
-        if saved is not None and (known := _find_record(saved, name, sha256)) is not None:
-            return _describe_known(monitor, saved, known)
+        if states is not None and (
+            known := store.monitors.find_record(monitor.id, name, sha256, is_rejected=False)
+        ):
+            return _describe_known(monitor, states, name, json.loads(known))
         before = saved or _create_monitor(spec, record, columns)
         after = monitor_record(before, record, name, asked.time or "", columns)
     except RecordError as error:
-        return _reject(monitor, saved, name, sha256, error)
+        update = None
+        # A monitor without records has no parameters yet, and lists no record.
+        if (
+            saved is not None
+            and states is not None
+            and store.monitors.find_record(monitor.id, name, sha256, is_rejected=True) is None
+        ):
+            update = _make_rejection(monitor, saved, states, RejectedRecord(name, sha256, str(error)))
+        return JobOutcome(JobState.FAILED, problem=make_problem_document(error), monitor=update)
     check()
-    return _describe_outcome(monitor, before, after)
+    return _describe_outcome(monitor, states, before, after)
 
 
-def _parse_state(monitor: Monitor, state: str | None) -> SavedMonitor | None:
-    """Return the state of a monitor; None before its first record.
+def _parse_states(monitor: Monitor, states: MonitorStates | None) -> SavedMonitor | None:
+    """Return the monitor with the records that the next one is compared with; None before the first one.
 
     Raises
     ------
     JobDeclinedError
-        A newer version of islands wrote the state, and this one cannot read it.
+        A newer version of islands wrote the states, and this one cannot read them.
     """
-    if state is None:
+    if states is None:
         return None
     try:
-        return monitor_from_json(state, f"monitor {monitor.id}")
+        return monitor_from_head(states.head, states.start, states.records, f"monitor {monitor.id}")
     except Exception as error:
         check_readable(monitor.written_by, "monitor", error)
         raise
@@ -108,68 +131,84 @@ def _create_monitor(spec: MonitorSpec, record: Dataset, columns: Mapping[str, Si
     )
 
 
-def _find_record(saved: SavedMonitor, name: str, sha256: str) -> int | None:
-    """Return the index of an analysed record of the same name and content."""
-    for index, record in enumerate(saved.state.records):
-        if (record.name, record.sha256) == (name, sha256):
-            return index
-    return None
-
-
-def _describe_known(monitor: Monitor, saved: SavedMonitor, index: int) -> JobOutcome:
+def _describe_known(
+    monitor: Monitor, states: MonitorStates, name: str, document: dict[str, Any]
+) -> JobOutcome:
     """Return the outcome of a record that was submitted and analysed before: the monitor does not change."""
-    words = f"{saved.state.records[index].name} was analysed before"
+    alarms = [
+        each for each in json.loads(states.document)["alarms"] if each["record"]["index"] == document["index"]
+    ]
     return JobOutcome(
         JobState.SUCCEEDED,
-        _make_document(monitor, saved, index),
-        summary={"monitor": monitor.id, "status": monitor.status, "alarms": 0, "words": words},
+        _make_result(monitor, monitor.status, document, alarms),
+        summary={
+            "monitor": monitor.id,
+            "status": monitor.status,
+            "alarms": 0,
+            "words": f"{name} was analysed before",
+        },
     )
 
 
-def _describe_outcome(monitor: Monitor, before: SavedMonitor, after: SavedMonitor) -> JobOutcome:
-    raised = after.state.alarms[len(before.state.alarms) :]
-    update = _make_update(monitor, after, bool(raised))
-    alarms = [describe_alarm_text(after.state, each) for each in raised]
-    words = "\n".join([describe_last_record(after.state), *alarms])
+def _describe_outcome(
+    monitor: Monitor, states: MonitorStates | None, before: SavedMonitor, after: SavedMonitor
+) -> JobOutcome:
+    state = after.state
+    raised = state.alarms[len(before.state.alarms) :]
+    alarms = [describe_alarm(state, each) for each in raised]
+    record = state.records[-1]
+    document = {"index": state.count - 1, **describe_record(state, record)}
+    entry = RecordEntry(record.name, record.sha256, False, record_to_json(record), _dump(document))
+    update = _make_update(monitor, after, [*_get_alarms(states), *alarms], entry)
+    if alarms:
+        update = replace(update, alarm=_dump(alarms[-1]))
+    words = "\n".join([describe_last_record(state), *(describe_alarm_text(state, each) for each in raised)])
     return JobOutcome(
         JobState.SUCCEEDED,
-        _make_document(monitor, after, len(after.state.records) - 1),
+        _make_result(monitor, update.status, document, alarms),
         summary={"monitor": monitor.id, "status": update.status, "alarms": len(raised), "words": words},
         monitor=update,
     )
 
 
-def _reject(
-    monitor: Monitor, saved: SavedMonitor | None, name: str, sha256: str, error: RecordError
-) -> JobOutcome:
-    """Return the outcome of a record that cannot be used; a monitor without records cannot list it."""
-    problem = make_problem_document(error)
-    update = None
-    if saved is not None and not any((name, sha256) == (each.name, each.sha256) for each in saved.rejected):
-        update = _make_update(monitor, reject_record(saved, name, sha256, str(error)), False)
-    return JobOutcome(JobState.FAILED, problem=problem, monitor=update)
+def _make_rejection(
+    monitor: Monitor, saved: SavedMonitor, states: MonitorStates, rejected: RejectedRecord
+) -> MonitorUpdate:
+    """Return the update of a monitor by a record that cannot be used."""
+    state = asdict(rejected)
+    document = {"index": monitor.version - monitor.records, **state}
+    entry = RecordEntry(rejected.name, rejected.sha256, True, _dump(state), _dump(document))
+    return _make_update(monitor, saved, _get_alarms(states), entry)
 
 
-def _make_update(monitor: Monitor, after: SavedMonitor, is_alarm: bool) -> MonitorUpdate:
+def _get_alarms(states: MonitorStates | None) -> list[dict[str, Any]]:
+    """Return the earlier alarms for clients; the records that they name may not have been loaded."""
+    return [] if states is None else list(json.loads(states.document)["alarms"])
+
+
+def _make_update(
+    monitor: Monitor, after: SavedMonitor, alarms: list[dict[str, Any]], entry: RecordEntry
+) -> MonitorUpdate:
+    state = after.state
     return MonitorUpdate(
         monitor.id,
         monitor.version,
-        MonitorStatus(describe_status(after.state)),
-        len(after.state.records),
-        len(after.state.alarms),
-        monitor_to_json(after),
-        json.dumps(monitor_document(after), allow_nan=False),
-        is_alarm,
+        MonitorStatus(describe_status(state)),
+        state.count,
+        len(state.alarms),
+        state.start,
+        head_to_json(after),
+        _dump(describe_monitor(after, alarms)),
+        entry,
     )
 
 
-def _make_document(monitor: Monitor, saved: SavedMonitor, index: int) -> dict[str, Any]:
+def _dump(document: dict[str, Any]) -> str:
+    return json.dumps(document, allow_nan=False)
+
+
+def _make_result(
+    monitor: Monitor, status: MonitorStatus, record: dict[str, Any], alarms: list[dict[str, Any]]
+) -> dict[str, Any]:
     """Return the result of a record: its states, and the alarms that it raised."""
-    state = saved.state
-    return {
-        "schema": SCHEMA,
-        "monitor": monitor.id,
-        "status": describe_status(state),
-        "record": describe_record(state, state.records[index]),
-        "alarms": [describe_alarm(state, each) for each in state.alarms if each.record == index],
-    }
+    return {"schema": SCHEMA, "monitor": monitor.id, "status": status, "record": record, "alarms": alarms}

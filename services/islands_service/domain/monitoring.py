@@ -54,6 +54,8 @@ class Monitor:
         Seconds since 1970 by the clock of the database.
     written_by : str or None
         Version of islands that wrote the states; None before the first record.
+    last_alarm : mapping or None
+        The last alarm, as in the document for clients.
     """
 
     id: str
@@ -69,6 +71,48 @@ class Monitor:
     created: float
     updated: float
     written_by: str | None
+    last_alarm: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MonitorStates:
+    """What the analysis of a next record needs of a monitor.
+
+    Attributes
+    ----------
+    head, document : str
+        As in `MonitorUpdate`.
+    start : int
+        Index of the first record that the next one is compared with.
+    records : tuple of str
+        States of the records from this one.
+    """
+
+    head: str
+    document: str
+    start: int
+    records: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RecordEntry:
+    """What is stored of an analysed or rejected record; it never changes.
+
+    Attributes
+    ----------
+    name, sha256 : str
+    is_rejected : bool
+    state : str
+        JSON of the record in `islands.io.checkpoints.monitor_state`.
+    document : str
+        JSON of the record for clients.
+    """
+
+    name: str
+    sha256: str
+    is_rejected: bool
+    state: str
+    document: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +127,16 @@ class MonitorUpdate:
     status : MonitorStatus
     records, alarms : int
         As in `Monitor`.
-    state : str
-        All that the analysis of a next record needs: JSON of `islands.io.checkpoints.monitor_state`.
+    start : int
+        Index of the first record that the next one is compared with.
+    head : str
+        State without its records: JSON of `islands.io.checkpoints.monitor_state`.
     document : str
-        States and alarms for clients: JSON of `islands.io.checkpoints.monitor_document`.
-    is_alarm : bool
-        Whether this record raised an alarm.
+        Parameters and alarms for clients: JSON of `islands.io.checkpoints.monitor_document`.
+    entry : RecordEntry
+        The record.
+    alarm : str or None
+        JSON of the alarm that this record raised.
     """
 
     monitor: str
@@ -96,6 +144,8 @@ class MonitorUpdate:
     status: MonitorStatus
     records: int
     alarms: int
-    state: str
+    start: int
+    head: str
     document: str
-    is_alarm: bool
+    entry: RecordEntry
+    alarm: str | None = None

@@ -9,13 +9,18 @@ from uuid import uuid4
 from sqlalchemy import Column, Connection, Row, Select, delete, func, insert, select, tuple_
 
 from islands_service.domain.job import ACTIVE, QuotaError, Requester
-from islands_service.domain.monitoring import Monitor, MonitorNotFoundError, MonitorStatus
+from islands_service.domain.monitoring import (
+    Monitor,
+    MonitorNotFoundError,
+    MonitorStates,
+    MonitorStatus,
+)
 from islands_service.store.audit import Action, record_change
 from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
 from islands_service.store.job_rows.job_events import cancel_job
-from islands_service.store.tables import jobs, monitors
+from islands_service.store.tables import jobs, monitor_records, monitors
 
 _PENDING = (
     select(func.count())
@@ -24,10 +29,15 @@ _PENDING = (
     .scalar_subquery()
 )
 
-#: Rows without the states, which may have megabytes.
+#: Rows without the states.
 _ROWS: Select[Any] = select(
     *(column for column in monitors.c if column.name not in ("state", "document")), _PENDING.label("pending")
 )
+
+
+#: Schema of a state with its records: that of `islands.io.checkpoints.monitor_state`, which this module does
+#: not import for its numerical packages. A test compares them.
+STATE_SCHEMA = "islands.monitor-state/1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,14 +116,20 @@ class Monitors:
         with self._database.read() as connection:
             return _make_monitor(_read_owned(connection, owner, monitor))
 
-    def load(self, owner: str, monitor: str) -> tuple[Monitor, str | None]:
-        """Return a monitor and its state for the next record; None before the first one.
+    def load(self, owner: str, monitor: str) -> tuple[Monitor, MonitorStates | None]:
+        """Return a monitor and its states for the next record; None before the first one.
 
         Raises
         ------
         MonitorNotFoundError
         """
-        return self._read_with(monitors.c.state, owner, monitor)
+        with self._database.read() as connection:
+            query = _ROWS.add_columns(monitors.c.state, monitors.c.document)
+            row = _read_owned(connection, owner, monitor, query)
+            if row.state is None:
+                return _make_monitor(row), None
+            records = _read_records(connection, monitor_records.c.state, monitor, False, row.start)
+        return _make_monitor(row), MonitorStates(row.state, row.document, row.start, tuple(records))
 
     def result(self, owner: str, monitor: str) -> tuple[Monitor, str | None]:
         """Return a monitor and its document for clients; None before the first record.
@@ -122,15 +138,58 @@ class Monitors:
         ------
         MonitorNotFoundError
         """
-        return self._read_with(monitors.c.document, owner, monitor)
-
-    def _read_with(self, column: Column[Any], owner: str, monitor: str) -> tuple[Monitor, str | None]:
-        query: Select[Any] = _ROWS.add_columns(column.label("text"))
         with self._database.read() as connection:
-            row = connection.execute(query.where(*_owned(owner, monitor))).one_or_none()
-        if row is None:
-            raise _make_not_found_error(monitor)
-        return _make_monitor(row), row.text
+            row = _read_owned(connection, owner, monitor, _ROWS.add_columns(monitors.c.document))
+        return _make_monitor(row), row.document
+
+    def saved(self, owner: str, monitor: str) -> str | None:
+        """Return the state with all records, as a file of the command line; None before the first record.
+
+        Raises
+        ------
+        MonitorNotFoundError
+        """
+        with self._database.read() as connection:
+            row = _read_owned(connection, owner, monitor, _ROWS.add_columns(monitors.c.state))
+            # Records that were added after the row was read do not belong to its state.
+            analysed, rejected = (
+                _read_records(connection, monitor_records.c.state, monitor, is_rejected, limit=count)
+                for is_rejected, count in ((False, row.records), (True, row.version - row.records))
+            )
+        if row.state is None:
+            return None
+        document = json.loads(row.state)
+        document["schema"] = STATE_SCHEMA
+        document["state"]["records"] = [json.loads(each) for each in analysed]
+        document["rejected"] = [json.loads(each) for each in rejected]
+        return json.dumps(document, allow_nan=False) + "\n"
+
+    def records(
+        self, owner: str, monitor: str, is_rejected: bool, after: int = -1, limit: int | None = None
+    ) -> list[str]:
+        """Return the documents of analysed or rejected records after a number, in the order of their numbers.
+
+        Raises
+        ------
+        MonitorNotFoundError
+        """
+        column = monitor_records.c.document
+        with self._database.read() as connection:
+            _read_owned(connection, owner, monitor)
+            return _read_records(connection, column, monitor, is_rejected, after + 1, limit)
+
+    def find_record(self, monitor: str, name: str, sha256: str, is_rejected: bool) -> str | None:
+        """Return the document of the first record of a name and a content; None if there is none."""
+        rows = monitor_records.c
+        query = (
+            select(rows.document)
+            .where(rows.monitor_id == monitor, rows.is_rejected.is_(is_rejected))
+            .where(rows.sha256 == sha256, rows.name == name)
+            .order_by(rows.place)
+            .limit(1)
+        )
+        with self._database.read() as connection:
+            return connection.execute(query).scalar()
 
     def page(
         self, owner: str, after: tuple[float, str] | None = None, limit: int = 50
@@ -184,8 +243,22 @@ def _owned(owner: str, monitor: str) -> tuple[Any, ...]:
     return monitors.c.id == monitor, monitors.c.owner == owner
 
 
-def _read_owned(connection: Connection, owner: str, monitor: str) -> Row[Any]:
-    row = connection.execute(_ROWS.where(*_owned(owner, monitor))).one_or_none()
+def _read_records(
+    connection: Connection,
+    column: Column[Any],
+    monitor: str,
+    is_rejected: bool,
+    first: int = 0,
+    limit: int | None = None,
+) -> list[str]:
+    """Read a text of the analysed or rejected records of a monitor, in order."""
+    rows = monitor_records.c
+    chosen = (rows.monitor_id == monitor, rows.is_rejected.is_(is_rejected), rows.place >= first)
+    return list(connection.execute(select(column).where(*chosen).order_by(rows.place).limit(limit)).scalars())
+
+
+def _read_owned(connection: Connection, owner: str, monitor: str, query: Select[Any] = _ROWS) -> Row[Any]:
+    row = connection.execute(query.where(*_owned(owner, monitor))).one_or_none()
     if row is None:
         raise _make_not_found_error(monitor)
     return row
@@ -210,4 +283,5 @@ def _make_monitor(row: Row[Any]) -> Monitor:
         row.created,
         row.updated,
         row.islands_version,
+        None if row.last_alarm is None else json.loads(row.last_alarm),
     )

@@ -205,14 +205,29 @@ monitors = Table(
     Column("status", String(16), nullable=False),
     Column("records", BigInteger, nullable=False),
     Column("alarms", BigInteger, nullable=False),
-    # All that the analysis of a next record needs, and the states and alarms for clients.
+    # State without its records, document for clients, first record that the next one is compared with.
     Column("state", Text),
     Column("document", Text),
+    Column("start", BigInteger, nullable=False, server_default=text("0")),
+    Column("last_alarm", Text),
     Column("created", Float, nullable=False),
     Column("updated", Float, nullable=False),
-    # Version of islands that wrote the state.
     Column("islands_version", String(64)),
     Index(None, "owner", "created", "id"),
+)
+
+#: Analysed and rejected records of monitors, each numbered from 0. A row never changes.
+monitor_records = Table(
+    "monitor_records",
+    metadata,
+    Column("monitor_id", String(32), ForeignKey("monitors.id", ondelete="CASCADE"), primary_key=True),
+    Column("is_rejected", Boolean, primary_key=True),
+    Column("place", BigInteger, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("sha256", String(64), nullable=False),
+    Column("state", Text, nullable=False),
+    Column("document", Text, nullable=False),
+    Index(None, "monitor_id", "sha256"),
 )
 
 #: URLs that receive the events of an owner's jobs.

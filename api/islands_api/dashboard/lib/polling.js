@@ -115,7 +115,7 @@ const endIfLost = (task, lost) => async () => {
 };
 
 /**
- * Follow the monitor at a path: call `show(monitor)` at each change, `lost(problem)` if it does not exist.
+ * Follow the monitor at a path: await `show(monitor)` at each change, `lost(problem)` if it does not exist.
  * Return a function that asks for it immediately.
  */
 export function followMonitor(path, { show, lost }, signal) {
@@ -125,9 +125,9 @@ export function followMonitor(path, { show, lost }, signal) {
     const headers = tag === null ? {} : { "If-None-Match": tag };
     const response = await sendRequest(path, { headers, signal });
     if (response.status !== 304) {
-      current = await response.json();
-      tag = response.headers.get("etag");
-      if (!signal.aborted) show(current);
+      const monitor = await response.json();
+      if (!signal.aborted) await show(monitor);
+      [current, tag] = [monitor, response.headers.get("etag")];
     }
     return current.pending ? ANALYSIS_POLL_SECONDS : MONITOR_POLL_SECONDS;
   }

@@ -8,6 +8,7 @@ import {
   getMonitorName,
   makeStatusBadge,
 } from "../components/monitoring/monitor_status.js";
+import { makeRecordHistory } from "../components/monitoring/record_history.js";
 import { makeAlarmsPanel, makeRecordsPanel } from "../components/monitoring/record_table.js";
 import { makeRecordUpload } from "../components/monitoring/record_upload.js";
 import { makeStatesPanel } from "../components/monitoring/state_charts.js";
@@ -17,13 +18,12 @@ import { announce, el, makeFacts, runOnceAtATime, setText } from "../lib/dom.js"
 import { formatCount, formatDuration, formatShort } from "../lib/numbers.js";
 import { followMonitor } from "../lib/polling.js";
 
-function makeMonitorFacts({ records, alarms, pending, created, updated, result }) {
-  const last = result?.records.at(-1);
+function makeMonitorFacts({ records, alarms, pending, created, updated, last_alarm: alarm }, last) {
   return makeFacts([
     ["Records", formatCount(records)],
     ["Waiting", pending ? formatCount(pending) : null],
     ["Alarms", formatCount(alarms)],
-    ["Last change", result?.alarms.at(-1) && `since ${result.alarms.at(-1).since.name}`],
+    ["Last change", alarm && `since \u2068${alarm.since.name}\u2069`],
     ["Last record", last && el("bdi", {}, last.name)],
     ["Analysed", last && makeAge(updated)],
     ["Created", makeAge(created)],
@@ -96,6 +96,7 @@ export function mountMonitor(host, { id }, signal) {
   const factsHost = el("div");
   const settingsHost = el("div");
   const [alarms, states, records] = [makeAlarmsPanel(), makeStatesPanel(), makeRecordsPanel()];
+  const history = makeRecordHistory(path, signal);
   let current = null;
   const actions = makeActions(path, () => current);
 
@@ -118,7 +119,9 @@ export function mountMonitor(host, { id }, signal) {
     );
   }
 
-  function show(monitor) {
+  async function show(monitor) {
+    await history.load(monitor);
+    if (signal.aborted) return;
     if (current === null) build();
     else if (monitor.status !== current.status)
       announce(`${getIsolatedMonitorName(monitor)}: ${monitor.status}`);
@@ -128,11 +131,11 @@ export function mountMonitor(host, { id }, signal) {
     setText(name, getMonitorName(monitor));
     status.show(monitor);
     actions.show(monitor);
-    factsHost.replaceChildren(makeMonitorFacts(monitor));
+    factsHost.replaceChildren(makeMonitorFacts(monitor, history.analysed.at(-1)));
     if (isChanged) {
       alarms.show(monitor.result);
-      states.show(monitor.result, monitor.result.records);
-      records.show(monitor.result, monitor.result.records);
+      states.show(monitor.result, history.analysed);
+      records.show(monitor.result, history);
     }
     if (isChanged || !settingsHost.hasChildNodes()) settingsHost.replaceChildren(makeSettingsPanel(monitor));
   }

@@ -26,6 +26,7 @@ function makeRow(monitor) {
   const name = el("bdi");
   const [records, alarms, last] = ["records", "alarms", "last record"].map((label) =>
     el("td", { class: "figure", "data-label": label }));
+  const change = el("td", { class: "change" });
   let lastStatus = null;
   const node = el(
     "tr",
@@ -39,6 +40,7 @@ function makeRow(monitor) {
     ),
     records,
     alarms,
+    change,
     last,
     el("td", { class: "figure", "data-label": "created" }, makeAge(monitor.created)),
   );
@@ -49,6 +51,7 @@ function makeRow(monitor) {
     const waiting = newMonitor.pending ? ` + ${formatCount(newMonitor.pending)} waiting` : "";
     setText(records, formatCount(newMonitor.records) + waiting);
     setText(alarms, formatCount(newMonitor.alarms));
+    setText(change, newMonitor.last_alarm?.words ?? "");
     last.replaceChildren(newMonitor.records ? makeAge(newMonitor.updated) : NONE);
     if (lastStatus !== null && lastStatus !== newMonitor.status)
       announce(`${getIsolatedMonitorName(newMonitor)}: ${newMonitor.status}`);
@@ -85,7 +88,9 @@ export function mountMonitors(host, { cursor = "" }, signal) {
     caption: "Monitors, newest first",
     headings: [
       ...["Status", "Monitor"],
-      ...["Records", "Alarms", "Last record", "Created"].map((name) => [name, "figure"]),
+      ...["Records", "Alarms"].map((name) => [name, "figure"]),
+      "Last change",
+      ...["Last record", "Created"].map((name) => [name, "figure"]),
     ],
     makeRow,
     makeEmptyMessage: () => makeEmptyMessage(cursor),

@@ -3,10 +3,16 @@
 import json
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Path, Query, Response
 
 from islands.io.simulator_spec.specification import ExtendedSpec
-from islands_api.monitor_schemas import MonitorPage, MonitorRecordRequest, MonitorRequest, MonitorView
+from islands_api.monitor_schemas import (
+    MonitorPage,
+    MonitorRecordPage,
+    MonitorRecordRequest,
+    MonitorRequest,
+    MonitorView,
+)
 from islands_api.schemas import JobView
 from islands_api.web.auth import Principal, Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
@@ -54,6 +60,9 @@ _CREATED: dict[int | str, dict[str, Any]] = {
     }
 }
 
+#: Maximum number of records of a page, some kB each.
+_MAX_RECORDS = 1000
+
 _ETAG = {"description": "Version of the monitor, for `If-None-Match`.", "schema": {"type": "string"}}
 
 _CONDITIONAL: dict[int | str, dict[str, Any]] = {
@@ -95,7 +104,7 @@ async def monitors(caller: Reader, state: AppStateDep, cursor: Cursor = None, li
 
 @router.get("/{monitor}", response_model=MonitorView, responses=_CONDITIONAL)
 async def monitor(monitor: Id, caller: Reader, state: AppStateDep, if_none_match: IfNoneMatch = None) -> Any:
-    """Return a monitor: the states of the effects in each record, and the alarms with their beginning.
+    """Return a monitor: its parameters and effects, and the alarms with their beginning.
 
     With `If-None-Match`, the status is 304 if the monitor has not changed.
     """
@@ -110,10 +119,33 @@ async def monitor(monitor: Id, caller: Reader, state: AppStateDep, if_none_match
 @router.get("/{monitor}/state", response_model=dict[str, Any])
 async def saved(monitor: Id, caller: Reader, state: AppStateDep) -> Response:
     """Return `state.json` of a monitor, from which `islands monitor` continues with the same bits."""
-    _, text = await state.run_blocking(state.store.monitors.load, caller.owner, monitor)
+    text = await state.run_blocking(state.store.monitors.saved, caller.owner, monitor)
     if text is None:
         raise ResourceNotFoundError(f"monitor {monitor} has no state: wait for its first record")
     return Response(text, media_type="application/json")
+
+
+@router.get("/{monitor}/records", response_model=MonitorRecordPage)
+async def records(
+    monitor: Id,
+    caller: Reader,
+    state: AppStateDep,
+    after: Annotated[
+        int, Query(ge=-1, le=2**31 - 1, description="Return only records after the one of this index.")
+    ] = -1,
+    limit: Annotated[
+        int, Query(ge=1, le=_MAX_RECORDS, description="Maximum number of records.")
+    ] = _MAX_RECORDS,
+    rejected: Annotated[bool, Query(description="Return the rejected records instead.")] = False,
+) -> Response:
+    """Return the states of the effects in each record.
+
+    The records have pages: repeat the request with `after` set to the last index until a page is empty.
+    """
+    texts = await state.run_blocking(
+        state.store.monitors.records, caller.owner, monitor, rejected, after, limit
+    )
+    return Response(f'{{"items":[{",".join(texts)}]}}', media_type="application/json")
 
 
 @router.post("/{monitor}/records", status_code=202, response_model=JobView, responses=ACCEPTED_RESPONSES)
@@ -128,7 +160,7 @@ async def add_record(
 
     Records are analysed one after the other in the order of submission, each exactly once. The job is
     followed and cancelled under `/v1/jobs`; its `result` has the states of this record and the alarms that
-    it raised. A record that cannot be used fails its job and is listed under `rejected` of the monitor.
+    it raised. A record that cannot be used fails its job and is listed with `rejected` of the records.
     """
     found = await state.run_blocking(state.store.monitors.get, caller.owner, monitor)
     submission = Submission(
@@ -189,6 +221,6 @@ def _make_etag(monitor: Monitor) -> str:
 
 
 def _render(monitor: Monitor, document: str | None) -> bytes:
-    """Return a monitor as JSON. Its states may have megabytes: they are not parsed."""
+    """Return a monitor as JSON; its document is not parsed."""
     head = json_text({**monitor_summary(monitor), "spec": monitor.spec})
     return f'{head[:-1]},"result":{document or "null"}}}'.encode()

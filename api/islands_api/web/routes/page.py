@@ -36,6 +36,7 @@ FILES = {
     "components/models.js": _SCRIPT,
     "components/monitoring/monitor_form.js": _SCRIPT,
     "components/monitoring/monitor_status.js": _SCRIPT,
+    "components/monitoring/record_history.js": _SCRIPT,
     "components/monitoring/record_table.js": _SCRIPT,
     "components/monitoring/record_upload.js": _SCRIPT,
     "components/monitoring/state_charts.js": _SCRIPT,

@@ -1,12 +1,12 @@
 """Records of monitors in the transactions of their jobs: number, order of claims, effect on the monitor."""
 
-from sqlalchemy import Connection, and_, exists, or_, select, update
+from sqlalchemy import Connection, and_, exists, insert, or_, select, update
 
 from islands_service.domain.job import ISLANDS_VERSION, JobState, LeaseLostError
 from islands_service.domain.monitoring import MonitorNotFoundError, MonitorUpdate
 from islands_service.domain.webhook import ALARM_EVENT, make_alarm_body
 from islands_service.store.backends.dialect import now
-from islands_service.store.tables import jobs, monitors
+from islands_service.store.tables import jobs, monitor_records, monitors
 from islands_service.store.tenants.deliveries import queue_event
 
 _other = jobs.alias("other")
@@ -48,7 +48,7 @@ def count_record(connection: Connection, owner: str, monitor: str) -> int:
 
 
 def update_monitor(connection: Connection, job: str, change: MonitorUpdate) -> None:
-    """Store the state of a monitor after a record, and queue the event of an alarm.
+    """Store a record and the state of its monitor after it, and queue the event of an alarm.
 
     Raises
     ------
@@ -63,8 +63,10 @@ def update_monitor(connection: Connection, job: str, change: MonitorUpdate) -> N
             status=change.status,
             records=change.records,
             alarms=change.alarms,
-            state=change.state,
+            start=change.start,
+            state=change.head,
             document=change.document,
+            **({} if change.alarm is None else {"last_alarm": change.alarm}),
             updated=now(),
             islands_version=ISLANDS_VERSION,
         )
@@ -72,6 +74,20 @@ def update_monitor(connection: Connection, job: str, change: MonitorUpdate) -> N
     ).one_or_none()
     if row is None:
         raise LeaseLostError(f"the monitor {change.monitor} of job {job} was changed or deleted")
-    if change.is_alarm:
+    entry = change.entry
+    # The version counts the analysed and the rejected records before this one.
+    place = change.version - change.records if entry.is_rejected else change.records - 1
+    connection.execute(
+        insert(monitor_records).values(
+            monitor_id=change.monitor,
+            is_rejected=entry.is_rejected,
+            place=place,
+            name=entry.name,
+            sha256=entry.sha256,
+            state=entry.state,
+            document=entry.document,
+        )
+    )
+    if change.alarm is not None:
         body = make_alarm_body(row.id, row.name, job, row.updated)
         queue_event(connection, ALARM_EVENT, row.owner, job, body, row.updated)

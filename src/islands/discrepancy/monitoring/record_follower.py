@@ -149,12 +149,14 @@ class MonitorState:
     reference : MonitorReference or None
         None before the first record.
     records : tuple of MonitoredRecord
-        In the order in which they were analysed.
+        In the order in which they were analysed, from the record ``first``.
     alarms : tuple of Alarm
     start : int
         Record from which the undisturbed state is taken: the first, or the first since the last alarm.
     changes : tuple of tuple of float
         Mean of `RecordAnalysis.changes` over the first records of the training.
+    first : int
+        Index of the first one of ``records``. Those before ``start`` are not needed to analyse a next record.
     """
 
     settings: MonitorSettings
@@ -163,17 +165,31 @@ class MonitorState:
     alarms: tuple[Alarm, ...] = ()
     start: int = 0
     changes: tuple[tuple[float, ...], ...] = ()
+    first: int = 0
+
+    @property
+    def count(self) -> int:
+        """Number of records that were analysed."""
+        return self.first + len(self.records)
 
     @property
     def is_training(self) -> bool:
         """Whether no change can be found yet."""
-        return len(self.records) - self.start < self.settings.training + MIN_CHANGED
+        return self.count - self.start < self.settings.training + MIN_CHANGED
 
     @property
     def threshold(self) -> float:
         """Threshold of the test statistics; the rate of false alarms is divided among them."""
         assert self.reference is not None
         return find_threshold(self.settings.false_alarms / (len(self.reference.names) + 2))
+
+    def get_record(self, index: int) -> MonitoredRecord:
+        """Return the record of an index."""
+        return self.records[index - self.first]
+
+    def get_records_since_start(self) -> tuple[MonitoredRecord, ...]:
+        """Return the records from `start`, which the next one is compared with."""
+        return self.records[self.start - self.first :]
 
 
 def follow_record(
@@ -198,7 +214,7 @@ def follow_record(
     tolerance = state.settings.tolerance
     reference = state.reference or make_reference(record, simulator, tolerance)
     analysis = estimate_states(record, simulator, tolerance, reference)
-    seen = len(state.records)
+    seen = state.count
     changes = np.array(state.changes) if state.changes else np.zeros_like(analysis.changes)
     if seen < state.settings.training:
         changes = changes + (analysis.changes - changes) / (seen + 1)
@@ -214,8 +230,9 @@ def follow_record(
 
 def _detect(state: MonitorState, record: Dataset, simulator: Simulator) -> MonitorState:
     """Return the state with the statistic of its last record, and with an alarm if there is a change."""
-    values = np.array([each.states.statistics for each in state.records[state.start :]])
-    errors = np.array([each.states.statistic_errors for each in state.records[state.start :]])
+    compared = [each.states for each in state.get_records_since_start()]
+    values = np.array([each.statistics for each in compared])
+    errors = np.array([each.statistic_errors for each in compared])
     statistics, starts = compute_statistics(values, errors, state.settings.training)
     strongest = int(np.argmax(np.abs(statistics)))
     largest = float(abs(statistics[strongest]))
@@ -236,7 +253,7 @@ def _find_cause(
     assert reference is not None
     linear = explain_change(values[:, : len(reference.names)], np.array(state.changes), since, reference)
     if linear.gain > LARGE_CHANGE * (len(values) - since):
-        undisturbed = [each.states for each in state.records[state.start : state.start + since]]
+        undisturbed = [each.states for each in state.get_records_since_start()[:since]]
         return explain_record(record, simulator, state.settings.tolerance, reference, undisturbed)
     return linear if linear.gain > state.threshold**2 else None
 
@@ -258,7 +275,7 @@ def _describe_change(
     point = locate_change(values[:, located], errors[:, located], state.settings.training)
     sequence = np.exp(values[:, shown]) if shown >= len(names) else values[:, shown]
     return Alarm(
-        record=len(state.records) - 1,
+        record=state.count - 1,
         kind=kind,
         cause=name,
         since=state.start + point.record,

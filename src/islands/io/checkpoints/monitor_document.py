@@ -16,6 +16,18 @@ _NORMAL_95 = 1.96
 def monitor_document(monitor: SavedMonitor) -> dict[str, Any]:
     """Return the states and alarms of a monitor as a JSON document."""
     state = monitor.state
+    return {
+        **describe_monitor(monitor, [describe_alarm(state, each) for each in state.alarms]),
+        "records": [describe_record(state, each) for each in state.records],
+        "rejected": [
+            {"name": each.name, "sha256": each.sha256, "reason": each.reason} for each in monitor.rejected
+        ],
+    }
+
+
+def describe_monitor(monitor: SavedMonitor, alarms: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the document of a monitor without its records."""
+    state = monitor.state
     reference = state.reference
     return {
         "schema": SCHEMA,
@@ -29,11 +41,7 @@ def monitor_document(monitor: SavedMonitor) -> dict[str, Any]:
             for each in (() if reference is None else reference.parameters)
         ],
         "effects": [each.effect for each in (() if reference is None else reference.directions)],
-        "alarms": [describe_alarm(state, each) for each in state.alarms],
-        "records": [describe_record(state, each) for each in state.records],
-        "rejected": [
-            {"name": each.name, "sha256": each.sha256, "reason": each.reason} for each in monitor.rejected
-        ],
+        "alarms": alarms,
     }
 
 
@@ -44,7 +52,7 @@ def monitor_json(monitor: SavedMonitor) -> str:
 
 def describe_status(state: MonitorState) -> str:
     """Return ``training``, ``alarm`` if the last record raised one, or ``normal``."""
-    if state.alarms and state.alarms[-1].record == len(state.records) - 1:
+    if state.alarms and state.alarms[-1].record == state.count - 1:
         return "alarm"
     return "training" if state.is_training else "normal"
 
@@ -74,7 +82,7 @@ def describe_alarm(state: MonitorState, alarm: Alarm) -> dict[str, Any]:
     """Return an alarm with the names and times of its records, and in words."""
 
     def place(index: int) -> dict[str, Any]:
-        record = state.records[index]
+        record = state.get_record(index)
         return {"index": index, "name": record.name, "time": record.time or None}
 
     return {

@@ -1,18 +1,25 @@
-"""State of a monitor on disk: one JSON file, from which a monitor continues with the same bits."""
+"""State of a monitor as JSON, from which a monitor continues with the same bits.
+
+On disk it is one file. A service stores each record once, and the rest, the head, after every record.
+"""
 
 import json
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from islands.discrepancy.monitoring.record_follower import MonitorState
+from islands.discrepancy.monitoring.record_follower import MonitoredRecord, MonitorState
 from islands.errors import SettingsError
 from islands.io.checkpoints.writing import replace_file
 from islands.io.simulator_spec.specification import LocalSpec
 
 SCHEMA = "islands.monitor-state/1"
+
+#: Schema of a state without its records.
+HEAD_SCHEMA = "islands.monitor-head/1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,14 +78,42 @@ class SavedMonitor:
 
 _ADAPTER: TypeAdapter[SavedMonitor] = TypeAdapter(SavedMonitor)
 
+_RECORD: TypeAdapter[MonitoredRecord] = TypeAdapter(MonitoredRecord)
 
-def monitor_to_json(monitor: SavedMonitor) -> str:
+
+def monitor_to_json(monitor: SavedMonitor, schema: str = SCHEMA) -> str:
     """Return a monitor as JSON. Floating-point numbers keep all bits."""
-    document: dict[str, Any] = {"schema": SCHEMA, **_ADAPTER.dump_python(monitor, mode="json", by_alias=True)}
+    document: dict[str, Any] = {"schema": schema, **_ADAPTER.dump_python(monitor, mode="json", by_alias=True)}
     return json.dumps(document, allow_nan=False) + "\n"
 
 
-def monitor_from_json(text: str, title: str = "the monitor") -> SavedMonitor:
+def head_to_json(monitor: SavedMonitor) -> str:
+    """Return a monitor without its records as JSON."""
+    state = replace(monitor.state, records=(), first=0)
+    return monitor_to_json(replace(monitor, state=state, rejected=()), HEAD_SCHEMA)
+
+
+def record_to_json(record: MonitoredRecord) -> str:
+    """Return an analysed record as JSON. Floating-point numbers keep all bits."""
+    return json.dumps(_RECORD.dump_python(record, mode="json"), allow_nan=False)
+
+
+def monitor_from_head(
+    head: str, first: int, records: Sequence[str], title: str = "the monitor"
+) -> SavedMonitor:
+    """Return a monitor from its head and from its records since the one with index ``first``.
+
+    Raises
+    ------
+    SettingsError
+        The texts are not those of a monitor.
+    """
+    monitor = monitor_from_json(head, title, HEAD_SCHEMA)
+    parsed = tuple(_RECORD.validate_python(json.loads(each)) for each in records)
+    return replace(monitor, state=replace(monitor.state, records=parsed, first=first))
+
+
+def monitor_from_json(text: str, title: str = "the monitor", schema: str = SCHEMA) -> SavedMonitor:
     """Return a monitor from its JSON.
 
     Raises
@@ -88,8 +123,8 @@ def monitor_from_json(text: str, title: str = "the monitor") -> SavedMonitor:
     """
     try:
         document = json.loads(text)
-        if not isinstance(document, dict) or document.pop("schema", None) != SCHEMA:
-            raise ValueError(f"its schema is not {SCHEMA}")
+        if not isinstance(document, dict) or document.pop("schema", None) != schema:
+            raise ValueError(f"its schema is not {schema}")
         return _ADAPTER.validate_python(document)
     except (ValueError, ValidationError) as error:
         raise SettingsError(

@@ -13,7 +13,7 @@ def describe_last_record(state: MonitorState) -> str:
         f"{each.name} {value:.5g} +/- {1.96 * error:.1g} {each.unit}".rstrip()
         for each, value, error in parameters
     )
-    seen, training = len(state.records) - state.start, state.settings.training
+    seen, training = state.count - state.start, state.settings.training
     is_followed = record.statistic is not None
     status = (
         f"statistic {record.statistic:.1f} of {state.threshold:.1f}"
@@ -21,7 +21,7 @@ def describe_last_record(state: MonitorState) -> str:
         else f"training {seen} of {training}"
     )
     parts = [values, f"noise {record.states.noise:.3g}", status]
-    return f"{_name(state, len(state.records) - 1)}: {', '.join(part for part in parts if part)}"
+    return f"{record.name}: {', '.join(part for part in parts if part)}"
 
 
 def describe_alarm_text(state: MonitorState, alarm: Alarm) -> str:
@@ -57,7 +57,7 @@ def describe_change(state: MonitorState, alarm: Alarm) -> str:
 
 
 def _name(state: MonitorState, index: int) -> str:
-    return state.records[index].name
+    return state.get_record(index).name
 
 
 def _unit(state: MonitorState, alarm: Alarm) -> str:

@@ -8,9 +8,15 @@ from benchmarks.monitor import run
 from islands.discrepancy.monitoring.record_follower import AlarmKind, MonitorSettings
 from islands.errors import RecordError, SettingsError
 from islands.facade.record_monitor import monitor_record
-from islands.io.checkpoints.monitor_document import monitor_document
-from islands.io.checkpoints.monitor_state import monitor_from_json, monitor_to_json
-from islands.io.result_text.monitor_text import describe_alarm_text
+from islands.io.checkpoints.monitor_document import describe_alarm, describe_status, monitor_document
+from islands.io.checkpoints.monitor_state import (
+    head_to_json,
+    monitor_from_head,
+    monitor_from_json,
+    monitor_to_json,
+    record_to_json,
+)
+from islands.io.result_text.monitor_text import describe_alarm_text, describe_last_record
 from support.monitored_oscillator import ONSET, TRAINING, follow, make_records, undisturbed_monitor
 
 
@@ -59,6 +65,30 @@ def test_a_continued_monitor_has_the_bits_of_an_uninterrupted_one():
     for record in make_records(ONSET + 6, k=97.0)[ONSET:]:
         saved = follow((record,), monitor_from_json(monitor_to_json(saved)))
     assert saved.state == disturb(k=97.0).state
+
+
+@pytest.mark.ci
+def test_the_head_and_the_records_since_the_start_continue_with_the_same_bits():
+    """The second change is found after the training that begins with the first one."""
+    changed = make_records(ONSET + 6, k=97.0)
+    records = (*changed, *changed[ONSET:] * 2, *make_records(ONSET + 4, c=2.2)[ONSET:])
+    whole, part = undisturbed_monitor(), undisturbed_monitor()
+    for record in records[ONSET:]:
+        whole = follow((record,), whole)
+        since = part.state.get_records_since_start()
+        texts = [record_to_json(each) for each in since]
+        part = monitor_from_head(head_to_json(part), part.state.start, texts)
+        part = follow((record,), part)
+        assert head_to_json(part) == head_to_json(whole)
+        assert part.state.count == whole.state.count
+        assert part.state.records == whole.state.records[part.state.first :]
+        assert describe_last_record(part.state) == describe_last_record(whole.state)
+        assert describe_status(part.state) == describe_status(whole.state)
+    assert len(whole.state.alarms) == 2
+    assert part.state.first >= ONSET - 1
+    assert describe_alarm(part.state, part.state.alarms[-1]) == describe_alarm(
+        whole.state, whole.state.alarms[-1]
+    )
 
 
 def test_a_record_that_cannot_be_analysed_leaves_the_monitor_valid():

@@ -1,5 +1,6 @@
 """Monitoring job: states that cannot be read, deleted monitors, and interruption, without an analysis."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,9 +11,10 @@ from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_failures import JobDeclinedError
 from islands_service.coordinator.monitoring_job import run_monitoring_job
 from islands_service.domain.job import MONITORING, JobOutcome, JobState, Lease, Submission
-from islands_service.domain.monitoring import Monitor, MonitorNotFoundError, MonitorStatus, MonitorUpdate
+from islands_service.domain.monitoring import Monitor, MonitorNotFoundError
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
+from support.monitor_updates import make_update
 from support.service import held, kept
 from support.stores import ALICE, claimed, contents
 
@@ -82,7 +84,7 @@ def test_a_record_of_a_deleted_monitor_fails(
 def test_a_state_of_a_newer_version_waits_for_its_coordinator(
     store: Store, blobs: Blobs, monitor: Monitor, lease: Lease, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    update = MonitorUpdate(monitor.id, 0, MonitorStatus.TRAINING, 1, 0, '{"schema": "new"}', "{}", False)
+    update = replace(make_update(monitor, [0]), head='{"schema": "new"}')
     store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {}, monitor=update))
     lease = add(store, monitor)
     with pytest.raises(SettingsError, match="is not the state of a monitor of this version"):

@@ -103,7 +103,7 @@ def add(
     Exit code 3 if one of them has raised an alarm.
     """
     with open_client(url, key) as client:
-        known = _find_known(client.monitor(monitor))
+        known = _find_known(client, monitor)
         jobs = []
         for path in sorted(records, key=order_of_recording):
             content = hash_file(path)
@@ -119,11 +119,15 @@ def add(
         raise typer.Exit(ALARM_EXIT)
 
 
-def _find_known(monitor: MonitorView) -> set[tuple[str, str]]:
+def _find_known(client: Client, monitor: str) -> set[tuple[str, str]]:
     """Return the names and hashes of the records that a monitor has analysed or rejected."""
-    result = monitor.result or {}
-    found = [*result.get("records", ()), *result.get("rejected", ())]
-    return {(each["name"], each["sha256"]) for each in found}
+    known: set[tuple[str, str]] = set()
+    for rejected in (False, True):
+        after = -1
+        while items := client.monitor_records(monitor, after, rejected=rejected).items:
+            known.update((each["name"], each["sha256"]) for each in items)
+            after = items[-1]["index"]
+    return known
 
 
 def _add_file(client: Client, monitor: str, path: Path, content: str, reading: ReadingOptions) -> JobView:

@@ -37,11 +37,11 @@ export function makeAlarmsPanel() {
   };
 }
 
-function makeRecordRow(result, record, index) {
-  const isAlarm = result.alarms.some((alarm) => alarm.record.index === index);
+function makeRecordRow(result, record) {
+  const isAlarm = result.alarms.some((alarm) => alarm.record.index === record.index);
   const statistic = formatNumber(record.statistic);
   return [
-    String(index + 1),
+    String(record.index + 1),
     makeName(record.name),
     record.time ? formatTime(record.time) : NONE,
     ...result.parameters.map(({ name }) => {
@@ -70,14 +70,12 @@ export function makeRecordsPanel() {
       ...result.parameters.map(({ name, unit }) => [unit ? `${name} / ${unit}` : name, "figure"]),
       ...["Noise", "Statistic"].map((name) => [name, "figure"]),
     ];
-    const first = Math.max(0, records.length - shown);
-    const latest = records.slice(first).map((record, at) => makeRecordRow(result, record, first + at));
-    latest.reverse();
+    const latest = records.slice(-shown).map((record) => makeRecordRow(result, record)).reverse();
     host.replaceChildren(makeScrollable("Records", makeTable("Records, latest first", headings, latest)));
     more.hidden = shown >= records.length;
   }
 
-  function renderRejected({ rejected }) {
+  function renderRejected(rejected) {
     const rows = rejected.map(({ name, reason }) => [makeName(name), reason]).reverse();
     const title = "Rejected records";
     const table = makeScrollable(title, makeTable(title, ["Name", "Reason"], rows));
@@ -93,11 +91,11 @@ export function makeRecordsPanel() {
       more,
       rejectedHost,
     ),
-    show(newResult, newRecords) {
-      [result, records] = [newResult, newRecords];
+    show(newResult, { analysed, rejected }) {
+      [result, records] = [newResult, analysed];
       this.node.hidden = false;
       render();
-      renderRejected(result);
+      renderRejected(rejected);
     },
   };
 }

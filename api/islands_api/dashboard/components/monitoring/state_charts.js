@@ -6,8 +6,8 @@ import { makeLineChart } from "../chart.js";
 /** Number of further effects whose scores are drawn at most, as in `monitor.svg`. */
 const MAX_EFFECTS = 3;
 
-/** Return the name of a record and its time for texts; records are numbered from 1. */
-export const describePlace = ({ name, time }, index) =>
+/** Return the number of a record and its time or name for texts; records are numbered from 1. */
+export const describePlace = ({ index, name, time }) =>
   [`record ${index + 1}`, time ? time.slice(0, 16).replace("T", " ") : name].join(", ");
 
 /** Return the effects that are drawn: those that alarms name, then those with the largest recent scores. */
@@ -21,16 +21,17 @@ export function chooseEffects({ effects, alarms, training }, records) {
 
 /**
  * Return the bands and lines of a chart: trainings, and for each alarm its interval, beginning and record.
- * The training begins again at the first changed record.
+ * The training begins again at the first changed record. Those before the first point are left out.
  */
 export function makeEvents({ alarms, training }, records) {
+  const [first, last] = [records[0].index + 1, records.at(-1).index + 1];
   const starts = [0, ...alarms.map(({ since }) => since.index)];
   const trainings = starts.map((start, at) => ({
     kind: "training",
     from: start + 1,
-    to: Math.min(start + training, starts[at + 1] ?? records.length),
+    to: Math.min(start + training, starts[at + 1] ?? last),
   }));
-  return [
+  const events = [
     ...trainings,
     ...alarms.flatMap(({ record, since, since_ci95: [earliest, latest] }) => [
       { kind: "since-band", from: earliest.index + 1, to: latest.index + 1 },
@@ -38,13 +39,16 @@ export function makeEvents({ alarms, training }, records) {
       { kind: "alarm", at: record.index + 1 },
     ]),
   ];
+  return events
+    .filter(({ at, to = at }) => to >= first)
+    .map((event) => ("from" in event ? { ...event, from: Math.max(event.from, first) } : event));
 }
 
 /** Return `[{title, label, series}]`, one for each chart. */
 export function makeStateSeries(result, records) {
   const follow = (name, select, bare = false) => ({
     name,
-    points: records.map((record, at) => [at + 1, ...[select(record)].flat()]),
+    points: records.map((record) => [record.index + 1, ...[select(record)].flat()]),
     bare,
   });
   const parameters = result.parameters.map(({ name, unit }) => ({
@@ -58,7 +62,8 @@ export function makeStateSeries(result, records) {
     ],
   }));
   const effects = chooseEffects(result, records);
-  const limit = records.map(({ statistic }, at) => [at + 1, statistic === null ? null : result.threshold]);
+  const limit = records.map(({ index, statistic }) =>
+    [index + 1, statistic === null ? null : result.threshold]);
   return [
     ...parameters,
     {
@@ -96,7 +101,8 @@ export function makeStatesPanel() {
   let known = [];
 
   function makeChart({ title, label }) {
-    const x = { label: "record", integer: true, describe: (at) => describePlace(known[at - 1], at - 1) };
+    const describe = (at) => describePlace(known[at - 1 - known[0].index]);
+    const x = { label: "record", integer: true, describe };
     return makeLineChart({ title, x, y: { label }, marks: true });
   }
 
@@ -105,6 +111,7 @@ export function makeStatesPanel() {
     show(result, records) {
       known = records;
       this.node.hidden = records.length === 0;
+      if (records.length === 0) return;
       const events = makeEvents(result, records);
       for (const each of makeStateSeries(result, records)) {
         if (!charts.has(each.title)) {

@@ -14,7 +14,9 @@ sys.path.insert(0, str(Path(__file__).parents[4]))
 
 from islands_service.domain.job import Requester
 from islands_service.store import Store
+from islands_service.store.job_rows.monitor_records import update_monitor
 from islands_service.store.migrations.upgrade import HEAD
+from support.monitor_updates import make_update
 from support.stores import ALICE, BLOB, BOB, EXPIRED, FAILED, FOUND, brought_on, claimed, submitted
 
 FOLDER = Path(__file__).parent
@@ -28,7 +30,9 @@ def fill(store: Store) -> None:
     store.datasets.add(ALICE, "Bühne.csv", ".csv", BLOB, 12, preview, source="https://example.org/a.csv")
     store.webhooks.create(ALICE, "https://hooks.example.org/a", ("job.succeeded",), 1)
     monitor = store.monitors.create(ALICE, "press", {"input": "u"}, 0, 1)
-    store.jobs.cancel(ALICE, submitted(store, monitor=monitor.id).id)
+    job = submitted(store, monitor=monitor.id)
+    store.jobs.cancel(ALICE, job.id)
+    store.database.write(lambda connection: update_monitor(connection, job.id, make_update(monitor, [4])))
     for outcome, owner in ((FOUND, ALICE), (FAILED, BOB)):
         submitted(store, owner, name="it's done; really", idempotency_key="k")
         lease = claimed(store)

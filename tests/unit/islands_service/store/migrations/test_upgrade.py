@@ -15,6 +15,7 @@ from islands_service.domain.job import JobState
 from islands_service.store import Store
 from islands_service.store.database import Database, StoreError
 from islands_service.store.migrations.upgrade import HEAD, configuration, prepare, revision, upgrade
+from islands_service.store.monitor_states import STATE_SCHEMA
 from islands_service.store.tables import metadata
 from support.stores import ALICE, BOB, asked, child, contents, kinds, submitted
 
@@ -183,6 +184,32 @@ def test_islands_of_earlier_jobs_are_those_of_their_specification(empty_database
         found = connection.execute(select(table.c.id, table.c.islands)).all()
     database.close()
     assert dict(map(tuple, found)) == {"a": 8, "b": 1, "c": 1, "d": 1}
+
+
+def test_records_of_a_monitor_are_moved_to_rows(empty_database):
+    """The analysis continues with the same states, and clients find the same records."""
+    record, rejected = {"name": "a", "sha256": "1", "noise": 0.1 + 0.2}, {"name": "b", "sha256": "2"}
+    state = {"schema": STATE_SCHEMA, "state": {"records": [record] * 3, "start": 2}, "rejected": [rejected]}
+    alarm = {"words": "k changed"}
+    document = {"status": "alarm", "alarms": [alarm], "records": [record] * 3, "rejected": [rejected]}
+    texts = {"id": "e" * 32, "owner": ALICE, "name": "press", "spec": "{}", "status": "alarm"}
+    numbers = {"priority": 0, "version": 4, "submitted": 4, "records": 3, "alarms": 1}
+    states = {"state": json.dumps(state) + "\n", "document": json.dumps(document)}
+    database = Database(empty_database)
+    with database.exclusive() as connection:
+        upgrade(connection, "0008")
+        values = {**texts, **numbers, **states, "created": 0.0, "updated": 0.0, "islands_version": "1"}
+        connection.execute(tables_of(connection)["monitors"].insert(), values)
+    database.close()
+    with Store(empty_database) as store:
+        monitor, loaded = store.monitors.load(ALICE, texts["id"])
+        assert store.monitors.saved(ALICE, texts["id"]) == states["state"]
+        assert (loaded.start, loaded.records) == (2, (json.dumps(record),))
+        assert json.loads(loaded.document) == {"status": "alarm", "alarms": [alarm]}
+        assert monitor.last_alarm == alarm
+        for is_rejected, expected in ((False, [record] * 3), (True, [rejected])):
+            found = map(json.loads, store.monitors.records(ALICE, texts["id"], is_rejected))
+            assert list(found) == [{"index": at, **each} for at, each in enumerate(expected)]
 
 
 def test_running_process_of_an_earlier_release_can_write_after_the_migration(old):

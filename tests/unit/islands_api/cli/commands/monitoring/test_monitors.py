@@ -15,7 +15,8 @@ from islands_api.cli.commands.monitoring.watched_folder import hash_file
 from islands_api.cli.service import client_options
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import MONITORING, JobOutcome, JobState, Submission
-from islands_service.domain.monitoring import MonitorStatus, MonitorUpdate
+from islands_service.domain.monitoring import MonitorStatus, MonitorUpdate, RecordEntry
+from support.monitor_updates import store_monitor
 from support.monitored_oscillator import follow, make_records
 from support.service import Service, csv
 from support.stores import claimed, taken
@@ -70,8 +71,10 @@ def test_records_are_added_in_the_order_of_recording_and_once(
     assert lease.job.kind == MONITORING
     assert (lease.job.spec["name"], lease.job.spec["time"]) == (names[1], "2026-11-03T09:00:00")
     service.store.jobs.cancel(LOCAL_OWNER, shown.split()[4].removesuffix(":"))
-    document = {"records": [{"name": names[1], "sha256": hash_file(Path(paths[1]))}], "rejected": []}
-    update = MonitorUpdate(monitor, 0, MonitorStatus.ALARM, 1, 1, "{}", json.dumps(document), True)
+    content = hash_file(Path(paths[1]))
+    document = json.dumps({"index": 0, "name": names[1], "sha256": content})
+    entry = RecordEntry(names[1], content, False, "{}", document)
+    update = MonitorUpdate(monitor, 0, MonitorStatus.ALARM, 1, 1, 0, "{}", "{}", entry, "{}")
     summary = {"words": "ALARM: k changed", "alarms": 1}
     service.store.leases.finish(
         lease, JobOutcome(JobState.SUCCEEDED, {"record": {}}, summary=summary, monitor=update)
@@ -89,10 +92,10 @@ def test_the_states_of_a_monitor_are_shown_and_downloaded(
     submission = Submission(LOCAL_OWNER, {}, MONITORING, priority=100, monitor=monitor)
     job, _ = service.store.jobs.submit(submission)
     texts = monitor_to_json(saved), json.dumps(monitor_document(saved))
-    update = MonitorUpdate(monitor, 0, MonitorStatus.TRAINING, 1, 0, *texts, False)
     summary = {"words": "record 0: normal", "alarms": 0}
-    outcome = JobOutcome(JobState.SUCCEEDED, {"record": {}}, summary=summary, monitor=update)
+    outcome = JobOutcome(JobState.SUCCEEDED, {"record": {}}, summary=summary)
     service.store.leases.finish(taken(service.store, job.id), outcome)
+    store_monitor(service.store, monitor, saved)
     code, shown, _ = run("show", monitor, "--out", "states")
     first, record, rejected = shown.splitlines()
     assert (code, first) == (0, f"monitor {monitor}: training, records 1, alarms 0")
