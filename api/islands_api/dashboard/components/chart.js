@@ -14,6 +14,9 @@ const MARGIN = { right: 12, top: 10, bottom: 36 };
 const LEFT = { least: 58, space: 31, character: 6.8 };
 const HEIGHT = 250;
 
+/** Distance of points in pixels below which they are small, and their line is thin. */
+const DENSE_PIXELS = 6;
+
 /** Number of line colours in job.css; further series are dashed. */
 export const COLOURS = 8;
 
@@ -85,7 +88,7 @@ const circle = (kind, r, cx, cy) => svg("circle", { class: kind, r, cx, cy });
  * `draw(series, events)` takes `[{name, points: [[x, y, half], ...], faint, bare}]`, abscissas increasing.
  * `half` is half the length of the interval of a point, if it has one and the axis is linear. Faint series
  * form the background and have no entry in the legend; bare ones have no circles. Events are vertical lines
- * `{kind, at}` and bands `{kind, from, to}` behind the series.
+ * `{kind, at}` over the series and bands `{kind, from, to}` behind them.
  */
 export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
   const describe = xAxis.describe ?? ((at) => `${xAxis.label} ${formatShort(at)}`);
@@ -166,12 +169,14 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
     let at = 0;
     const stretches = Math.max(60, Math.min(width, 60_000 / series.length));
     return series.flatMap(({ points, faint, name, bare }) => {
-      const kind = faint ? "faint" : `line s${at % COLOURS}${at >= COLOURS ? " dashed" : ""}`;
-      if (!faint) at += 1;
       const shown = downsample(points, stretches);
+      const isDense = marks && !bare && shown.length > width / DENSE_PIXELS;
+      const style = `${at >= COLOURS ? " dashed" : ""}${isDense ? " dense" : ""}`;
+      const kind = faint ? "faint" : `line s${at % COLOURS}${style}`;
+      if (!faint) at += 1;
       const d = makePath(shown, scales.x, scales.y);
       const known = shown.filter((point) => point[1] !== null);
-      const dot = ([px, py]) => circle(kind, 3.5, scales.x.at(px), scales.y.at(py));
+      const dot = ([px, py]) => circle(kind, isDense ? 1.5 : 3.5, scales.x.at(px), scales.y.at(py));
       return [
         ...known.filter(([, , half]) => half).map((point) => makeInterval(`${kind} interval`, point)),
         svg("path", { class: kind, "data-name": name, d }),
@@ -188,9 +193,10 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
     drawing.setAttribute("height", HEIGHT);
     updateScales(width);
     drawing.replaceChildren(
-      ...events.map(makeEvent),
+      ...events.filter(({ at }) => at === undefined).map(makeEvent),
       ...makeAxes(width),
       ...makeLines(width),
+      ...events.filter(({ at }) => at !== undefined).map(makeEvent),
       svg("g", { class: "pointer" }),
     );
     updatePointer();
