@@ -21,8 +21,9 @@ for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np  # noqa: E402 - after the environment is set
 
 from islands.data.dataset import Dataset  # noqa: E402
-from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate  # noqa: E402
+from islands.discrepancy.calibration.levenberg_marquardt import calibrate  # noqa: E402
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context  # noqa: E402
+from islands.discrepancy.calibration.target import Target  # noqa: E402
 from islands.discrepancy.detectability import estimate_rate  # noqa: E402
 from islands.discrepancy.gross_errors.channel_admission import admit_channels  # noqa: E402
 from islands.discrepancy.gross_errors.closed_loop import find_closed_loop  # noqa: E402

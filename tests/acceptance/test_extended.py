@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.levenberg_marquardt import Target, evaluate_fit
+from islands.discrepancy.calibration.levenberg_marquardt import evaluate_fit
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.io.export.fmu.compiler import find_compiler

@@ -7,7 +7,8 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.initial_states import fit_initial_states
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, evaluate_fit
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
 from islands.discrepancy.discovery.discovery import MISSING_TERM, MissingTerms, describe_terms
 from islands.discrepancy.discovery.effect_shape import compare_shapes

@@ -1,11 +1,14 @@
 """Least-squares problem of a calibration: costs at values of the parameters, derivatives, and damped steps.
 
-Simulations of one call share the arithmetic of the kernels, so that eight cost little more than one. The
-derivatives at a point are therefore simulated in the same call as the point itself.
+Simulations of one call share the arithmetic of the kernels, so that sixteen cost little more than one. The
+derivatives at a point are therefore simulated in the same call as the point itself, and several fits of one
+simulation share their calls: a function that needs outputs is a generator, which yields the points and
+receives the outputs.
 """
 
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +18,12 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 #: Finite-difference step, as a fraction of the scale of a parameter.
 DIFFERENCE_STEP = 1e-2
+
+
+T = TypeVar("T")
+
+#: Computation that yields points, shape (points, parameters), and receives their outputs, (points, samples).
+Simulated: TypeAlias = Generator[Signal, Signal, T]
 
 
 class Weighting(Protocol):
@@ -77,27 +86,28 @@ class CalibrationProblem:
         count = nominal.size
         self._free = np.arange(count) if is_fixed is None else np.flatnonzero(~is_fixed)
 
-    def evaluate(self, values: Signal, with_jacobian: bool = False) -> FittedPoint:
+    def evaluate(self, values: Signal, with_jacobian: bool = False) -> Simulated[FittedPoint]:
         """Simulate at the given values, clipped to their bounds, and around them for the derivatives."""
         values = np.clip(values, *self._bounds)
         if not with_jacobian:
-            return self._compare(values, self._simulation.simulate(values))
+            (output,) = yield values[None]
+            return self._compare(values, output)
         points, steps = self._list_differences(values)
         # The last simulations are cached.
-        *shifted, output = self._simulation.simulate_batch(np.vstack([points, values]))
+        *shifted, output = yield np.vstack([points, values])
         return self._differentiate(self._compare(values, output), shifted, steps)
 
-    def evaluate_all(self, points: Signal) -> list[FittedPoint]:
+    def evaluate_all(self, points: Signal) -> Simulated[list[FittedPoint]]:
         """Simulate at several points, shape (points, parameters), within the bounds."""
-        outputs = self._simulation.simulate_batch(points)
+        outputs = yield points
         return [self._compare(values, output) for values, output in zip(points, outputs, strict=True)]
 
-    def linearise(self, point: FittedPoint) -> FittedPoint:
+    def linearise(self, point: FittedPoint) -> Simulated[FittedPoint]:
         """Return a point with its derivatives."""
         if point.jacobian is not None:
             return point
         points, steps = self._list_differences(point.values)
-        shifted = self._simulation.simulate_batch(points) if self._free.size else points
+        shifted = (yield points) if self._free.size else points
         return self._differentiate(point, list(shifted), steps)
 
     def _list_differences(self, values: Signal) -> tuple[Signal, Signal]:
@@ -158,3 +168,33 @@ class CalibrationProblem:
         changes = (values - point.values) / self._scales
         predicted = 2.0 * changes @ slope - np.einsum("ij,jk,ik->i", changes, hessian, changes)
         return values, predicted
+
+
+def simulate_together(simulation: ExtendedSimulator, computations: Sequence[Simulated[T]]) -> list[T]:
+    """Run computations that need outputs of a simulation, with one call for the points of all of them.
+
+    Returns
+    -------
+    list
+        Result of each computation. It does not depend on the others.
+    """
+    results: dict[int, T] = {}
+    asked: dict[int, Signal] = {}
+
+    def resume(index: int, outputs: Signal | None) -> None:
+        asked.pop(index, None)
+        try:
+            # A generator is started by None.
+            asked[index] = computations[index].send(outputs)  # type: ignore[arg-type]
+        except StopIteration as end:
+            results[index] = end.value
+
+    for index in range(len(computations)):
+        resume(index, None)
+    while asked:
+        indices, points = list(asked), list(asked.values())
+        outputs = simulation.simulate_batch(np.vstack(points))
+        ends = np.cumsum([len(each) for each in points])
+        for index, part in zip(indices, np.split(outputs, ends[:-1]), strict=True):
+            resume(index, part)
+    return [results[index] for index in range(len(computations))]

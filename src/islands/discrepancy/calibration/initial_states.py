@@ -4,12 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import (
-    CalibrationResult,
-    Target,
-    calibrate,
-    evaluate_fit,
-)
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate, evaluate_fit
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.segments import find_bounds
 
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator

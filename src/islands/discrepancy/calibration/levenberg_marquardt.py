@@ -1,20 +1,25 @@
 """Calibration of a simulation's parameters to a record by the Levenberg-Marquardt method."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.discrepancy.calibration.calibration_problem import CalibrationProblem, FittedPoint
+from islands.discrepancy.calibration.calibration_problem import (
+    CalibrationProblem,
+    FittedPoint,
+    Simulated,
+    simulate_together,
+)
 from islands.discrepancy.calibration.noise_model import (
     NoiseModel,
     fit_noise,
     fit_whitening,
     white_noise,
 )
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.effect import Signal
-from islands.discrepancy.interfaces.segments import find_bounds
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 #: Maximum number of accepted steps.
@@ -32,64 +37,6 @@ MIN_BATCHED_SAMPLES = 2000
 
 #: First and least damping, factor between the damping values of a step, and decrease after a step.
 FIRST_DAMPING, MIN_DAMPING, DAMPING_FACTOR, DAMPING_DECREASE = 1e-3, 1e-9, 8.0, 5.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Target:
-    """Measured output, and the weighting under which a simulation is compared with it.
-
-    Attributes
-    ----------
-    y : ndarray, shape (samples,)
-        The measured output; NaN if it is missing.
-    estimation_part : ndarray of bool, shape (samples,)
-        Samples used for estimation; none of them is missing.
-    noise : NoiseModel or None
-        Noise model that whitens residuals; None to leave them unweighted.
-    prior_std : mapping
-        Relative standard deviations of the simulator's parameters about their nominal values. Parameters that
-        are not in it are free.
-    effective_samples : float or None
-        Effective sample size of the estimation part if the residual is model error; None if it is noise,
-        white or coloured.
-    segments : tuple of int
-        Lengths in samples of the recordings, cut at the gaps of the output; empty for a single recording.
-    """
-
-    y: Signal
-    estimation_part: NDArray[np.bool_]
-    noise: NoiseModel | None
-    prior_std: Mapping[str, float]
-    effective_samples: float | None = None
-    segments: tuple[int, ...] = ()
-
-    @property
-    def fitted_segments(self) -> tuple[int, ...]:
-        """Number of samples of every segment that are used for estimation, without zeros."""
-        counts = (
-            int(np.count_nonzero(self.estimation_part[first:last]))
-            for first, last in find_bounds(self.segments, self.y.size)
-        )
-        return tuple(count for count in counts if count)
-
-    @property
-    def prior_weight(self) -> float:
-        """Weight of a squared prior deviation relative to a squared residual of unit variance.
-
-        A residual of which neighbouring samples are alike has less information than it has samples.
-        """
-        if self.effective_samples is None:
-            return 1.0
-        return float(np.count_nonzero(self.estimation_part)) / self.effective_samples
-
-    def select(self, signal: Signal) -> Signal:
-        """Return the whitened signal over the estimation part."""
-        whitened = signal if self.noise is None else self.noise.whiten(signal, self.segments)
-        return whitened[self.estimation_part]
-
-    def residual(self, simulated: Signal) -> Signal:
-        """Return the whitened residual over the estimation part."""
-        return self.select(self.y - simulated)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,49 +90,74 @@ def calibrate(
     is_fixed : ndarray of bool, shape (parameters,), optional
         Parameters that keep their values; by default none.
     """
-    point = minimise(simulation, target, start, max_iterations, is_fixed=is_fixed)
+    (point,) = minimise(simulation, target, [start], max_iterations, is_fixed=is_fixed)
     return _make_result(simulation, target, point.values, point.output)
 
 
 def minimise(
     simulation: ExtendedSimulator,
     target: Target,
-    start: Signal,
+    starts: Sequence[Signal],
     max_iterations: int = MAX_ITERATIONS,
     min_decrease: float = MIN_DECREASE,
     is_fixed: NDArray[np.bool_] | None = None,
-) -> FittedPoint:
-    """Fit the parameters as `calibrate` does, without a noise model of the residual.
+) -> list[FittedPoint]:
+    """Fit the parameters from each start as `calibrate` does, without a noise model of the residual.
 
     Parameters
     ----------
+    starts : sequence of ndarray, each of shape (parameters,)
+        The fits share the calls of the simulation, and do not depend on one another.
     min_decrease : float
         The iteration ends at a step that decreases the cost by less than this, or if the derivatives promise
         a tenth of it.
     """
-    problem, is_batch = (
-        _make_problem(simulation, target, is_fixed),
-        simulation.is_batch and target.y.size >= MIN_BATCHED_SAMPLES,
-    )
-    point = problem.evaluate(start, with_jacobian=is_batch)
-    damping, is_rejected = FIRST_DAMPING, False
+    problem = _make_problem(simulation, target, is_fixed)
+    is_batch = simulation.is_batch and target.y.size >= MIN_BATCHED_SAMPLES
     # Residuals at the level of rounding cannot be fitted: the record may be an output of the simulation.
-    rounding = point.residual.size * (np.finfo(float).eps * float(np.nanmax(np.abs(target.y)))) ** 2
+    error = np.finfo(float).eps * float(np.nanmax(np.abs(target.y)))
+    rounding = np.count_nonzero(target.estimation_part) * error**2
+    return simulate_together(
+        simulation,
+        [_minimise(problem, start, max_iterations, min_decrease, rounding, is_batch) for start in starts],
+    )
+
+
+def _minimise(
+    problem: CalibrationProblem,
+    start: Signal,
+    max_iterations: int,
+    min_decrease: float,
+    min_squares: float,
+    is_batch: bool,
+) -> Simulated[FittedPoint]:
+    """Minimise the cost from one start.
+
+    Parameters
+    ----------
+    min_squares : float
+        The iteration ends at a smaller sum of squares.
+    is_batch : bool
+        Whether to simulate what may not be needed in the same call as what is.
+    """
+    point = yield from problem.evaluate(start, with_jacobian=is_batch)
+    damping, is_rejected = FIRST_DAMPING, False
     for _ in range(max_iterations if start.size and np.isfinite(point.cost) else 0):
-        if float(point.residual @ point.residual) <= rounding:
+        if float(point.residual @ point.residual) <= min_squares:
             break
-        point = problem.linearise(point)
+        point = yield from problem.linearise(point)
         dampings: Signal = damping * DAMPING_FACTOR ** np.arange(MAX_DAMPING_TRIALS, dtype=np.float64)
         steps, predicted = problem.find_steps(point, dampings)
         if predicted.max() < 0.1 * min_decrease:
             break
         if is_rejected and is_batch:
-            trials = problem.evaluate_all(steps)
+            trials = yield from problem.evaluate_all(steps)
         else:
             # The derivatives at the next point are simulated in the same call, unless it is the last one.
-            trials = [problem.evaluate(steps[0], with_jacobian=is_batch and predicted[0] > min_decrease)]
+            with_jacobian = is_batch and bool(predicted[0] > min_decrease)
+            trials = [(yield from problem.evaluate(steps[0], with_jacobian))]
             if not trials[0].cost < point.cost:
-                trials += _try_further(problem, steps[1:], point.cost, is_batch)
+                trials += yield from _try_further(problem, steps[1:], point.cost, is_batch)
         place = next((index for index, trial in enumerate(trials) if trial.cost < point.cost), None)
         if place is None:
             break
@@ -199,13 +171,13 @@ def minimise(
 
 def _try_further(
     problem: CalibrationProblem, steps: Signal, cost: float, is_batch: bool
-) -> list[FittedPoint]:
+) -> Simulated[list[FittedPoint]]:
     """Evaluate several steps: all at once, or one by one until one of them decreases the cost."""
     if is_batch:
-        return problem.evaluate_all(steps)
+        return (yield from problem.evaluate_all(steps))
     trials: list[FittedPoint] = []
     for values in steps:
-        trials.append(problem.evaluate(values))
+        trials.append((yield from problem.evaluate(values)))
         if trials[-1].cost < cost:
             break
     return trials
@@ -255,7 +227,8 @@ def estimate_covariance(fit: CalibrationResult, target: Target) -> NDArray[np.fl
     whitened = replace(target, noise=fit.noise)
     scales = simulation.scales
     problem = _make_problem(simulation, whitened)
-    jacobian = problem.linearise(problem.evaluate(fit.values)).jacobian
+    (point,) = simulate_together(simulation, [problem.evaluate(fit.values, with_jacobian=True)])
+    jacobian = point.jacobian
     assert jacobian is not None
     inverse_std, _ = prior_precision(simulation, target.prior_std)
     weight = fit.noise.effective_samples / np.count_nonzero(target.estimation_part)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from operator import attrgetter
 
 import numpy as np
 import scipy
@@ -76,7 +77,10 @@ class NoiseModel:
 
         def whiten_segment(part: Signal) -> Signal:
             part = take_fractional_difference(part, self.difference_order)
-            return scipy.signal.lfilter(self._polynomial, [1.0], part)
+            filtered = part.copy()
+            for lag, coefficient in enumerate(self.coefficients[: part.size - 1], start=1):
+                filtered[lag:] -= coefficient * part[:-lag]
+            return filtered
 
         return map_segments(whiten_segment, signal, segments)
 
@@ -140,7 +144,6 @@ def _fit_autoregression(
     residual: Signal, difference_order: float, max_order: int, segments: Sequence[int]
 ) -> NoiseModel:
     """Fit an autoregression to a fractional difference of the residual."""
-    best: NoiseModel | None = None
     n = residual.size
     difference = map_segments(
         lambda part: take_fractional_difference(part, difference_order), residual, segments
@@ -160,18 +163,20 @@ def _fit_autoregression(
         ]
     )
     gram, moment, energy = lagged.T @ lagged, lagged.T @ later, float(later @ later)
-    for order in range(max_order + 1):
-        coefficients: Signal = np.zeros(0)
-        remaining = energy
-        if order:
-            coefficients = np.asarray(np.linalg.lstsq(gram[:order, :order], moment[:order], rcond=None)[0])
-            remaining = energy - float(coefficients @ moment[:order])
-        variance = max(remaining / later.size, np.finfo(float).tiny)
-        candidate = NoiseModel(coefficients, variance, n, difference_order)
-        if best is None or candidate.minus_twice_log_likelihood < best.minus_twice_log_likelihood:
-            best = candidate
-    assert best is not None
-    return best
+
+    def fit(order: int) -> NoiseModel:
+        coefficients = np.asarray(np.linalg.lstsq(gram[:order, :order], moment[:order], rcond=None)[0])
+        variance = max((energy - float(coefficients @ moment[:order])) / later.size, np.finfo(float).tiny)
+        return NoiseModel(coefficients, variance, n, difference_order)
+
+    try:
+        # The leading blocks of one factor belong to the lower orders.
+        explained = np.linalg.solve(np.linalg.cholesky(gram), moment) ** 2
+    except np.linalg.LinAlgError:  # lagged residuals are linearly dependent
+        return min(map(fit, range(max_order + 1)), key=attrgetter("minus_twice_log_likelihood"))
+    variances = np.maximum(energy - np.append(0.0, np.cumsum(explained)), np.finfo(float).tiny)
+    costs = n * np.log(variances) + np.log(n) * np.arange(max_order + 1)
+    return fit(int(np.argmin(costs)))
 
 
 def take_fractional_difference(signal: Signal, order: float) -> Signal:

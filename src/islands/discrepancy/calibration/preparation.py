@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import Target
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.effects.scale import wrong_parameter
 from islands.discrepancy.interfaces.effect import Effect, SimulationContext, Site

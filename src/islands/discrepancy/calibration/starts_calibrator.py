@@ -9,10 +9,10 @@ from typing import TypeAlias
 from islands.discrepancy.calibration.levenberg_marquardt import (
     MAX_ITERATIONS,
     MIN_DECREASE,
-    Target,
     minimise,
     prior_precision,
 )
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
@@ -54,7 +54,7 @@ class StartsCalibrator:
         first = FIRST_ITERATIONS_WITH_MODEL_ERROR if has_model_error else FIRST_ITERATIONS
         iterations = first if self.is_rough else MAX_ITERATIONS
         decrease = ROUGH_DECREASE if self.is_rough else MIN_DECREASE
-        points = [minimise(simulation, self.target, start, iterations, decrease) for start in starts]
+        points = minimise(simulation, self.target, starts, iterations, decrease)
         if has_model_error:
             return [point.values for point in points]
         return [min(points, key=attrgetter("cost")).values]

@@ -8,10 +8,10 @@ import numpy as np
 
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
-    Target,
     estimate_deviations,
     evaluate_fit,
 )
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.inference.confidence import CONFIDENCE_TEMPERATURE
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, Finding, Rival, Value

@@ -10,7 +10,8 @@ from operator import attrgetter
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, compute_form_chance
 from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, with_effect, without_effect
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects

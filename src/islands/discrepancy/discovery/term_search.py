@@ -12,19 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
-from islands.discrepancy.calibration.levenberg_marquardt import (
-    CalibrationResult,
-    Target,
-    calibrate,
-    whiten_target,
-)
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
+from islands.discrepancy.calibration.projection import Projection
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.candidate_terms import (
     CandidateTerm,
     find_free_numbers,
     list_candidate_terms,
 )
 from islands.discrepancy.discovery.equation_simulator import find_equations, with_equations
-from islands.discrepancy.inference.screening import Projection
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.simulators.coordinates import peak_amplitude

@@ -8,13 +8,13 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
-    Target,
     calibrate,
     evaluate_fit,
     prior_precision,
 )
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
 from islands.discrepancy.calibration.preparation import make_context, make_target
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.gross_errors.channel_corrections import correct_swapped_channels
 from islands.discrepancy.gross_errors.correction import Correction
 from islands.discrepancy.gross_errors.gross_error import GrossError

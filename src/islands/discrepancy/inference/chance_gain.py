@@ -12,13 +12,12 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.discrepancy.calibration.calibration_problem import DIFFERENCE_STEP
-from islands.discrepancy.calibration.levenberg_marquardt import (
-    CalibrationResult,
-    Target,
-)
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.calibration.projection import Projection
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.noise_surrogates import Randomisation, draw_surrogates
-from islands.discrepancy.inference.screening import DEPENDENCE, Projection, simulate_starting_points
+from islands.discrepancy.inference.screening import DEPENDENCE, simulate_starting_points
 from islands.discrepancy.interfaces.effect import Effect, Signal
 
 #: Number of surrogates of each kind.

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.inference.holdout import BLOCKS, sum_by_block
 from islands.discrepancy.interfaces.effect import Signal
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.screening import transfer_parameters
 from islands.discrepancy.interfaces.effect import Effect, Signal

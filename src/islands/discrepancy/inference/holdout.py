@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.segments import find_bounds
 

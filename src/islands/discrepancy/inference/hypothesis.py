@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.screening import (
     SCORE_TIE,

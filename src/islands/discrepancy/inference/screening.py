@@ -6,14 +6,10 @@ from operator import attrgetter, itemgetter
 
 import numpy as np
 
-from islands.discrepancy.calibration.calibration_problem import DIFFERENCE_STEP
-from islands.discrepancy.calibration.levenberg_marquardt import (
-    CalibrationResult,
-    Target,
-    evaluate_fit,
-    prior_precision,
-)
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
+from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
@@ -37,9 +33,13 @@ DEPENDENCE = 1e-6
 #: no gain.
 MIN_CALIBRATED_EFFECTS = 5
 
-#: Least number of effects that are calibrated to convergence, the best ones after a rough calibration, and
-#: distance from the best score within which all others are as well.
-MIN_CONVERGED_EFFECTS, MAX_DISTANCE = 6, 20.0
+#: Fraction of the best promised gain below which a further effect is not calibrated.
+MIN_PROMISE = 0.05
+
+#: Least number of effects that are calibrated to convergence, the best ones after a rough calibration, if the
+#: residual is noise and if it is model error, and distance from the best score within which all others are as
+#: well.
+MIN_CONVERGED_EFFECTS, MIN_CONVERGED_WITH_MODEL_ERROR, MAX_DISTANCE = 3, 6, 20.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,14 +85,16 @@ def screen_effects(
         starts = _find_starts(base, simulation, effect, target, projection)
         if starts:
             candidates.append((starts[0][0], effect, simulation, [values for _, values in starts]))
-    if base.simulation.effects and target.effective_samples is None:
+    is_noise = target.effective_samples is None
+    if base.simulation.effects and is_noise:
         # If the simulation has effects already, only the most promising further ones are worth a calibration.
         candidates.sort(key=lambda candidate: candidate[0])
+        promises = [projection.score_decrease(remaining) for remaining, *_ in candidates]
         candidates = [
             candidate
-            for index, candidate in enumerate(candidates)
+            for index, (candidate, promise) in enumerate(zip(candidates, promises, strict=True))
             if index < MIN_CALIBRATED_EFFECTS
-            or projection.score_decrease(candidate[0]) > bic_penalty(candidate[1], base)
+            or promise > max(bic_penalty(candidate[1], base), MIN_PROMISE * promises[0])
         ]
     rough = _calibrate_starts(
         StartsCalibrator(target, is_rough=True),
@@ -103,7 +105,8 @@ def screen_effects(
     ranked = sorted(rough, key=lambda each: -each.score_gain(base))
     gains = [each.score_gain(base) for each in ranked]
     count = sum(gain > gains[0] - MAX_DISTANCE for gain in gains)
-    best = ranked[: max(count, MIN_CONVERGED_EFFECTS)]
+    least = MIN_CONVERGED_EFFECTS if is_noise else MIN_CONVERGED_WITH_MODEL_ERROR
+    best = ranked[: max(count, least)]
     converged = _calibrate_starts(
         StartsCalibrator(target),
         [(each.effect, each.fit.simulation, [each.fit.values]) for each in rough if each in best],
@@ -140,67 +143,6 @@ def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSim
         if effect in old.effects:
             transferred[new.get_slice(effect)] = values[old.get_slice(effect)]
     return transferred
-
-
-class Projection:
-    """Projection of responses onto the orthogonal complement of those that the base's parameters reproduce.
-
-    The parameters act through their linearised, whitened responses. The prior of each parameter is one more
-    observation.
-    """
-
-    def __init__(self, base: CalibrationResult, target: Target) -> None:
-        simulation, values = base.simulation, base.values
-        self._target, self._values = target, values.size
-        self._sigma = float(np.std(target.residual(base.output))) or 1.0
-        inverse_std, nominal = prior_precision(simulation, target.prior_std)
-        inverse_std = inverse_std * target.prior_weight**0.5
-        columns = []
-        self._absorbing: list[int] = []
-        points = values + DIFFERENCE_STEP * np.diag(simulation.scales)
-        shifted = simulation.simulate_batch(points) if values.size else points
-        for index, (scale, moved) in enumerate(zip(simulation.scales, shifted, strict=True)):
-            prior = np.zeros(values.size)
-            prior[index] = inverse_std[index] * scale
-            response = (moved - base.output) / DIFFERENCE_STEP
-            # A simulation that is almost unstable diverges for some changes, and has no response to them.
-            if not np.isfinite(response).all():
-                continue
-            # The estimation part does not depend on the initial states of recordings in the hold-out part; an
-            # orthogonal basis of columns that are zero would contain arbitrary directions.
-            if not simulation.is_copy[index] or response[target.estimation_part].any():
-                columns.append(self._stack(response, prior))
-                self._absorbing.append(index)
-        self._scales = simulation.scales
-        self._basis: Signal | None = None
-        if columns:
-            self._basis, self._factor = np.linalg.qr(np.column_stack(columns))
-        # The deviation of calibrated values from their prior is part of the residual to be explained.
-        self.residual = self._project(self._stack(target.y - base.output, inverse_std * (nominal - values)))
-        self._samples = base.noise.effective_samples
-
-    def score_decrease(self, remaining: float) -> float:
-        """Return the decrease of minus twice the log-likelihood, given the remaining sum of squares."""
-        return self._samples * float(np.log(float(self.residual @ self.residual) / max(remaining, 1e-300)))
-
-    def __call__(self, response: Signal) -> Signal:
-        """Project a response, shape (samples,), followed by a zero for the prior of each parameter."""
-        return self._project(self._stack(response, np.zeros(self._values)))
-
-    def absorb(self, response: Signal) -> Signal:
-        """Return the change of the base's parameters that reproduces most of a response, (parameters,)."""
-        change = np.zeros(self._values)
-        if self._basis is not None:
-            product = self._basis.T @ self._stack(response, change)
-            found = np.linalg.lstsq(self._factor, product, rcond=None)[0]
-            change[self._absorbing] = found * self._scales[self._absorbing]
-        return change
-
-    def _project(self, stacked: Signal) -> Signal:
-        return stacked if self._basis is None else stacked - self._basis @ (self._basis.T @ stacked)
-
-    def _stack(self, response: Signal, prior: Signal) -> Signal:
-        return np.concatenate([self._target.select(response) / self._sigma, prior])
 
 
 def get_starting_points(

@@ -6,7 +6,8 @@ from operator import attrgetter
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, whiten_target
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, whiten_target
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import model_form
 from islands.discrepancy.inference.hypothesis import (
     Alternatives,
@@ -26,6 +27,9 @@ MIN_GAIN = 6.0
 
 #: Number of hypotheses that are followed at the same time.
 BEAM_WIDTH = 3
+
+#: Fraction of the best gain below which a hypothesis is not followed, unless pairs are searched for.
+MIN_FOLLOWED_GAIN = 0.1
 
 #: Maximum number of effects of a hypothesis, not counting the model-form error; one more if pairs are
 #: searched for.
@@ -91,6 +95,9 @@ def stepwise_search(
             best, target = beam[0], new_target
         elif not (is_first and pairs):
             break
+        if not pairs:
+            least = MIN_FOLLOWED_GAIN * (base.score - beam[0].cost)
+            beam = [each for each in beam if base.score - each.cost >= least]
     return refine_by_swaps(best, target, effects, progress, parallel_map, max_effects)
 
 

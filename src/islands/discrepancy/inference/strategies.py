@@ -12,13 +12,13 @@ import numpy as np
 
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
-    Target,
     calibrate,
     evaluate_fit,
     whiten_target,
 )
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
 from islands.discrepancy.calibration.starts_calibrator import make_task_key
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.inference.chance_gain import ForwardSelection
 from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis
 from islands.discrepancy.inference.noise_floor import (

@@ -6,11 +6,8 @@ from enum import StrEnum
 import numpy as np
 
 from islands.discrepancy.calibration.initial_states import fit_initial_states
-from islands.discrepancy.calibration.levenberg_marquardt import (
-    CalibrationResult,
-    Target,
-    evaluate_fit,
-)
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain
 from islands.discrepancy.inference.confounders import find_confounder
 from islands.discrepancy.inference.holdout import bound_reduction, cross_validate_gain

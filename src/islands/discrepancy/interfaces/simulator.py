@@ -122,8 +122,20 @@ class SimulationRun:
 class BatchSimulator(Protocol):
     """Simulator that computes several runs at once, faster than one by one and with the same bits."""
 
-    def simulate_batch(self, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
-        """Simulate the outputs of runs with the same effects and force laws, shape (runs, samples)."""
+    def simulate_batch(
+        self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
+    ) -> Signal:
+        """Simulate the outputs of runs with the same effects and force laws.
+
+        Parameters
+        ----------
+        every : int
+            The outputs have one sample of ``every`` successive ones, the first.
+
+        Returns
+        -------
+        ndarray, shape (runs, samples)
+        """
 
 
 @runtime_checkable
@@ -142,16 +154,19 @@ def is_batch_simulator(simulator: Simulator) -> bool:
     return isinstance(simulator, BatchSimulator)
 
 
-def simulate_runs(simulator: Simulator, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
-    """Simulate runs with the same effects and force laws, at once if the simulator can; (runs, samples)."""
+def simulate_runs(
+    simulator: Simulator, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
+) -> Signal:
+    """Simulate as `BatchSimulator.simulate_batch`, at once if the simulator can."""
     if isinstance(simulator, BatchSimulator):
-        return simulator.simulate_batch(runs, context)
+        return simulator.simulate_batch(runs, context, every)
     outputs = []
     for run in runs:
         own = context
         if run.intersample_values is not None:
             own = replace(context, u=run.x, intersample_values=run.intersample_values)
-        outputs.append(simulator.simulate(run.values, run.x, own, run.effect_parameters, run.forces))
+        output = simulator.simulate(run.values, run.x, own, run.effect_parameters, run.forces)
+        outputs.append(output[::every])
     return np.stack(outputs)
 
 

@@ -65,9 +65,11 @@ class CentredSimulator(SimulatorWrapper):
         """Simulate the output; see `Simulator.simulate`."""
         return self.simulator.simulate(values, x, context, effect_parameters, forces)
 
-    def simulate_batch(self, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
+    def simulate_batch(
+        self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
+    ) -> Signal:
         """Simulate the outputs of several runs, at once if the simulator can."""
-        return simulate_runs(self.simulator, runs, context)
+        return simulate_runs(self.simulator, runs, context, every)
 
 
 def explain_record(

@@ -8,7 +8,6 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
-    Target,
     calibrate,
     estimate_covariance,
     whiten_target,
@@ -21,8 +20,10 @@ from islands.discrepancy.calibration.preparation import (
     select_effects,
     validate_prior,
 )
+from islands.discrepancy.calibration.projection import Projection
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
-from islands.discrepancy.inference.screening import Projection, get_starting_points, transfer_parameters
+from islands.discrepancy.inference.screening import get_starting_points, transfer_parameters
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances

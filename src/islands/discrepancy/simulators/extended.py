@@ -215,7 +215,7 @@ class ExtendedSimulator:
             inputs: dict[bytes, Signal] = {}
             runs = [self._make_run(values, _NONE, (), inputs) for values in missing.values()]
             with np.errstate(over="ignore", invalid="ignore"):
-                found = simulate_runs(self.simulator, runs, self.context)
+                found = np.ascontiguousarray(simulate_runs(self.simulator, runs, self.context))
             known |= zip(missing, found, strict=True)
             # Copies, since a row would keep the outputs of all points in memory.
             self._cache.update({key: known[key].copy() for key in list(missing)[-_CACHE_SIZE:]})

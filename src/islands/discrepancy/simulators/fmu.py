@@ -72,10 +72,17 @@ class FmuSimulator(OdeSimulator):
         return simulate_fmu(fmu, self.model, program, context.start_time, dt, lane)
 
     def _simulate_lanes(
-        self, program: OdeProgram, start_time: float, dt: float, lanes: Sequence[LaneInput], _interval: int
+        self,
+        program: OdeProgram,
+        start_time: float,
+        dt: float,
+        lanes: Sequence[LaneInput],
+        _interval: int,
+        every: int,
     ) -> Signal:
         fmu = load_fmu(self.model.description)
-        return np.stack([simulate_fmu(fmu, self.model, program, start_time, dt, lane).y for lane in lanes])
+        outputs = [simulate_fmu(fmu, self.model, program, start_time, dt, lane).y for lane in lanes]
+        return np.stack(outputs)[:, :, ::every]
 
 
 def make_fmu_simulator(model: FmuModel, system: OdeSystem, record: Dataset) -> FmuSimulator:

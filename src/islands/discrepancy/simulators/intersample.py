@@ -1,8 +1,9 @@
 """Simulation with a smaller step than the sampling time, and the input between samples."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -71,10 +72,6 @@ class SimulatorWrapper:
         return self.simulator.make_force_coordinate(context, output)
 
 
-#: Number of cached resampled inputs.
-_CACHE_SIZE = 2
-
-
 class InterSample(StrEnum):
     """Behaviour of the input between samples: linear, constant, or band-limited interpolation."""
 
@@ -98,10 +95,9 @@ class ResampledSimulator(SimulatorWrapper):
     simulator: Simulator
     intersample: InterSample = InterSample.FOH
     oversampling: int = 1
-    _cache: dict[bytes, tuple[Signal, Signal]] = field(init=False, default_factory=dict)
 
     def for_samples(self, first: int, last: int) -> "ResampledSimulator":
-        """Return the resampled simulator of one recording, with its own cache of resampled inputs."""
+        """Return the resampled simulator of one recording."""
         return replace(self, simulator=take_recording(self.simulator, first, last))
 
     def simulate(
@@ -117,25 +113,31 @@ class ResampledSimulator(SimulatorWrapper):
         resampled = replace(context, u=u, dt=context.dt / self.oversampling, intersample_values=between)
         return self.simulator.simulate(values, u, resampled, effect_parameters, forces)[:: self.oversampling]
 
-    def simulate_batch(self, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
+    def simulate_batch(
+        self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
+    ) -> Signal:
         """Simulate several runs; see `BatchSimulator.simulate_batch`."""
-        signals = [self._resample(run.x) for run in runs]
-        finer = [
-            replace(run, x=u, intersample_values=between)
-            for run, (u, between) in zip(runs, signals, strict=True)
-        ]
+        signals = {id(run.x): self._resample(run.x) for run in runs}
+        finer = []
+        for run in runs:
+            u, between = signals[id(run.x)]
+            finer.append(replace(run, x=u, intersample_values=between))
         resampled = replace(
-            context, u=signals[0][0], dt=context.dt / self.oversampling, intersample_values=signals[0][1]
+            context,
+            u=finer[0].x,
+            dt=context.dt / self.oversampling,
+            intersample_values=finer[0].intersample_values,
         )
-        return simulate_runs(self.simulator, finer, resampled)[:, :: self.oversampling]
+        return simulate_runs(self.simulator, finer, resampled, every * self.oversampling)
 
     def _resample(self, x: Signal) -> tuple[Signal, Signal]:
-        key = x.tobytes()
-        if key not in self._cache:
-            while len(self._cache) >= _CACHE_SIZE:
-                del self._cache[next(iter(self._cache))]
-            self._cache[key] = resample_input(x, self.intersample, self.oversampling)
-        return self._cache[key]
+        return _resample_bytes(x.tobytes(), self.intersample, self.oversampling)
+
+
+@lru_cache(maxsize=4)
+def _resample_bytes(x: bytes, intersample: InterSample, oversampling: int) -> tuple[Signal, Signal]:
+    """Resample an input that successive simulations have in common."""
+    return resample_input(np.frombuffer(x), intersample, oversampling)
 
 
 def resample_input(x: Signal, intersample: InterSample, oversampling: int) -> tuple[Signal, Signal]:
@@ -159,6 +161,15 @@ def resample_input(x: Signal, intersample: InterSample, oversampling: int) -> tu
             # Both ends are extended by reflection: with zeros beyond the ends, the filter would ring.
             spare = min(64, x.size - 1)
             longer = np.concatenate([2 * x[0] - x[spare:0:-1], x, 2 * x[-1] - x[-2 : -spare - 2 : -1]])
-            smooth = scipy.signal.resample_poly(longer, 2 * oversampling, 1, window=("kaiser", 8.0))
+            smooth = scipy.signal.resample_poly(
+                longer, 2 * oversampling, 1, window=_design_low_pass(2 * oversampling)
+            )
             fine = smooth[2 * oversampling * spare : 2 * oversampling * (spare + x.size) + 1]
     return fine[:-1:2].copy(), np.stack([fine[1::2], fine[2::2]])
+
+
+@lru_cache(maxsize=8)
+def _design_low_pass(factor: int) -> Signal:
+    """Return the impulse response of the low-pass that raises the sampling rate by a factor."""
+    low_pass: Signal = scipy.signal.firwin(20 * factor + 1, 1.0 / factor, window=("kaiser", 8.0))
+    return low_pass

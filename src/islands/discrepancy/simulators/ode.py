@@ -72,12 +72,9 @@ class OdeSimulator:
 
     def __post_init__(self) -> None:
         system = self.system
-        declared = (
-            *(_make_parameter(each) for each in system.parameters if not each.fixed),
-            *self._list_initial_states(),
-        )
+        free = (_make_parameter(each) for each in system.parameters if not each.fixed)
         supported, of_states = find_effects(system, self.sizes)
-        object.__setattr__(self, "parameters", declared)
+        object.__setattr__(self, "parameters", (*free, *self._list_initial_states()))
         object.__setattr__(self, "state_effects", of_states)
         object.__setattr__(self, "supported_effects", supported)
 
@@ -118,15 +115,12 @@ class OdeSimulator:
         force = self.system.force
         if force is None or not force.rate:
             return input_coordinate(context, output)
-        parts = [
-            self.simulate_nominal(part, (Symbol(force.coordinate), force.drive)) for part in context.split()
-        ]
-        coordinate, drive = (np.concatenate([part[index] for part in parts]) for index in range(2))
+        expressions = Symbol(force.coordinate), force.drive
+        parts = [self.simulate_nominal(part, expressions) for part in context.split()]
+        coordinate, drive = np.concatenate(parts, axis=1)
         unit = {each.name: each.unit for each in self.system.states}.get(force.coordinate) or "1"
-        found = output_coordinate(context, coordinate)
-        return replace(
-            found, unit=unit, force_unit=force.unit or context.input_unit, force=peak_amplitude(drive)
-        )
+        given, peak = force.unit or context.input_unit, peak_amplitude(drive)
+        return replace(output_coordinate(context, coordinate), unit=unit, force_unit=given, force=peak)
 
     def simulate(
         self,
@@ -137,10 +131,11 @@ class OdeSimulator:
         forces: Forces,
     ) -> Signal:
         """Simulate the output; see `Simulator.simulate`."""
-        run = SimulationRun(values, x, effect_parameters, forces)
-        return np.asarray(self.simulate_batch([run], context)[0])
+        return self.simulate_batch([SimulationRun(values, x, effect_parameters, forces)], context)[0].copy()
 
-    def simulate_batch(self, runs: Sequence[SimulationRun], context: SimulationContext) -> Signal:
+    def simulate_batch(
+        self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
+    ) -> Signal:
         """Simulate runs with the same effects and force laws; see `BatchSimulator.simulate_batch`."""
         active = tuple(
             each for each in list_terms(self.system) if each.name in runs[0].effect_parameters and each.term
@@ -149,11 +144,12 @@ class OdeSimulator:
         laws = runs[0].forces if self._has_force_equation else ()
         program = self._get_program(active, has_factor, tuple(law for law, _ in laws))
         if self.shots is None:
-            outputs = self._run(program, active, runs, context)[:, 0]
+            outputs = self._run(program, active, runs, context, every=every)[:, 0]
         else:
-            outputs = self._fit_shots(self.shots, program, active, runs, context)
+            outputs = self._fit_shots(self.shots, program, active, runs, context)[:, ::every]
         if not self._has_force_equation and runs[0].forces:
-            outputs += sum_output_forces([run.x for run in runs], context, [run.forces for run in runs])
+            further = sum_output_forces([run.x for run in runs], context, [run.forces for run in runs])
+            outputs = outputs + np.stack(further)[:, ::every]
         return outputs
 
     @property
@@ -181,7 +177,7 @@ class OdeSimulator:
 
         def simulate(asked: Sequence[tuple[int, Mapping[str, Signal]]]) -> Signal:
             starts = [states for _, states in asked]
-            return self._run(program, active, [runs[run] for run, _ in asked], context, starts)[:, 0, ::steps]
+            return self._run(program, active, [runs[run] for run, _ in asked], context, starts, steps)[:, 0]
 
         fitted = shots.fit_states(simulate, len(runs), shots.get_starts(self.initial), sizes)
         return np.repeat(fitted, steps, axis=1)
@@ -216,20 +212,27 @@ class OdeSimulator:
         runs: Sequence[SimulationRun],
         context: SimulationContext,
         starts: Sequence[Mapping[str, Signal]] | None = None,
+        every: int = 1,
     ) -> Signal:
         steps, interval = max(self.system.steps, 1), 0
         if self.shots is not None:
             interval = self.shots.interval * steps * (runs[0].x.size // self.shots.measured.size)
             starts = starts or [self.shots.get_starts(self.initial)] * len(runs)
         lanes = self._make_lanes(program, active, runs, context, starts)
-        outputs = self._simulate_lanes(program, context.start_time, context.dt / steps, lanes, interval)
-        return outputs[:, :, ::steps]
+        dt = context.dt / steps
+        return self._simulate_lanes(program, context.start_time, dt, lanes, interval, every * steps)
 
     def _simulate_lanes(
-        self, program: OdeProgram, _start_time: float, dt: float, lanes: Sequence[LaneInput], interval: int
+        self,
+        program: OdeProgram,
+        _start_time: float,
+        dt: float,
+        lanes: Sequence[LaneInput],
+        interval: int,
+        every: int,
     ) -> Signal:
-        """Simulate the outputs of a program, shape (lanes, outputs, steps)."""
-        return simulate_lanes(program, dt, lanes, interval)
+        """Simulate the outputs of a program, shape (lanes, outputs, samples)."""
+        return simulate_lanes(program, dt, lanes, interval, every)
 
     def _make_lanes(
         self,
@@ -239,38 +242,34 @@ class OdeSimulator:
         context: SimulationContext,
         starts: Sequence[Mapping[str, Signal]] | None = None,
     ) -> list[LaneInput]:
-        steps = max(self.system.steps, 1)
-        samples = runs[0].x.size
+        steps, samples = max(self.system.steps, 1), runs[0].x.size
         common = make_time(context.start_time, samples, context.dt) if Symbol(TIME) in program.signals else {}
         common |= sample_channels(context, self.channels, samples, is_held=not self.is_continuous_time)
         common = {name: signal.refine(steps) for name, signal in common.items()}
-        made: dict[bytes, SampledSignal] = {}
+        made: dict[int, SampledSignal] = {}
+        names = [each.name for each in self.parameters]
+        fixed = {each.name: each.value for each in self.system.parameters}
         lanes = []
         for index, run in enumerate(runs):
             effects = run.effect_parameters
             gain = gain_over_time(effects, context)
             signals = dict(common)
             if isinstance(gain, float) or self.system.gain:
-                key = run.x.tobytes()
-                if key not in made:
-                    made[key] = SampledSignal(run.x, *self._get_between(run, context)).refine(steps)
-                signals[self.system.input] = made[key]
+                if id(run.x) not in made:
+                    made[id(run.x)] = SampledSignal(run.x, *self._get_between(run, context)).refine(steps)
+                signals[self.system.input] = made[id(run.x)]
                 if not isinstance(gain, float):
                     signals[_GAIN] = interpolate_linearly(gain).refine(steps)
             else:
                 between = self._get_between(run, context) * gain
                 signals[self.system.input] = SampledSignal(run.x * gain, *between).refine(steps)
-            given = {each.name: float(v) for each, v in zip(self.parameters, run.values, strict=True)}
+            given = dict(zip(names, run.values.tolist(), strict=True))
             laws = list(enumerate(run.forces)) if self._has_force_equation else []
             calls = [law for _, law in laws if not self._is_term(law[0])]
             numbers, states = list_values([each for each in laws if self._is_term(each[1][0])], context)
             lanes.append(
                 LaneInput(
-                    {
-                        **{each.name: given.get(each.name, each.value) for each in self.system.parameters},
-                        **{each.name: effects[each.name] for each in active},
-                        **numbers,
-                    },
+                    {**fixed, **given, **{each.name: effects[each.name] for each in active}, **numbers},
                     {
                         **{name: given.get(f"initial {name}", value) for name, value in self.initial.items()},
                         **states,

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.discrepancy.calibration.preparation import select_effects
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.effects import catalogue_order, model_form
 from islands.discrepancy.inference.screening import transfer_parameters

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.kernels.jit_cache import kernel
-from islands.kernels.simd import VECTOR
 from islands.systems.fmu.fmi_calls import (
     TERMINATED,
     WARNING,
@@ -23,7 +22,7 @@ from islands.systems.fmu.fmi_calls import (
     set_time,
     update_discrete_states,
 )
-from islands.systems.ode.kernel_arguments import Instructions, LaneForces, LaneLimits
+from islands.systems.ode.kernel_arguments import LANES, Instructions, LaneForces, LaneLimits
 from islands.systems.ode.ode_kernel import execute_code
 
 
@@ -33,7 +32,7 @@ class FmuEquations(NamedTuple):
     Attributes
     ----------
     instructions : Instructions
-    arena : ndarray, shape (rows*8,)
+    arena : ndarray, shape (rows*16,)
         Constants, parameters and initial states.
     signals : ndarray, shape (steps, 3, signals)
         Signals at the start, in the middle and at the end of each step.
@@ -137,7 +136,7 @@ def integrate(fmu, equations, begin, dt, start, middle, end, inputs, states, ind
     if status <= WARNING:
         status = exchange_states(fmu.get_states, fmu, fmu_x)
     for i in range(places.size):
-        x[places[i]] = arena[VECTOR * (equations.instructions.states + i)]
+        x[places[i]] = arena[LANES * (equations.instructions.states + i)]
     if status <= WARNING:
         status = exchange_states(fmu.set_states, fmu, fmu_x)
     if status <= WARNING:
@@ -197,10 +196,10 @@ def _write_outputs(fmu, equations, k, x, slope, values, y):
     if status > WARNING:
         return status
     for i in range(values.size):
-        equations.arena[VECTOR * equations.value_rows[i]] = values[i]
+        equations.arena[LANES * equations.value_rows[i]] = values[i]
     _execute(equations, k, 0, x, slope, 3)
     for output in range(y.size):
-        y[output] = equations.arena[VECTOR * equations.instructions.outputs[output]]
+        y[output] = equations.arena[LANES * equations.instructions.outputs[output]]
     return status
 
 
@@ -209,11 +208,11 @@ def _execute(equations, k, moment, x, slope, last):
     """Execute the equations up to a section, for states and derivatives by the FMU at a moment of a step."""
     instructions, arena = equations.instructions, equations.arena
     for s in range(equations.signal_rows.size):
-        arena[VECTOR * equations.signal_rows[s]] = equations.signals[k, moment, s]
+        arena[LANES * equations.signal_rows[s]] = equations.signals[k, moment, s]
     for i in range(equations.places.size):
-        arena[VECTOR * (instructions.states + i)] = x[equations.places[i]]
+        arena[LANES * (instructions.states + i)] = x[equations.places[i]]
     for i in range(equations.derivative_rows.size):
-        arena[VECTOR * equations.derivative_rows[i]] = slope[equations.derivative_places[i]]
+        arena[LANES * equations.derivative_rows[i]] = slope[equations.derivative_places[i]]
     first = 0 if k == 0 and moment == 0 else instructions.ends[0]
     execute_code(instructions, first, instructions.ends[last], arena.ctypes.data, arena, equations.laws, 1)
 
@@ -223,19 +222,19 @@ def _read_slopes(equations, slope):
     """Replace the derivatives of the states that have equations."""
     for i in range(equations.places.size):
         row = equations.instructions.slopes[i]
-        slope[equations.places[i]] = equations.arena[VECTOR * row]
+        slope[equations.places[i]] = equations.arena[LANES * row]
 
 
 @kernel(forceinline=True)
 def _limit(equations, x):
     """Limit the states at a sample; a NaN remains."""
-    limits, states = equations.limits, equations.limits.lower.size // VECTOR
+    limits, states = equations.limits, equations.limits.lower.size // LANES
     for i in range(states):
         place = equations.places[i]
-        if x[place] < limits.lower[VECTOR * i]:
-            x[place] = limits.lower[VECTOR * i]
-        elif x[place] > limits.upper[VECTOR * i]:
-            x[place] = limits.upper[VECTOR * i]
+        if x[place] < limits.lower[LANES * i]:
+            x[place] = limits.lower[LANES * i]
+        elif x[place] > limits.upper[LANES * i]:
+            x[place] = limits.upper[LANES * i]
 
 
 @kernel

@@ -4,10 +4,10 @@ import itertools
 
 import numpy as np
 
-from islands.kernels.simd import VECTOR
 from islands.systems.fmu.fmi_kernel import FmuEquations
 from islands.systems.fmu.fmu_instance import FmuInstance, FmuRun
 from islands.systems.fmu.fmu_model import FmuModel
+from islands.systems.ode.kernel_arguments import LANES
 from islands.systems.ode.lane_simulation import (
     LaneInput,
     pack_arena,
@@ -65,8 +65,8 @@ def _pack_equations(model: FmuModel, program: OdeProgram, dt: float, lane: LaneI
                 values.append((references[name], row))
             case _:
                 signals.append(expression)
-    full = [lane] * VECTOR
-    shared, _, order = pack_signals(signals, dt, full)
+    full = [lane] * LANES
+    found, order = pack_signals(signals, dt, full)
     # Internal states of force laws follow the states of the FMU.
     following = itertools.count(len(model.description.states))
     places = [known[name] if name in known else next(following) for name in program.states]
@@ -74,7 +74,7 @@ def _pack_equations(model: FmuModel, program: OdeProgram, dt: float, lane: LaneI
     return FmuEquations(
         program.instructions,
         pack_arena(program, full),
-        shared,
+        found.shared,
         np.array([rows[signals[place]] for place in order], dtype=np.int64),
         pack_elements(full),
         pack_limits(program.states, full),

@@ -1,9 +1,18 @@
-"""Arguments of the kernel that integrates a system eight lanes at a time: arrays that belong together."""
+"""Arguments of the kernel that integrates a system in several lanes: arrays that belong together."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from islands.kernels.simd import VECTOR
+
+#: Vectors of a row. Most instructions wait for the result of the one before, so that two vectors cost little
+#: more than one.
+VECTORS = 2
+
+#: Lanes: sets of parameters and initial states that are simulated at once.
+LANES = VECTORS * VECTOR
 
 
 class Instructions(NamedTuple):
@@ -37,13 +46,31 @@ class Instructions(NamedTuple):
     rows: int
 
 
+class LaneSignals(NamedTuple):
+    """Signals at the start, in the middle and at the end of each step.
+
+    Attributes
+    ----------
+    shared : ndarray, shape (samples, 3, shared)
+        Signals that are equal in all lanes.
+    own : ndarray, shape (samples, 3, different)
+        Signals of single lanes.
+    places : ndarray of int64, shape (signals, lanes)
+        Index in ``own`` of each further signal in each lane.
+    """
+
+    shared: NDArray[np.float64]
+    own: NDArray[np.float64]
+    places: NDArray[np.int64]
+
+
 class LaneForces(NamedTuple):
     """Force laws in every lane; addresses as in `islands.systems.mechanics.Elements`.
 
     Attributes
     ----------
     forces, state_derivatives : ndarray of int64, shape (laws,)
-    numbers : ndarray, shape (laws, 8, WIDTH)
+    numbers : ndarray, shape (laws, 16, WIDTH)
     """
 
     forces: NDArray[np.int64]
@@ -56,10 +83,10 @@ class LaneLimits(NamedTuple):
 
     Attributes
     ----------
-    lower, upper : ndarray, shape (states*8,)
+    lower, upper : ndarray, shape (states*16,)
     receivers : ndarray of int64, shape (states,)
         Index of the state that receives the part ``caught`` of what the upper limit of a state cuts off.
-    caught : ndarray, shape (states*8,)
+    caught : ndarray, shape (states*16,)
     """
 
     lower: NDArray[np.float64]
@@ -74,7 +101,7 @@ class LaneRestarts(NamedTuple):
     Attributes
     ----------
     samples : ndarray of int64, shape (restarts,)
-    states : ndarray, shape (restarts, states*8)
+    states : ndarray, shape (restarts, states*16)
     """
 
     samples: NDArray[np.int64]

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.kernels.simd import VECTOR, padded_size
+from islands.kernels.simd import padded_size
 from islands.systems.mechanics import WIDTH, Elements
 from islands.systems.ode.equation_parser import TIME
-from islands.systems.ode.kernel_arguments import LaneForces, LaneLimits, LaneRestarts
+from islands.systems.ode.kernel_arguments import LANES, LaneForces, LaneLimits, LaneRestarts, LaneSignals
 from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol
 from islands.systems.ode.ode_kernel import integrate
 from islands.systems.ode.ode_program import OdeProgram
@@ -106,9 +106,9 @@ class LaneInput:
 
 
 def simulate_lanes(
-    program: OdeProgram, dt: float, lanes: Sequence[LaneInput], interval: int = 0
+    program: OdeProgram, dt: float, lanes: Sequence[LaneInput], interval: int = 0, every: int = 1
 ) -> NDArray[np.float64]:
-    """Simulate a system, eight lanes at a time.
+    """Simulate a system, `LANES` at a time.
 
     Parameters
     ----------
@@ -119,40 +119,42 @@ def simulate_lanes(
         All have the same force laws.
     interval : int
         Steps of a shooting interval; 0 for none.
+    every : int
+        The outputs have one sample of ``every`` successive ones, the first.
 
     Returns
     -------
     ndarray, shape (lanes, outputs, samples)
-        NaN in all samples of a lane that diverges. A lane does not depend on the others.
+        NaN in all samples of a lane that diverges. A lane does not depend on the others. The array is not
+        contiguous: the values of one sample follow one another.
     """
-    return np.concatenate(
-        [
-            _simulate_eight(program, dt, lanes[first : first + VECTOR], interval)
-            for first in range(0, len(lanes), VECTOR)
-        ]
-    )
-
-
-def _simulate_eight(
-    program: OdeProgram, dt: float, lanes: Sequence[LaneInput], interval: int
-) -> NDArray[np.float64]:
-    instructions = program.instructions
-    full = [*lanes, *[lanes[0]] * (VECTOR - len(lanes))]
-    arena = pack_arena(program, full)
-    shared, own, order = pack_signals(program.signals, dt, full)
     samples = len(next(iter(lanes[0].signals.values())).start)
-    out = np.empty((samples, instructions.outputs.size, VECTOR))
-    instructions = instructions._replace(signals=instructions.signals[order])
-    limits = pack_limits(program.states, full)
-    restarts = _pack_restarts(program.states, full, samples, interval)
-    integrate(instructions, arena, shared, own, dt, limits, restarts, pack_elements(full), len(lanes), out)
-    return np.ascontiguousarray(out.transpose(2, 1, 0)[: len(lanes)])
+    out = np.empty((-(-samples // every), program.instructions.outputs.size, -(-len(lanes) // LANES) * LANES))
+    for first in range(0, len(lanes), LANES):
+        group = lanes[first : first + LANES]
+        signals, order = pack_signals(program.signals, dt, group)
+        full = [*group, *[group[0]] * (LANES - len(group))]
+        integrate(
+            program.instructions._replace(signals=program.instructions.signals[order]),
+            pack_arena(program, full),
+            signals,
+            dt,
+            pack_limits(program.states, full),
+            _pack_restarts(program.states, full, samples, interval),
+            pack_elements(full),
+            len(group),
+            first,
+            every,
+            out,
+        )
+    found: NDArray[np.float64] = out.transpose(2, 1, 0)[: len(lanes)]
+    return found
 
 
 def pack_arena(program: OdeProgram, lanes: Sequence[LaneInput]) -> NDArray[np.float64]:
-    """Return the rows of a program with its constants, and the parameters and states of eight lanes."""
-    arena: NDArray[np.float64] = padded_size(VECTOR * program.instructions.rows)
-    rows = arena.reshape(-1, VECTOR)
+    """Return the rows of a program with its constants, and the parameters and states of all lanes."""
+    arena: NDArray[np.float64] = padded_size(LANES * program.instructions.rows)
+    rows = arena.reshape(-1, LANES)
     count, states = len(program.constants), program.instructions.states
     rows[:count] = program.constants[:, None]
     for lane, each in enumerate(lanes):
@@ -170,30 +172,41 @@ def pack_arena(program: OdeProgram, lanes: Sequence[LaneInput]) -> NDArray[np.fl
 
 def pack_signals(
     expressions: Sequence[OdeExpression], dt: float, lanes: Sequence[LaneInput]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Return the shared signals, those of each lane, and the order of both among all signals."""
+) -> tuple[LaneSignals, NDArray[np.int64]]:
+    """Return the signals of lanes, and the order of shared and own ones among all signals."""
     samples = len(next(iter(lanes[0].signals.values())).start)
     made: dict[tuple[object, ...], SampledSignal] = {}
-    shared, own, shared_places, own_places = [], [], [], []
-    for place, expression in enumerate(expressions):
+    shared, own, places = list[SampledSignal](), list[SampledSignal](), list[list[int]]()
+    shared_order, own_order = list[int](), list[int]()
+    for index, expression in enumerate(expressions):
         found = [_make_signal(expression, dt, lane, made) for lane in lanes]
-        if all(each is found[0] for each in found):
+        different = {id(each): each for each in found}
+        if len(different) == 1:
             shared.append(found[0])
-            shared_places.append(place)
+            shared_order.append(index)
         else:
-            own.append(found)
-            own_places.append(place)
-    of_all, of_lanes = np.empty((samples, 3, len(shared))), np.empty((samples, 3, len(own), VECTOR))
-    for index, signal in enumerate(shared):
-        _copy_signal(signal, of_all[:, :, index])
-    for index, signals in enumerate(own):
-        for lane, signal in enumerate(signals):
-            _copy_signal(signal, of_lanes[:, :, index, lane])
-    return of_all, of_lanes, np.array([*shared_places, *own_places], dtype=np.int64)
+            place = {key: len(own) + number for number, key in enumerate(different)}
+            own += different.values()
+            places.append([place[id(each)] for each in found])
+            own_order.append(index)
+    signals = LaneSignals(
+        _stack(shared, samples),
+        _stack(own, samples),
+        np.array(places, dtype=np.int64).reshape(-1, len(lanes)),
+    )
+    return signals, np.array([*shared_order, *own_order], dtype=np.int64)
 
 
-def _copy_signal(signal: SampledSignal, target: NDArray[np.float64]) -> None:
-    target[:, 0], target[:, 1], target[:, 2] = signal.start, signal.middle, signal.end
+def _stack(signals: Sequence[SampledSignal], samples: int) -> NDArray[np.float64]:
+    """Return signals as one array, shape (samples, 3, signals)."""
+    stacked = np.empty((samples, 3, len(signals)))
+    for index, signal in enumerate(signals):
+        stacked[:, 0, index], stacked[:, 1, index], stacked[:, 2, index] = (
+            signal.start,
+            signal.middle,
+            signal.end,
+        )
+    return stacked
 
 
 def _make_signal(
@@ -219,7 +232,7 @@ def _make_signal(
 
 
 def pack_limits(states: Sequence[str], lanes: Sequence[LaneInput]) -> LaneLimits:
-    """Return the limits of the states in eight lanes."""
+    """Return the limits of the states in all lanes."""
     receivers, none = np.zeros(len(states), dtype=np.int64), np.empty(0)
     if not any(lane.limits for lane in lanes):
         return LaneLimits(none, none, receivers, none)
@@ -228,8 +241,9 @@ def pack_limits(states: Sequence[str], lanes: Sequence[LaneInput]) -> LaneLimits
     lower, upper = (np.ascontiguousarray(bounds[..., side].reshape(-1)) for side in range(2))
     if not any(lane.spills for lane in lanes):
         return LaneLimits(lower, upper, receivers, none)
-    for name, (receiver, _) in (lanes[0].spills or {}).items():
-        receivers[states.index(name)] = states.index(receiver)
+    for lane in lanes:
+        for name, (receiver, _) in (lane.spills or {}).items():
+            receivers[states.index(name)] = states.index(receiver)
     caught = [[(lane.spills or {}).get(name, ("", 0.0))[1] for lane in lanes] for name in states]
     return LaneLimits(lower, upper, receivers, np.array(caught).reshape(-1))
 
@@ -245,11 +259,11 @@ def _pack_restarts(
 
 
 def pack_elements(lanes: Sequence[LaneInput]) -> LaneForces:
-    """Return the force laws of eight lanes that are calls."""
+    """Return the force laws of all lanes that are calls."""
     first = lanes[0].elements
     if first is None:
         none = np.empty(0, dtype=np.int64)
-        return LaneForces(none, none, np.empty((0, VECTOR, WIDTH)))
+        return LaneForces(none, none, np.empty((0, LANES, WIDTH)))
     numbers = np.stack([lane.elements.numbers for lane in lanes if lane.elements is not None], axis=1)
     return LaneForces(first.forces, first.state_derivatives, np.ascontiguousarray(numbers))
 

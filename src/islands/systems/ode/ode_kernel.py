@@ -1,6 +1,6 @@
-"""Kernel that interprets the instructions of a system and integrates it by RK4, eight lanes at a time.
+"""Kernel that interprets the instructions of a system and integrates it by RK4, sixteen lanes at a time.
 
-A row is eight consecutive values, one for each lane; a lane is one set of parameters and initial states. No
+A row is sixteen consecutive values, one for each lane; a lane is one set of parameters and initial states. No
 instruction combines lanes, so that no lane depends on another one, nor on the vector width of the processor.
 """
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from islands.kernels.interpreter import ADD, MULTIPLY, SIGN, SUBTRACT
 from islands.kernels.jit_cache import kernel
-from islands.kernels.simd import VECTOR, add, broadcast, multiply, read, sign, subtract, write
+from islands.kernels.simd import add, broadcast, multiply, read, sign, subtract, write
 from islands.kernels.simd_functions import (
     absolute,
     divide,
@@ -20,6 +20,7 @@ from islands.kernels.simd_functions import (
     square_root,
 )
 from islands.systems.mechanics import WIDTH, call_law
+from islands.systems.ode.kernel_arguments import LANES, VECTORS
 
 # Instructions of `islands.kernels.interpreter` keep their numbers. All others are functions here and not
 # calls of addresses, which would be compiled once per process.
@@ -56,7 +57,17 @@ FORCES = 40
 _CHECK = 16
 
 #: Bytes of a row.
-_ROW = 8 * VECTOR
+_ROW = 8 * LANES
+
+
+@kernel(forceinline=True)
+def _read(place):
+    return read(place, VECTORS)
+
+
+@kernel(forceinline=True)
+def _fill(number):
+    return broadcast(number, VECTORS)
 
 
 @kernel(forceinline=True)
@@ -64,44 +75,44 @@ def _execute(operation, base, target, first, second, third):
     """Execute an instruction on rows of an arena at the address ``base``."""
     to, a, b, c = base + _ROW * target, base + _ROW * first, base + _ROW * second, base + _ROW * third
     if operation == MULTIPLY:
-        write(to, multiply(read(a, 1), read(b, 1)))
+        write(to, multiply(_read(a), _read(b)))
     elif operation == ADD:
-        write(to, add(read(a, 1), read(b, 1)))
+        write(to, add(_read(a), _read(b)))
     elif operation == SUBTRACT:
-        write(to, subtract(read(a, 1), read(b, 1)))
+        write(to, subtract(_read(a), _read(b)))
     elif operation == ADD_PRODUCT:
-        write(to, add(read(a, 1), multiply(read(b, 1), read(c, 1))))
+        write(to, add(_read(a), multiply(_read(b), _read(c))))
     elif operation == SUBTRACT_PRODUCT:
-        write(to, subtract(read(a, 1), multiply(read(b, 1), read(c, 1))))
+        write(to, subtract(_read(a), multiply(_read(b), _read(c))))
     elif operation == DIVIDE:
-        write(to, divide(read(a, 1), read(b, 1)))
+        write(to, divide(_read(a), _read(b)))
     elif operation == COPY:
-        write(to, read(a, 1))
+        write(to, _read(a))
     elif operation == SIGN:
-        write(to, sign(read(a, 1)))
+        write(to, sign(_read(a)))
     elif operation == SQUARE_ROOT:
-        write(to, square_root(read(a, 1)))
+        write(to, square_root(_read(a)))
     elif operation == ABSOLUTE:
-        write(to, absolute(read(a, 1)))
+        write(to, absolute(_read(a)))
     elif operation == NEGATE:
-        write(to, negate(read(a, 1)))
+        write(to, negate(_read(a)))
     elif operation == MINIMUM:
-        write(to, select_less(read(a, 1), read(b, 1), read(a, 1), read(b, 1)))
+        write(to, select_less(_read(a), _read(b), _read(a), _read(b)))
     elif operation == MAXIMUM:
-        write(to, select_less(read(b, 1), read(a, 1), read(a, 1), read(b, 1)))
+        write(to, select_less(_read(b), _read(a), _read(a), _read(b)))
     elif operation == LESS:
-        write(to, select_less(read(a, 1), read(b, 1), broadcast(1.0, 1), broadcast(0.0, 1)))
+        write(to, select_less(_read(a), _read(b), _fill(1.0), _fill(0.0)))
     elif operation == LESS_EQUAL:
-        write(to, select_less_equal(read(a, 1), read(b, 1), broadcast(1.0, 1), broadcast(0.0, 1)))
+        write(to, select_less_equal(_read(a), _read(b), _fill(1.0), _fill(0.0)))
     else:
-        write(to, select_less(broadcast(0.0, 1), read(a, 1), read(b, 1), read(c, 1)))
+        write(to, select_less(_fill(0.0), _read(a), _read(b), _read(c)))
 
 
 @kernel(forceinline=True)
 def _apply(operation, arena, target, first, second, lanes):
     """Apply a function to the first ``lanes`` lanes of rows."""
     for lane in range(lanes):
-        x, b = arena[VECTOR * first + lane], arena[VECTOR * second + lane]
+        x, b = arena[LANES * first + lane], arena[LANES * second + lane]
         if operation == POWER:
             y = x**b
         elif operation == EXPONENTIAL:
@@ -118,7 +129,7 @@ def _apply(operation, arena, target, first, second, lanes):
             y = math.tanh(x)
         else:
             y = math.atan(x)
-        arena[VECTOR * target + lane] = y
+        arena[LANES * target + lane] = y
 
 
 @kernel
@@ -126,16 +137,16 @@ def _sum_forces(arena, laws, states, slopes, target, coordinate, rate, lanes):
     """Write the sum of the force laws, and the derivatives of their states."""
     own = states + slopes.size - laws.forces.size
     for lane in range(lanes):
-        x, v, total = arena[VECTOR * coordinate + lane], arena[VECTOR * rate + lane], 0.0
+        x, v, total = arena[LANES * coordinate + lane], arena[LANES * rate + lane], 0.0
         for e in range(laws.forces.size):
-            numbers = laws.numbers.ctypes.data + 8 * WIDTH * (VECTOR * e + lane)
-            z = arena[VECTOR * (own + e) + lane]
+            numbers = laws.numbers.ctypes.data + 8 * WIDTH * (LANES * e + lane)
+            z = arena[LANES * (own + e) + lane]
             total += call_law(laws.forces[e], x, v, z, numbers)
             slope = 0.0
             if laws.state_derivatives[e] != 0:
                 slope = call_law(laws.state_derivatives[e], x, v, z, numbers)
-            arena[VECTOR * slopes[slopes.size - laws.forces.size + e] + lane] = slope
-        arena[VECTOR * target + lane] = total
+            arena[LANES * slopes[slopes.size - laws.forces.size + e] + lane] = slope
+        arena[LANES * target + lane] = total
 
 
 @kernel(forceinline=True)
@@ -160,16 +171,16 @@ def _advance(stage, dt, slope, before, total, state):
     sample, of the sum of the derivatives, and of the state itself.
     """
     if stage == 3:
-        new = add(read(before, 1), multiply(broadcast(dt / 6.0, 1), add(read(total, 1), slope)))
+        new = add(_read(before), multiply(_fill(dt / 6.0), add(_read(total), slope)))
         write(before, new)
         write(state, new)
         return
     if stage == 0:
         write(total, slope)
     else:
-        write(total, add(read(total, 1), multiply(broadcast(2.0, 1), slope)))
+        write(total, add(_read(total), multiply(_fill(2.0), slope)))
     part = dt if stage == 2 else 0.5 * dt
-    write(state, add(read(before, 1), multiply(broadcast(part, 1), slope)))
+    write(state, add(_read(before), multiply(_fill(part), slope)))
 
 
 @kernel
@@ -177,7 +188,7 @@ def _limit(arena, states, before, lower, upper, receivers, caught):
     """Limit the states at a sample; a NaN remains. Receivers get a part of what upper limits cut off."""
     for i in range(caught.size):
         if before[i] > upper[i]:
-            before[VECTOR * receivers[i // VECTOR] + i % VECTOR] += caught[i] * (before[i] - upper[i])
+            before[LANES * receivers[i // LANES] + i % LANES] += caught[i] * (before[i] - upper[i])
     for i in range(lower.size):
         x = before[i]
         if x < lower[i]:
@@ -185,67 +196,79 @@ def _limit(arena, states, before, lower, upper, receivers, caught):
         elif x > upper[i]:
             x = upper[i]
         before[i] = x
-        arena[VECTOR * states + i] = x
+        arena[LANES * states + i] = x
 
 
 @kernel
 def _is_finite(before, lane):
-    return np.isfinite(before[lane::VECTOR]).all()
+    """Return whether all states of a lane are finite."""
+    finite = True
+    for i in range(lane, before.size, LANES):
+        finite &= math.isfinite(before[i])
+    return finite
 
 
 @kernel
-def integrate(instructions, arena, shared, own, dt, limits, restarts, laws, lanes, out):
+def _is_any_finite(before, lanes):
+    """Return whether the states of any lane are finite."""
+    finite = False
+    for lane in range(lanes):
+        finite |= _is_finite(before, lane)
+    return finite
+
+
+@kernel
+def integrate(instructions, arena, signals, dt, limits, restarts, laws, lanes, first, every, out):
     """Integrate a system from the states in the arena; write the outputs.
 
-    ``arena`` (rows*8,) contains constants, parameters and initial states. ``shared`` (samples, 3, signals)
-    are signals that are equal in all lanes, at the start, in the middle and at the end of each step; ``own``
-    (samples, 3, signals, 8) the others, which follow them. ``out`` is (samples, outputs, 8); only the first
-    ``lanes`` lanes are computed. All outputs of a lane that diverges are NaN.
+    ``arena`` (rows*16,) contains constants, parameters and initial states. ``out`` is (samples, outputs, all
+    lanes) and receives the first of ``every`` successive samples. The kernel computes ``lanes`` lanes, and
+    overwrites the values of 16, from ``first``. All outputs of a lane that diverges are NaN.
     """
     ends, states = instructions.ends, instructions.states
-    signals, slopes, outputs = instructions.signals, instructions.slopes, instructions.outputs
-    size = slopes.size * VECTOR
-    before, total = arena[VECTOR * states : VECTOR * states + size].copy(), np.empty(size)
-    base = arena.ctypes.data
-    restart = 0
-    for k in range(out.shape[0]):
+    rows, slopes, outputs = instructions.signals, instructions.slopes, instructions.outputs
+    shared, own, places = signals.shared, signals.own, signals.places
+    size = slopes.size * LANES
+    before, total = arena[LANES * states : LANES * states + size].copy(), np.empty(size)
+    base, result = arena.ctypes.data, out.ctypes.data
+    samples, restart = shared.shape[0], 0
+    for k in range(samples):
         if restart < restarts.samples.size and restarts.samples[restart] == k:
             for i in range(restarts.states.shape[1]):
                 before[i] = restarts.states[restart, i]
-                arena[VECTOR * states + i] = before[i]
+                arena[LANES * states + i] = before[i]
             restart += 1
         for stage in range(4):
-            begin, end = ends[0], ends[3] if stage == 0 else ends[2]
+            is_read = stage == 0 and k % every == 0
+            begin, end = ends[0], ends[3] if is_read else ends[2]
             if stage == 2:
                 begin = ends[1]  # the signals are those of the stage before
             else:
                 moment = (stage + 1) // 2
                 for s in range(shared.shape[2]):
-                    write(base + _ROW * signals[s], broadcast(shared[k, moment, s], 1))
-                for s in range(own.shape[2]):
+                    write(base + _ROW * rows[s], _fill(shared[k, moment, s]))
+                values = own[k, moment]
+                for s in range(places.shape[0]):
+                    row = LANES * rows[shared.shape[2] + s]
                     for lane in range(lanes):
-                        arena[VECTOR * signals[shared.shape[2] + s] + lane] = own[k, moment, s, lane]
+                        arena[row + lane] = values[places[s, lane]]
             if k == 0 and stage == 0:
                 begin = 0
             execute_code(instructions, begin, end, base, arena, laws, lanes)
-            if stage == 0:
+            if is_read:
                 for output in range(outputs.size):
-                    for lane in range(lanes):
-                        out[k, output, lane] = arena[VECTOR * outputs[output] + lane]
-                if k + 1 == out.shape[0]:
-                    break
+                    place = (k // every * outputs.size + output) * out.shape[2] + first
+                    write(result + 8 * place, _read(base + _ROW * outputs[output]))
+            if k + 1 == samples:
+                break
             for i in range(slopes.size):
-                slope = read(base + _ROW * slopes[i], 1)
-                places = before.ctypes.data + _ROW * i, total.ctypes.data + _ROW * i
-                _advance(stage, dt, slope, *places, base + _ROW * (states + i))
+                slope = _read(base + _ROW * slopes[i])
+                addresses = before.ctypes.data + _ROW * i, total.ctypes.data + _ROW * i
+                _advance(stage, dt, slope, *addresses, base + _ROW * (states + i))
         if limits.lower.size > 0:
             _limit(arena, states, before, limits.lower, limits.upper, limits.receivers, limits.caught)
-        if k % _CHECK == 0:
-            alive = False
-            for lane in range(lanes):
-                alive |= _is_finite(before, lane)
-            if not alive:
-                break
+        if k % _CHECK == 0 and not _is_any_finite(before, lanes):
+            break
     for lane in range(lanes):
         if not _is_finite(before, lane):
-            out[:, :, lane] = np.nan
+            out[:, :, first + lane] = np.nan

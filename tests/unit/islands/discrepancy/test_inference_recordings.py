@@ -8,9 +8,10 @@ import pytest
 import scipy
 
 from islands.data.dataset import join
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, evaluate_fit
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.discrepancy.calibration.noise_model import fit_noise
 from islands.discrepancy.calibration.preparation import make_context as make_record_context
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.holdout import cross_validate_gain
 from islands.discrepancy.inference.hypothesis import Hypothesis

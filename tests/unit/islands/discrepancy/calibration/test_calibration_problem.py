@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from islands.discrepancy.calibration import levenberg_marquardt
-from islands.discrepancy.calibration.calibration_problem import CalibrationProblem
-from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate
+from islands.discrepancy.calibration.calibration_problem import CalibrationProblem, simulate_together
+from islands.discrepancy.calibration.levenberg_marquardt import calibrate, minimise
 from islands.discrepancy.calibration.preparation import make_context
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.io.simulator_spec.factory import make_simulator
@@ -33,8 +34,9 @@ def test_derivatives_of_the_same_call_have_the_same_bits(
     simulation, target = oscillator
     free = np.zeros(simulation.nominal.size)
     problem = CalibrationProblem(simulation, target, free, simulation.nominal)
-    at_once = problem.evaluate(simulation.nominal, with_jacobian=True)
-    later = problem.linearise(problem.evaluate(simulation.nominal))
+    (at_once,) = simulate_together(simulation, [problem.evaluate(simulation.nominal, with_jacobian=True)])
+    (point,) = simulate_together(simulation, [problem.evaluate(simulation.nominal)])
+    (later,) = simulate_together(simulation, [problem.linearise(point)])
     assert at_once.jacobian is not None
     assert later.jacobian is not None
     assert at_once.jacobian.tobytes() == later.jacobian.tobytes()
@@ -47,7 +49,8 @@ def test_step_without_damping_solves_the_linearised_problem(
     simulation, target = oscillator
     free = np.zeros(simulation.nominal.size)
     problem = CalibrationProblem(simulation, target, free, simulation.nominal)
-    point = problem.evaluate(1.001 * simulation.nominal, with_jacobian=True)
+    values = 1.001 * simulation.nominal
+    (point,) = simulate_together(simulation, [problem.evaluate(values, with_jacobian=True)])
     assert point.jacobian is not None
     steps, predicted = problem.find_steps(point, np.array([1e-12, 1e3]))
     expected = np.linalg.lstsq(point.jacobian, point.residual, rcond=None)[0] * simulation.scales
@@ -63,3 +66,14 @@ def test_simulations_in_groups_give_the_same_fit(
     monkeypatch.setattr(levenberg_marquardt, "MIN_BATCHED_SAMPLES", 1)
     grouped = calibrate(simulation, target, simulation.nominal)
     assert grouped.values.tobytes() == one_by_one.values.tobytes()
+
+
+def test_fits_from_several_starts_do_not_depend_on_each_other(
+    oscillator: tuple[ExtendedSimulator, Target],
+) -> None:
+    simulation, target = oscillator
+    starts = [factor * simulation.nominal for factor in (0.97, 1.0, 1.05)]
+    together = minimise(simulation, target, starts)
+    alone = [minimise(simulation, target, [start])[0] for start in starts]
+    assert len({each.values.tobytes() for each in together}) == 3
+    assert [each.values.tobytes() for each in together] == [each.values.tobytes() for each in alone]

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from islands.discrepancy.calibration.fit_journal import FitJournal, RecordedFit, journal_from_document
-from islands.discrepancy.calibration.levenberg_marquardt import Target
 from islands.discrepancy.calibration.noise_model import NoiseModel
 from islands.discrepancy.calibration.preparation import make_context
 from islands.discrepancy.calibration.starts_calibrator import CalibrationTask, StartsCalibrator
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator

@@ -5,8 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate, evaluate_fit
+from islands.discrepancy.calibration.levenberg_marquardt import calibrate, evaluate_fit
 from islands.discrepancy.calibration.preparation import make_context
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects.model_form import CORE_SHAPE, SLOPE
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.narx import NarxSimulator

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import Target
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.gross_errors.gross_error_search import limit_to_tolerances

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain
 from islands.discrepancy.inference.screening import bic_penalty, screen_effects

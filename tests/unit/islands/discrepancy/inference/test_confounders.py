@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.preparation import make_context
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.confounders import Confounder, find_confounder
 from islands.discrepancy.inference.screening import screen_effects

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import Target, evaluate_fit
+from islands.discrepancy.calibration.levenberg_marquardt import evaluate_fit
 from islands.discrepancy.calibration.preparation import make_context
-from islands.discrepancy.inference.screening import Projection
+from islands.discrepancy.calibration.projection import Projection
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator
 

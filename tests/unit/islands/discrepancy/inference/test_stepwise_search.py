@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
-    Target,
     calibrate,
     evaluate_fit,
     whiten_target,
 )
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.hypothesis import Hypothesis, without_effect
 from islands.discrepancy.inference.screening import SCORE_TIE, screen_effects

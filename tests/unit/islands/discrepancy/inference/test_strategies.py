@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.strategies import assess_evidence, search_with_model_error
 from islands.discrepancy.inference.verdict import Verdict

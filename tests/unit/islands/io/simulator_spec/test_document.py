@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, evaluate_fit
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE, catalogue_order
 from islands.discrepancy.interfaces.effect import Effect

@@ -101,13 +101,14 @@ def test_every_function_has_the_value_of_the_reference() -> None:
 def test_a_lane_does_not_depend_on_the_others() -> None:
     """Also not on one that diverges, nor on one with its own signals, nor on the number of lanes."""
     program = generate_program(make_system(EVERYTHING))
-    lanes = [everything(a=0.4 + 0.01 * i, tau=0.033 + 0.001 * i) for i in range(11)]
+    lanes = [everything(a=0.4 + 0.01 * i, tau=0.033 + 0.001 * i) for i in range(19)]
     lanes[3] = replace(lanes[3], initial_states={**lanes[3].initial_states, "p": 1e200})
     lanes[5] = replace(lanes[5], signals={**lanes[5].signals, "F": interpolate_linearly(2 * FORCE)})
     together = simulate_lanes(program, DT, lanes)
     alone = np.concatenate([simulate_lanes(program, DT, [each]) for each in reversed(lanes)])[::-1]
     assert np.array_equal(together, alone, equal_nan=True)
-    assert np.isnan(together).all(axis=(1, 2)).tolist() == [i == 3 for i in range(11)]
+    assert np.isnan(together).all(axis=(1, 2)).tolist() == [i == 3 for i in range(19)]
+    assert np.array_equal(together[:, :, ::3], simulate_lanes(program, DT, lanes, every=3), equal_nan=True)
 
 
 MOTION = {
@@ -141,8 +142,12 @@ def test_halving_the_step_divides_the_error_by_sixteen() -> None:
 
 def test_limits_hold_a_state_and_leave_other_lanes() -> None:
     program = generate_program(make_system(MOTION), (Symbol("x"), Symbol("v")))
-    free, limited = simulate_lanes(program, DT, [motion(), motion(limits={"x": (-0.02, 0.03)})])
-    assert np.array_equal(free, simulate_lanes(program, DT, [motion()])[0])
+    limits = {"x": (-0.02, 0.03)}
+    lanes = [motion(), motion(limits=limits), motion(limits=limits, spills={"x": ("v", 0.5)})]
+    free, limited, spilled = simulate_lanes(program, DT, lanes)
+    for lane, found in zip(lanes, (free, limited, spilled), strict=True):
+        assert np.array_equal(found, simulate_lanes(program, DT, [lane])[0])
+    assert not np.array_equal(limited, spilled)
     assert (limited[0].min(), limited[0].max()) == (-0.02, 0.03)
     assert free[0].max() > 0.03
 
