@@ -33,7 +33,7 @@ MIN_DECREASE = 0.02
 
 #: Number of samples from which simulations that may not be needed are computed in the same call as others.
 #: In shorter ones, the preparation of a simulation costs as much as what a common call saves.
-MIN_BATCHED_SAMPLES = 2000
+MIN_BATCHED_SAMPLES = 800
 
 #: First and least damping, factor between the damping values of a step, and decrease after a step.
 FIRST_DAMPING, MIN_DAMPING, DAMPING_FACTOR, DAMPING_DECREASE = 1e-3, 1e-9, 8.0, 5.0

@@ -15,11 +15,17 @@ from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, compute_form_chance
 from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, with_effect, without_effect
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
-from islands.discrepancy.inference.stepwise_search import eliminate_backward, refit_with_ar_noise
+from islands.discrepancy.inference.stepwise_search import (
+    MAX_EFFECTS,
+    eliminate_backward,
+    refine_by_swaps,
+    refit_with_ar_noise,
+)
 from islands.discrepancy.inference.strategies import SearchOutcome, assess_evidence
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.evolution.progress import ignore_progress
 
 #: Fraction of the misfit that free forms explain, from which named effects are claimed. A form of the
 #: catalogue is an idealisation, such as a smoothed sign for dry friction.
@@ -44,7 +50,8 @@ def compare_with_free_forms(
 
     Otherwise the forms are only added to the alternatives of a single effect.
     """
-    freer = search_free_forms(outcome, forms, parallel_map)
+    named = [effect for effect in effects if not effect.is_free]
+    freer = search_free_forms(outcome, forms, named, parallel_map)
     if freer.hypothesis is not outcome.hypothesis:
         assessed = assess_evidence(freer, fitted, effects, rng)
         has_forms = any(effect.is_free for effect in assessed.hypothesis.effects)
@@ -54,11 +61,16 @@ def compare_with_free_forms(
 
 
 def search_free_forms(
-    outcome: SearchOutcome, forms: Sequence[Effect], parallel_map: ParallelMap = map
+    outcome: SearchOutcome,
+    forms: Sequence[Effect],
+    named: Sequence[Effect] = (),
+    parallel_map: ParallelMap = map,
 ) -> SearchOutcome:
     """Replace effects by free forms, or add free forms, as long as these explain clearly more.
 
     One free form that fits better than several effects replaces them: it is one cause instead of several.
+    Named effects are then searched for again, in addition to the others and instead of each of several ones:
+    their residual had contained the shape of the forms.
 
     Parameters
     ----------
@@ -66,6 +78,8 @@ def search_free_forms(
         Result of a search for named effects.
     forms : sequence of Effect
         Free forms that apply to the simulation.
+    named : sequence of Effect
+        Effects to be searched for with forms.
     parallel_map : ParallelMap
         Calibrates the extended simulations.
 
@@ -99,6 +113,8 @@ def search_free_forms(
         if not beam or not _explains_more(beam[0], found, outcome):
             break
         found, target, alternatives = beam[0], refitted, {}
+    if found is not outcome.hypothesis:
+        found, target = _add_named_effects(found, target, named, parallel_map)
     merged = _merge(base, outcome.screened, screened)
     return replace(outcome, hypothesis=found, target=target, screened=merged, form_alternatives=alternatives)
 
@@ -127,6 +143,29 @@ def _replace_by_one_form(
         if single.fit.score < found.fit.score - chance - EQUIVALENCE_MARGIN:
             found, target = single, refitted
     return found, target
+
+
+def _add_named_effects(
+    found: Hypothesis, target: Target, named: Sequence[Effect], parallel_map: ParallelMap
+) -> tuple[Hypothesis, Target]:
+    """Add named effects to a hypothesis with free forms, and replace each of its effects by better ones.
+
+    A form is an approximation: an added effect has to explain more than what that leaves.
+    """
+    forms = [effect for effect in found.effects if effect.is_free]
+    while len(found.effects) < MAX_EFFECTS:
+        others = [effect for effect in named if effect not in found.effects]
+        screened = screen_effects(found.fit, target, others, parallel_map)
+        larger = [with_effect(found, each) for each in screened[:1]]
+        beam, refitted = refit_with_ar_noise(larger, target)
+        if not beam or beam[0].cost > found.cost - EQUIVALENCE_MARGIN:
+            break
+        if beam[0].fit.mean_square > MIN_NAMED_FRACTION * found.fit.mean_square:
+            break
+        found, target = beam[0], refitted
+    if len(found.effects) == 1:
+        return found, target
+    return refine_by_swaps(found, target, [*named, *forms], ignore_progress, parallel_map)
 
 
 def _explains_more(new: Hypothesis, old: Hypothesis, outcome: SearchOutcome) -> bool:

@@ -48,6 +48,17 @@ def test_curve_of_no_listed_form_is_a_family_with_its_shape() -> None:
 
 
 @pytest.mark.ci
+def test_effect_in_addition_to_a_free_form_is_named() -> None:
+    place = THEIRS / float(np.max(np.abs(THEIRS)))
+    curve = 0.1 * np.sin(2 * np.pi * place) * (1.0 - place**2) + 0.1 * np.cos(np.pi * place / 2) ** 4
+    found = diagnose(THEIRS + curve + 0.05 * np.sin(0.09 * np.arange(U.size)))
+    assert str(found.verdict) == "family"
+    assert {"output-curve", "periodic-disturbance"} <= {each.name for each in found.effects}
+    assert found.gain is not None
+    assert found.gain.after.rmse < 0.02
+
+
+@pytest.mark.ci
 def test_listed_shape_keeps_its_name() -> None:
     found = diagnose(THEIRS + 0.02 * U**2)
     assert str(found.verdict) == "named"
