@@ -25,9 +25,12 @@ from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.kernels.simd import VECTOR
 from islands.systems.ode.ode_expression import render
 from islands.systems.ode.ode_system import OUTPUT, OdeSystem
+
+#: Number of terms whose responses are simulated in one call. The equations of every lane contain all of them:
+#: more terms in a call save nothing.
+TERMS_PER_CALL = 8
 
 #: Maximum number of terms.
 MAX_TERMS = 3
@@ -199,9 +202,9 @@ def _rank_terms(
     """Return the terms in the order of the part of the residual that their linear responses explain."""
     projection = Projection(fit, target)
     explained: list[float] = []
-    for first in range(0, len(candidates), VECTOR):
-        # As many terms as lanes are in the equations; each lane has the coefficient of one of them.
-        group = candidates[first : first + VECTOR]
+    for first in range(0, len(candidates), TERMS_PER_CALL):
+        # Each lane has the coefficient of one of the terms.
+        group = candidates[first : first + TERMS_PER_CALL]
         numbers = find_free_numbers(_get_system(fit), len(group))
         numbered = list(zip(group, numbers, strict=True))
         simulation, start = _add_terms(fit, _get_system(fit), numbered, target_sizes)

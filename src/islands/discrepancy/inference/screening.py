@@ -33,7 +33,8 @@ DEPENDENCE = 1e-6
 #: no gain.
 MIN_CALIBRATED_EFFECTS = 5
 
-#: Fraction of the best promised gain below which a further effect is not calibrated.
+#: Fraction of the best promised gain below which a further effect is not calibrated. If the noise is small,
+#: every effect promises more than its penalty.
 MIN_PROMISE = 0.05
 
 #: Least number of effects that are calibrated to convergence, the best ones after a rough calibration, if the
