@@ -10,6 +10,7 @@ from islands.kernels.simd import padded_size
 from islands.systems.mechanics import WIDTH, Elements
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.kernel_arguments import LANES, LaneForces, LaneLimits, LaneRestarts, LaneSignals
+from islands.systems.ode.native_code import find_native_code
 from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol
 from islands.systems.ode.ode_kernel import integrate
 from islands.systems.ode.ode_program import OdeProgram
@@ -134,18 +135,19 @@ def simulate_lanes(
         group = lanes[first : first + LANES]
         signals, order = pack_signals(program.signals, dt, group)
         full = [*group, *[group[0]] * (LANES - len(group))]
+        instructions = program.instructions._replace(signals=program.instructions.signals[order])
+        arena, limits = pack_arena(program, full), pack_limits(program.states, full)
+        elements = pack_elements(full)
+        native = None
+        if not (interval or elements.forces.size):
+            native = find_native_code(instructions, signals, limits)
+        if native:
+            native.integrate(arena, signals, dt, limits, len(group), first, every, out)
+            continue
+        restarts = _pack_restarts(program.states, full, samples, interval)
         integrate(
-            program.instructions._replace(signals=program.instructions.signals[order]),
-            pack_arena(program, full),
-            signals,
-            dt,
-            pack_limits(program.states, full),
-            _pack_restarts(program.states, full, samples, interval),
-            pack_elements(full),
-            len(group),
-            first,
-            every,
-            out,
+            *(instructions, arena, signals, dt, limits, restarts, elements),
+            *(len(group), first, every, out),
         )
     found: NDArray[np.float64] = out.transpose(2, 1, 0)[: len(lanes)]
     return found

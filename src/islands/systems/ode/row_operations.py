@@ -1,0 +1,106 @@
+"""Generator of machine code for rows: values of all lanes, as LLVM vectors."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from llvmlite import ir
+
+from islands.kernels.interpreter import ADD, MULTIPLY, SIGN, SUBTRACT
+from islands.systems.ode import ode_kernel
+from islands.systems.ode.kernel_arguments import LANES
+
+_DOUBLE = ir.DoubleType()
+_ROW = ir.VectorType(_DOUBLE, LANES)
+_UNDEFINED = ir.Constant(_ROW, ir.Undefined)
+_PLACE = ir.IntType(32)
+
+
+class RowOperations:
+    """Operations on rows at the position of a builder; the instructions are those of `ode_kernel`.
+
+    Parameters
+    ----------
+    build : IRBuilder
+    """
+
+    def __init__(self, build: ir.IRBuilder) -> None:
+        self._build = build
+
+    def constant(self, number: float) -> ir.Constant:
+        """Return a row with a number in all lanes."""
+        return ir.Constant(_ROW, [number] * LANES)
+
+    def fill(self, number: Any) -> Any:
+        """Return a row with a computed number in all lanes."""
+        first = self._build.insert_element(_UNDEFINED, number, _PLACE(0))
+        same = ir.Constant(ir.VectorType(_PLACE, LANES), [0] * LANES)
+        return self._build.shuffle_vector(first, _UNDEFINED, same)
+
+    def load(self, array: Any, place: int) -> Any:
+        """Read a row from a place of an array."""
+        row = self._build.load(self._point(array, ir.IntType(64)(place)))
+        row.align = 8
+        return row
+
+    def store(self, row: Any, array: Any, place: Any) -> None:
+        """Write a row to a place of an array."""
+        place = ir.IntType(64)(place) if isinstance(place, int) else place
+        self._build.store(row, self._point(array, place)).align = 8
+
+    def _point(self, array: Any, place: Any) -> Any:
+        return self._build.bitcast(self._build.gep(array, [place]), _ROW.as_pointer())
+
+    def gather(self, array: Any, places: Sequence[Any]) -> Any:
+        """Read the value of each lane from its own place."""
+        row = _UNDEFINED
+        for lane, place in enumerate(places):
+            value = self._build.load(self._build.gep(array, [place]))
+            row = self._build.insert_element(row, value, _PLACE(lane))
+        return row
+
+    def execute(self, operation: int, a: Any, b: Any, c: Any) -> Any:
+        """Return the result of an instruction."""
+        build = self._build
+        if operation == MULTIPLY:
+            return build.fmul(a, b)
+        if operation == ADD:
+            return build.fadd(a, b)
+        if operation == SUBTRACT:
+            return build.fsub(a, b)
+        if operation == ode_kernel.ADD_PRODUCT:
+            return build.fadd(a, build.fmul(b, c))
+        if operation == ode_kernel.SUBTRACT_PRODUCT:
+            return build.fsub(a, build.fmul(b, c))
+        if operation == ode_kernel.DIVIDE:
+            return build.fdiv(a, b)
+        if operation == ode_kernel.COPY:
+            return a
+        if operation == SIGN:
+            negative = self._select("<", a, self.constant(0.0), self.constant(-1.0), self.constant(0.0))
+            return self._select(">", a, self.constant(0.0), self.constant(1.0), negative)
+        if operation == ode_kernel.SQUARE_ROOT:
+            return self._call("sqrt", a)
+        if operation == ode_kernel.ABSOLUTE:
+            return self._call("fabs", a)
+        if operation == ode_kernel.NEGATE:
+            return build.fneg(a)
+        if operation == ode_kernel.MINIMUM:
+            return self._select("<", a, b, a, b)
+        if operation == ode_kernel.MAXIMUM:
+            return self._select("<", b, a, a, b)
+        if operation in (ode_kernel.LESS, ode_kernel.LESS_EQUAL):
+            comparison = "<" if operation == ode_kernel.LESS else "<="
+            return self._select(comparison, a, b, self.constant(1.0), self.constant(0.0))
+        assert operation == ode_kernel.SELECT
+        return self._select(">", a, self.constant(0.0), b, c)
+
+    def _select(self, comparison: str, a: Any, b: Any, first: Any, second: Any) -> Any:
+        return self._build.select(self._build.fcmp_ordered(comparison, a, b), first, second)
+
+    def _call(self, name: str, row: Any) -> Any:
+        """Call LLVM's function of this name for all lanes."""
+        full, module = f"llvm.{name}.v{LANES}f64", self._build.module
+        function = module.globals.get(full)
+        if function is None:
+            function = ir.Function(module, ir.FunctionType(_ROW, [_ROW]), full)
+        return self._build.call(function, [row])

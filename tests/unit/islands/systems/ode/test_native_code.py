@@ -1,0 +1,109 @@
+"""Machine code of a program: the bits of the interpreter, for every instruction and in every lane."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.systems.ode import native_code
+from islands.systems.ode.lane_simulation import (
+    LaneInput,
+    interpolate_linearly,
+    make_time,
+    simulate_lanes,
+)
+from islands.systems.ode.ode_expression import Symbol
+from islands.systems.ode.ode_program import OdeProgram, generate_program
+from islands.systems.ode.system_document import make_system
+
+DT, SAMPLES = 0.01, 200
+TIME = DT * np.arange(SAMPLES)
+FORCE = 3.0 * np.sin(7.0 * TIME) + 2.0 * np.cos(3.1 * TIME)
+
+ARITHMETIC = {
+    "name": "arithmetic",
+    "input": "F",
+    "channels": ["T"],
+    "equations": """
+        dx/dt = v
+        dv/dt = F - c*v - k*x - b*x**3 + 0.1*abs(v)*x - rate(T)*0.01 + sign(v)*0.2 - t/50
+        dy/dt = -y + min(x, T) - max(v, -y)/(2 + x**2) + sqrt(abs(x)) + where(x - v, y, 0.3)
+        dp/dt = -p**5 + (x < v)*a + (y <= 0)*b
+    """,
+    "output": "x + 0.1*y + p*F",
+    "parameters": {"a": 0.4, "b": 2.0, "c": 1.2, "k": 80.0},
+}
+
+
+def motion(index: int) -> LaneInput:
+    parameters = {"a": 0.4, "b": 2.0, "c": 1.2 + 0.1 * index, "k": 80.0}
+    signals = {"F": interpolate_linearly(FORCE), "T": interpolate_linearly(np.cos(TIME) - 0.5)}
+    initial = {"x": 0.01, "v": 0.3, "y": -0.2, "p": 0.5}
+    return LaneInput(parameters, initial, {**signals, **make_time(0.0, SAMPLES, DT)})
+
+
+def make_lanes() -> list[LaneInput]:
+    """Make lanes of which one diverges, one has another input, some have limits, and some spill."""
+    lanes = [motion(index) for index in range(19)]
+    lanes[3] = replace(lanes[3], initial_states={**lanes[3].initial_states, "p": 1e200})
+    lanes[5] = replace(lanes[5], signals={**lanes[5].signals, "F": interpolate_linearly(2.0 * FORCE)})
+    lanes[7] = replace(lanes[7], limits={"x": (-0.02, 0.03)})
+    lanes[8] = replace(lanes[8], limits={"x": (-0.02, 0.03)}, spills={"x": ("y", 0.5)})
+    return lanes
+
+
+def simulate_natively(
+    program: OdeProgram, lanes: list[LaneInput], monkeypatch: pytest.MonkeyPatch
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return outputs of the interpreter and of machine code."""
+    monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", np.inf)
+    interpreted = simulate_lanes(program, DT, lanes)
+    monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", 0)
+    return interpreted, simulate_lanes(program, DT, lanes)
+
+
+def test_machine_code_has_the_bits_of_the_interpreter(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = generate_program(make_system(ARITHMETIC))
+    compiled: list[object] = []
+    make = native_code._compile
+    monkeypatch.setattr(native_code, "_compile", lambda given: compiled.append(given) or make(given))
+    interpreted, native = simulate_natively(program, make_lanes(), monkeypatch)
+    assert len(compiled) == 2  # the lanes beyond sixteen have neither limits nor signals of single lanes
+    assert native.tobytes() == interpreted.tobytes()
+    assert np.isnan(native).all(axis=(1, 2)).tolist() == [index == 3 for index in range(19)]
+    fewer = simulate_lanes(program, DT, make_lanes(), every=3)
+    assert fewer.tobytes() == np.ascontiguousarray(interpreted[:, :, ::3]).tobytes()
+
+
+def test_limits_and_overflow_have_the_bits_of_the_interpreter(monkeypatch: pytest.MonkeyPatch) -> None:
+    system = make_system(ARITHMETIC)
+    program = generate_program(system, (Symbol("x"), Symbol("y")))
+    lanes = make_lanes()[5:10]
+    interpreted, native = simulate_natively(program, lanes, monkeypatch)
+    assert native.tobytes() == interpreted.tobytes()
+    assert (native[2, 0].min(), native[2, 0].max()) == (-0.02, 0.03)
+    assert not np.array_equal(native[2, 1], native[3, 1])
+
+
+def test_functions_of_the_library_remain_interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", 0)
+    monkeypatch.setattr(native_code, "_compile", pytest.fail)
+    system = make_system(
+        {"name": "s", "input": "F", "equations": "dx/dt = F - tanh(x)", "output": "x", "states": {"x": {}}}
+    )
+    lane = LaneInput({}, {"x": 0.0}, {"F": interpolate_linearly(FORCE)})
+    assert np.isfinite(simulate_lanes(generate_program(system), DT, [lane])).all()
+
+
+def test_program_is_compiled_once_it_has_run_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", 3 * SAMPLES)
+    monkeypatch.setattr(native_code, "_counts", type(native_code._counts)())
+    calls: list[int] = []
+    run = native_code.NativeCode.integrate
+    monkeypatch.setattr(
+        native_code.NativeCode, "integrate", lambda *given: (calls.append(len(calls)), run(*given))[1]
+    )
+    program = generate_program(make_system(ARITHMETIC))
+    found = [simulate_lanes(program, DT, [motion(1)]).tobytes() for _ in range(5)]
+    assert len(calls) == 2
+    assert len(set(found)) == 1
