@@ -8,7 +8,7 @@ Programs that call functions of the C library or force laws, and runs that are r
 
 import ctypes
 from collections import OrderedDict
-from functools import cache, lru_cache
+from functools import lru_cache
 from threading import Lock
 from typing import Any, NamedTuple
 
@@ -26,8 +26,8 @@ COMPILED_FROM_STEPS = 100_000
 #: Largest number of instructions of a compiled program; the time of a compilation grows with it.
 MAX_INSTRUCTIONS = 300
 
-#: Number of programs whose steps are counted, and of those whose machine code is kept.
-_COUNTED, _KEPT = 1024, 256
+#: Number of programs whose steps are counted, and of those whose machine code is kept, about 1 MB each.
+_COUNTED, _KEPT = 1024, 64
 
 _DOUBLE, _INTEGER = ir.DoubleType(), ir.IntType(64)
 _POINTER = _DOUBLE.as_pointer()
@@ -150,8 +150,8 @@ def _compile(program: ProgramCode) -> NativeCode:
     return NativeCode(program)
 
 
-@cache
 def _make_machine() -> Any:
+    """Return a new description of this processor: an execution engine takes ownership of its own."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     return binding.Target.from_default_triple().create_target_machine(
