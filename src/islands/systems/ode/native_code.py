@@ -27,7 +27,7 @@ COMPILED_FROM_STEPS = 100_000
 MAX_INSTRUCTIONS = 300
 
 #: Number of programs whose steps are counted, and of those whose machine code is kept, about 1 MB each.
-_COUNTED, _KEPT = 1024, 64
+_COUNTED, _KEPT = 256, 64
 
 _DOUBLE, _INTEGER = ir.DoubleType(), ir.IntType(64)
 _POINTER = _DOUBLE.as_pointer()
@@ -41,8 +41,8 @@ class ProgramCode(NamedTuple):
 
     Attributes
     ----------
-    code : tuple of tuple of int
-        Instructions.
+    code : bytes
+        Instructions, of int64.
     ends, signals, slopes, outputs : tuple of int
         See `Instructions`.
     states : int
@@ -55,7 +55,7 @@ class ProgramCode(NamedTuple):
         Whether receivers get a part of what the upper limits cut off.
     """
 
-    code: tuple[tuple[int, ...], ...]
+    code: bytes
     ends: tuple[int, ...]
     signals: tuple[int, ...]
     slopes: tuple[int, ...]
@@ -121,7 +121,7 @@ def find_native_code(
     if not _is_supported(instructions):
         return None
     program = ProgramCode(
-        code=tuple(map(tuple, instructions.code.tolist())),
+        code=instructions.code.tobytes(),
         ends=tuple(instructions.ends.tolist()),
         signals=tuple(instructions.signals.tolist()),
         slopes=tuple(instructions.slopes.tolist()),
@@ -151,7 +151,7 @@ def _compile(program: ProgramCode) -> NativeCode:
 
 
 def _make_machine() -> Any:
-    """Return a new description of this processor: an execution engine takes ownership of its own."""
+    """Return a new description of this processor: each execution engine takes ownership of one."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     return binding.Target.from_default_triple().create_target_machine(
@@ -164,6 +164,7 @@ class _Generator:
 
     def __init__(self, program: ProgramCode) -> None:
         self._program = program
+        self._code = np.frombuffer(program.code, dtype=np.int64).reshape(-1, 5).tolist()
         self._module = ir.Module()
         self._module.triple = binding.get_default_triple()
         arguments = [*[_INTEGER] * 4, _DOUBLE, *[_POINTER] * 8]
@@ -236,7 +237,7 @@ class _Generator:
         return self._module
 
     def _execute(self, begin: int, end: int) -> None:
-        for operation, target, *operands in self._program.code[begin:end]:
+        for operation, target, *operands in self._code[begin:end]:
             # Rows that an operation does not read may not be known.
             known = [self._rows.get(row) for row in operands]
             self._rows[target] = self._row.execute(operation, *known)
