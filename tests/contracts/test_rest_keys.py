@@ -58,6 +58,7 @@ GUARDED = {
     ("POST", "/v1/monitors"): "write",
     ("GET", "/v1/monitors/{monitor}"): "read",
     ("GET", "/v1/monitors/{monitor}/state"): "read",
+    ("GET", "/v1/monitors/{monitor}/records"): "read",
     ("POST", "/v1/monitors/{monitor}/records"): "write",
     ("DELETE", "/v1/monitors/{monitor}"): "write",
 }
@@ -73,7 +74,7 @@ def send_request(service, method, path, headers):
     body = {"json": spec("0-csv")} if (method, path) == ("POST", "/v1/jobs") else {}
     if path == "/v1/discrepancies":
         body = {"json": held("0-csv")}
-    if path.endswith("/records"):
+    if method == "POST" and path.endswith("/records"):
         body = {"json": {"dataset": "0-csv"}}
     if (method, path) == ("POST", "/v1/monitors"):
         body = {"json": {"diagnosis": "0" * 32}}
