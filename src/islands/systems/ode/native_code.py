@@ -29,6 +29,9 @@ MAX_INSTRUCTIONS = 300
 #: Number of programs whose steps are counted, and of those whose machine code is kept, about 1 MB each.
 _COUNTED, _KEPT = 256, 64
 
+#: Name of the function.
+_NAME = "integrate"
+
 _DOUBLE, _INTEGER = ir.DoubleType(), ir.IntType(64)
 _POINTER = _DOUBLE.as_pointer()
 
@@ -109,9 +112,6 @@ class NativeCode:
         self._function(*sizes, dt, *(each.ctypes.data for each in arrays))
         is_finite = np.isfinite(arena.reshape(-1, LANES)[self._states, :lanes]).all(axis=0)
         out[:, :, first : first + lanes][:, :, ~is_finite] = np.nan
-
-
-_NAME = "integrate"
 
 
 def find_native_code(
