@@ -55,7 +55,7 @@ class LaneSignals(NamedTuple):
         Signals that are equal in all lanes.
     own : ndarray, shape (samples, 3, different)
         Signals of single lanes.
-    places : ndarray of int64, shape (signals, lanes)
+    places : ndarray of int64, shape (signals, 16)
         Index in ``own`` of each further signal in each lane.
     """
 

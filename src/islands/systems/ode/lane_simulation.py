@@ -133,20 +133,17 @@ def simulate_lanes(
     out = np.empty((-(-samples // every), program.instructions.outputs.size, -(-len(lanes) // LANES) * LANES))
     for first in range(0, len(lanes), LANES):
         group = lanes[first : first + LANES]
-        signals, order = pack_signals(program.signals, dt, group)
         full = [*group, *[group[0]] * (LANES - len(group))]
+        signals, order = pack_signals(program.signals, dt, full)
         instructions = program.instructions._replace(signals=program.instructions.signals[order])
         arena, limits = pack_arena(program, full), pack_limits(program.states, full)
-        elements = pack_elements(full)
-        native = None
-        if not (interval or elements.forces.size):
-            native = find_native_code(instructions, signals, limits)
+        native = None if interval else find_native_code(instructions, signals, limits)
         if native:
             native.integrate(arena, signals, dt, limits, len(group), first, every, out)
             continue
         restarts = _pack_restarts(program.states, full, samples, interval)
         integrate(
-            *(instructions, arena, signals, dt, limits, restarts, elements),
+            *(instructions, arena, signals, dt, limits, restarts, pack_elements(full)),
             *(len(group), first, every, out),
         )
     found: NDArray[np.float64] = out.transpose(2, 1, 0)[: len(lanes)]
@@ -175,7 +172,7 @@ def pack_arena(program: OdeProgram, lanes: Sequence[LaneInput]) -> NDArray[np.fl
 def pack_signals(
     expressions: Sequence[OdeExpression], dt: float, lanes: Sequence[LaneInput]
 ) -> tuple[LaneSignals, NDArray[np.int64]]:
-    """Return the signals of lanes, and the order of shared and own ones among all signals."""
+    """Return the signals of all lanes, and the order of shared and own ones among all signals."""
     samples = len(next(iter(lanes[0].signals.values())).start)
     made: dict[tuple[object, ...], SampledSignal] = {}
     shared, own, places = list[SampledSignal](), list[SampledSignal](), list[list[int]]()

@@ -102,10 +102,8 @@ class NativeCode:
         out: NDArray[np.float64],
     ) -> None:
         """Integrate as `ode_kernel.integrate`, without restarts and force laws."""
-        places = np.zeros((signals.places.shape[0], LANES), dtype=np.int64)
-        places[:, :lanes] = signals.places
         arrays = (
-            *(arena, signals.shared, signals.own, places),
+            *(arena, signals.shared, signals.own, signals.places),
             *(limits.lower, limits.upper, limits.caught, out[:, :, first:]),
         )
         sizes = signals.shared.shape[0], every, signals.own.shape[2], out.shape[2]
