@@ -1,14 +1,18 @@
 """Experiments with cheap simulations whose separations are known in closed form."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from islands.data.dataset import Dataset
+from islands.discrepancy.calibration.noise_model import NoiseModel
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.planning.cause import Cause, CauseScale
+from islands.discrepancy.planning.channel_noise import ChannelNoise, NoiseOrigin
 from islands.discrepancy.planning.experiment import Experiment
 from islands.discrepancy.planning.experiment_setup import make_experiment
 from islands.discrepancy.planning.pair_separation import CausePair
@@ -50,6 +54,26 @@ def amplifier_experiment(
     u: Signal, noise_std: float = 0.2, prior_std: Mapping[str, float] | None = None
 ) -> Experiment:
     return make_experiment(input_record(u), amplifier(), noise_std, prior_std or {})[0]
+
+
+def coloured_noise(innovation_std: float, *coefficients: float) -> ChannelNoise:
+    """Return autoregressive noise."""
+    return ChannelNoise(NoiseModel(np.array(coefficients), innovation_std**2, np.inf), NoiseOrigin.GIVEN)
+
+
+def with_noise(experiment: Experiment, noise: ChannelNoise) -> Experiment:
+    """Return an experiment with another noise of its output."""
+    return replace(experiment, channels=(replace(experiment.channels[0], noise=noise),))
+
+
+def noise_covariance(innovation_std: float, coefficients: Sequence[float], samples: int) -> Signal:
+    """Return the covariance of a stationary autoregression, from its impulse response."""
+    response = scipy.signal.lfilter(
+        [innovation_std], np.append(1.0, -np.array(coefficients)), np.eye(1, 4096)[0]
+    )
+    lags = [response[: response.size - lag] @ response[lag:] for lag in range(samples)]
+    covariance: Signal = scipy.linalg.toeplitz(lags)
+    return covariance
 
 
 def take_effects(*names: str) -> list[Effect]:

@@ -114,8 +114,8 @@ def plan_experiment(
     simulation : str, Model, spec or Simulator
         As in `diagnose`.
     noise_std : float, optional
-        Standard deviation of the white noise of the output, in its unit; by default it is estimated from the
-        output of the record.
+        Standard deviation of the white noise of the output, in its unit; by default the noise and its colour
+        are estimated from the output of the record.
     separate : sequence of str
         Names of two effects for which cheaper and better experiments are compared; by default the decisive
         experiment is for all causes that the given one does not separate.

@@ -5,7 +5,10 @@ from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
+import numpy as np
+
 from islands.discrepancy.planning.alternative_experiments import AlternativeExperiment, choose_cheapest
+from islands.discrepancy.planning.channel_noise import ChannelNoise
 from islands.discrepancy.planning.decisive_experiment import DecisiveExperiment
 from islands.discrepancy.planning.experiment_plan import ExperimentPlan
 from islands.discrepancy.planning.isolability import IsolabilityRow
@@ -18,8 +21,8 @@ SCHEMA = "islands.plan/1"
 def plan_document(plan: ExperimentPlan) -> dict[str, Any]:
     """Return a plan as a JSON document.
 
-    Misfits are in standard deviations of the noise. Misfits that are not reached, and entries of a cause with
-    itself, are None.
+    Misfits are in standard deviations of the noise, and distances in those of its innovations. Misfits that
+    are not reached, and entries of a cause with itself, are None.
     """
     isolability = plan.isolability
     cheapest = choose_cheapest(plan.alternatives)
@@ -28,6 +31,7 @@ def plan_document(plan: ExperimentPlan) -> dict[str, Any]:
         "record": record_document(plan.record),
         "simulation": plan.simulation,
         "noise_std": plan.noise_std,
+        "noise": _describe_noise(plan.noise, plan.record.dt),
         "causes": [
             {"name": name, "family": effect.family, **_describe_row(row)}
             for name, effect, row in zip(
@@ -42,6 +46,16 @@ def plan_document(plan: ExperimentPlan) -> dict[str, Any]:
         "alternatives": [_describe_alternative(each) for each in plan.alternatives],
         "cheapest_alternative": None if cheapest is None else cheapest.change,
         "decisive_experiment": None if plan.decisive is None else _describe_decisive(plan.decisive),
+    }
+
+
+def _describe_noise(noise: ChannelNoise, dt: float) -> dict[str, Any]:
+    return {
+        "origin": str(noise.origin),
+        "is_white": noise.is_white,
+        "autoregression": noise.model.coefficients.tolist(),
+        "innovation_std": float(np.sqrt(noise.model.variance)),
+        "time_constant_s": dt * noise.time_constant,
     }
 
 

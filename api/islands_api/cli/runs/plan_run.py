@@ -69,7 +69,7 @@ class PlanOptions:
 
 
 _HELP = {
-    "noise_std": "Noise of the output in its unit, for --plan; by default estimated from a measured output.",
+    "noise_std": "White noise of the output in its unit, for --plan; by default estimated, with its colour.",
     "separate": "CAUSE,CAUSE: two causes that --plan separates; by default all that it can.",
     "excitation": "Input for --plan, if no record: multisine:LOW:HIGH, sine:FREQUENCY (Hz), steps:HOLD (s).",
     "amplitude": "Half of the range of inputs for --plan; by default that of the given input.",

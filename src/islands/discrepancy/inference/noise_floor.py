@@ -1,6 +1,6 @@
 """Noise floor: the explainable part of a residual, and the noise variance from repeated periods."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import scipy
@@ -56,10 +56,24 @@ def explainable_variance(
 ) -> float:
     """Return the part of the residual's mean square that cross-validated ridge regression predicts.
 
+    As `explain_residual`.
+    """
+    return explain_residual(residual, u, simulated, rng, segments)[0]
+
+
+def explain_residual(
+    residual: Signal,
+    u: Signal,
+    simulated: Signal,
+    rng: np.random.Generator,
+    segments: Sequence[int] = (),
+) -> tuple[float, Signal]:
+    """Explain a residual by cross-validated ridge regression.
+
     The features are lags, rates, low-pass filters, plays and random cosines of the input and the simulated
     output. Features do not reach across the boundary of two recordings; folds, which are contiguous
-    blocks, may contain one. If a surrogate of the residual is predicted as well, by chance, the result is
-    zero.
+    blocks, may contain one. If a surrogate of the residual is predicted as well, by chance, nothing is
+    explained.
 
     Parameters
     ----------
@@ -69,18 +83,32 @@ def explainable_variance(
         Draws the random features.
     segments : sequence of int
         Lengths of the recordings in samples.
+
+    Returns
+    -------
+    float
+        The part of the residual's mean square that is explained.
+    ndarray, shape (known samples,)
+        What is left of the residual.
     """
     is_known = ~np.isnan(residual)
     raw, residual = _make_features(u, simulated, segments)[is_known], residual[is_known]
     designs = _make_designs(raw, rng)
     explained = float(_predict_mean_square(designs, residual[:, None])[0])
+    if explained <= 0.0:
+        return 0.0, residual
+    left = min(
+        (np.concatenate(errors)[:, 0] for errors in _cross_validate(designs, residual[:, None])),
+        key=lambda errors: float(errors @ errors),
+    )
     if explained <= MIN_FRACTION * float(np.mean(residual**2)):
-        return explained
+        return explained, left
     runs = count_runs(is_known, segments)
     drawn = draw_surrogates(residual, runs, Randomisation.PHASES, SURROGATES, rng.spawn(1)[0])
     surrogates = np.column_stack(list(drawn))
     by_chance = _predict_mean_square(designs, surrogates) / np.mean(surrogates**2, axis=0)
-    return explained if explained > float(np.max(by_chance)) * float(np.mean(residual**2)) else 0.0
+    is_by_chance = explained <= float(np.max(by_chance)) * float(np.mean(residual**2))
+    return (0.0, residual) if is_by_chance else (explained, left)
 
 
 def _make_designs(raw: Signal, rng: np.random.Generator) -> list[Signal]:
@@ -110,21 +138,30 @@ def _predict_mean_square(designs: Sequence[Signal], residuals: Signal) -> Signal
     -------
     ndarray, shape (residuals,)
     """
-    samples = len(residuals)
-    fold = np.arange(samples) * FOLDS // samples
     total = np.sum(residuals**2, axis=0)
     best = total
+    for errors in _cross_validate(designs, residuals):
+        squared_error = np.zeros(total.size)
+        for each in errors:
+            squared_error += np.sum(each**2, axis=0)
+        best = np.minimum(best, squared_error)
+    return (total - best) / len(residuals)
+
+
+def _cross_validate(designs: Sequence[Signal], residuals: Signal) -> Iterator[list[Signal]]:
+    """Yield the errors of each regression in its folds, each of shape (samples of the fold, residuals)."""
+    samples = len(residuals)
+    fold = np.arange(samples) * FOLDS // samples
     for design in designs:
         grams = [design[fold == each].T @ design[fold == each] for each in range(FOLDS)]
         moments = [design[fold == each].T @ residuals[fold == each] for each in range(FOLDS)]
         for ridge in RIDGES:
-            squared_error = np.zeros(total.size)
+            errors = []
             for each in range(FOLDS):
                 gram = sum(grams) - grams[each] + ridge * samples * np.eye(design.shape[1])
                 weights = scipy.linalg.solve(gram, sum(moments) - moments[each], assume_a="pos")
-                squared_error += np.sum((residuals - design @ weights)[fold == each] ** 2, axis=0)
-            best = np.minimum(best, squared_error)
-    return (total - best) / samples
+                errors.append((residuals - design @ weights)[fold == each])
+            yield errors
 
 
 def _make_features(u: Signal, simulated: Signal, segments: Sequence[int]) -> Signal:
@@ -193,6 +230,26 @@ def noise_variance_from_periods(u: Signal, y: Signal, segments: Sequence[int] = 
     squares = np.concatenate(differences) ** 2 if differences else np.zeros(0)
     squares = squares[~np.isnan(squares)]
     return float(np.mean(squares)) / 2.0 if squares.size else None
+
+
+def subtract_mean_period(u: Signal, y: Signal) -> Signal | None:
+    """Subtract the mean period from an output without gaps; None if there are fewer than three periods.
+
+    What is left is noise, since a simulation and every effect of the input repeat. It is scaled so that its
+    variance is that of the noise (Pintelon and Schoukens, System Identification, 2012, section 2.5). The
+    first period is left out, since transients decay in it. Noise at multiples of the frequency of the periods
+    is subtracted with the mean.
+
+    Returns
+    -------
+    ndarray, shape (periods, samples of a period)
+    """
+    period = detect_period(u)
+    if period is None or y.size < 3 * period:
+        return None
+    periods = y[y.size % period :].reshape(-1, period)[1:]
+    count = len(periods)
+    return np.array((periods - periods.mean(axis=0)) * np.sqrt(count / (count - 1)))
 
 
 def _subtract_periods(u: Signal, y: Signal) -> Signal | None:

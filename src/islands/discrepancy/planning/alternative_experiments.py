@@ -118,7 +118,7 @@ def _list_changes(experiment: Experiment, limits: InputLimits) -> Iterator[tuple
         if limits.contains(signal, dt):
             yield Cost.INPUT, change, experiment.with_input(signal)
     for channel in list_state_channels(experiment):
-        unit = f"{channel.noise_std:.2g} {channel.unit}".rstrip()
+        unit = f"{channel.noise.std:.2g} {channel.unit}".rstrip()
         yield Cost.CHANNEL, f"measure {channel.name} too, noise {unit}", experiment.with_channel(channel)
 
 
@@ -146,7 +146,7 @@ def _list_inputs(u: Signal, dt: float, limits: InputLimits, unit: str) -> Iterat
 def list_state_channels(experiment: Experiment) -> tuple[MeasuredChannel, ...]:
     """Return the states of written equations as channels, without the output.
 
-    The noise of a channel is the same fraction of its peak as that of the output.
+    The noise of a channel has the colour of that of the output, and is the same fraction of its peak.
     """
     output = experiment.channels[0]
     simulator = output.simulator
@@ -160,7 +160,7 @@ def list_state_channels(experiment: Experiment) -> tuple[MeasuredChannel, ...]:
         rough = replace(output.context, output_peak=np.inf)
         simulation = ExtendedSimulator(inner, (), rough)
         peak = peak_amplitude(simulation.simulate(simulation.nominal))
-        noise_std = experiment.noise_std * peak / output.context.output_peak
+        noise = output.noise.scale(peak / output.context.output_peak)
         context = replace(output.context, output_peak=peak)
-        channels.append(MeasuredChannel(state.name, state.unit, inner, context, noise_std))
+        channels.append(MeasuredChannel(state.name, state.unit, inner, context, noise))
     return tuple(channels)

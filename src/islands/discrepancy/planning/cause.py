@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 
@@ -43,13 +44,17 @@ class Cause:
     misfit : float
         Root mean square that calibration leaves of the response, in standard deviations of the noise;
         deviations from parameters with a tolerance count as far as the tolerance prevents them.
+    whitened_misfit : float
+        Root mean square of the same after whitening, which decides what is detected; equal to `misfit` in
+        white noise.
     observed : ndarray, shape (channels * estimation samples,)
-        Data in standard deviations of the noise.
+        Whitened data.
     """
 
     effect: Effect
     values: tuple[float, ...]
     misfit: float
+    whitened_misfit: float
     observed: Signal
 
 
@@ -69,7 +74,8 @@ class CauseScale:
         self._model: ExperimentModel = dictionary.get_model(effect)
         experiment = dictionary.experiment
         context = experiment.context
-        noise = np.random.default_rng(_SEED).standard_normal(context.u.size) * experiment.noise_std
+        innovations = np.random.default_rng(_SEED).standard_normal(context.u.size)
+        noise = experiment.noise.colour(innovations) * experiment.noise.std
         points = get_starting_points(effect, self._model.output, noise)
         self._point = np.array(points[len(points) // 2], dtype=np.float64)
         scaled = slice(0, max(effect.linear_parameters, 1))
@@ -85,31 +91,40 @@ class CauseScale:
         self._factors = np.unique(np.minimum(_FACTORS, float(np.min(reach, initial=_FACTORS[-1]))))
         self._misfits = self._compute_misfits(self._factors)
 
-    def find_cause(self, misfit: float) -> Cause | None:
+    def find_cause(self, misfit: float, is_whitened: bool = False) -> Cause | None:
         """Return the weakest cause of about a misfit; None if no value in the bounds reaches it.
 
         Calibration absorbs more of a strong effect than its linear approximation tells.
+
+        Parameters
+        ----------
+        misfit : float
+        is_whitened : bool
+            Whether the misfit is that of whitened data.
         """
         wanted = misfit
         for _ in range(_CORRECTIONS):
-            factor = self._find_factor(wanted)
+            factor = self._find_factor(wanted, is_whitened)
             cause = None if factor is None else self.make_cause(self._get_values(factor))
-            if cause is None or cause.misfit > _ACCURACY * misfit:
+            if cause is None:
+                return None
+            found = cause.whitened_misfit if is_whitened else cause.misfit
+            if found > _ACCURACY * misfit:
                 # A response that jumps, as that of an unstable integration, has no such misfit.
-                return cause if cause is not None and cause.misfit < _MAX_EXCESS * misfit else None
-            wanted *= misfit / max(cause.misfit, misfit / _MAX_CORRECTION)
+                return cause if found < _MAX_EXCESS * misfit else None
+            wanted *= misfit / max(found, misfit / _MAX_CORRECTION)
         return None
 
-    def _find_factor(self, misfit: float) -> float | None:
+    def _find_factor(self, misfit: float, is_whitened: bool) -> float | None:
         """Return the smallest factor of the starting point with a misfit in linear approximation."""
-        reached = np.flatnonzero(self._misfits >= misfit)
+        reached = np.flatnonzero(self._misfits[int(is_whitened)] >= misfit)
         if not reached.size:
             return None
         high = float(self._factors[reached[0]])
         low = float(self._factors[max(reached[0] - 1, 0)])
         for _ in range(_BISECTIONS):
             middle = float(np.sqrt(low * high))
-            if self._compute_misfits(np.array([middle]))[0] < misfit:
+            if self._compute_misfits(np.array([middle]))[int(is_whitened), 0] < misfit:
                 low = middle
             else:
                 high = middle
@@ -122,20 +137,33 @@ class CauseScale:
             return None
         without = self._dictionary.without
         fit = fit_noise_free(without, observed, [without.output.nominal])
-        samples = self._dictionary.experiment.estimation_samples
-        return Cause(self._effect, tuple(values), float(np.sqrt(fit.squared_distance / samples)), observed)
+        misfit, whitened = self._measure(fit.residual)
+        return Cause(self._effect, tuple(values), misfit, whitened, observed)
 
     def _get_values(self, factor: float) -> tuple[float, ...]:
         return tuple((self._nominal + factor * (self._point - self._nominal)).tolist())
 
     def _compute_misfits(self, factors: Signal) -> Signal:
-        """Return linear approximations of the misfits at factors of the starting point."""
+        """Return linear approximations of the misfits at factors of the starting point.
+
+        Returns
+        -------
+        ndarray, shape (2, factors)
+            Misfits, and those of whitened data.
+        """
         points = np.stack([self._model.insert(self._effect, self._get_values(each)) for each in factors])
         dictionary = self._dictionary
         misfits = [
-            np.linalg.norm(dictionary.project(each - dictionary.output))
+            self._measure(dictionary.project(each - dictionary.output))
             for each in self._model.simulate(points)
         ]
-        return np.nan_to_num(np.array(misfits), nan=np.inf) / np.sqrt(
-            dictionary.experiment.estimation_samples
+        return np.nan_to_num(np.array(misfits).T, nan=np.inf)
+
+    def _measure(self, remaining: Signal) -> tuple[float, float]:
+        """Return the root mean squares of what calibration leaves of whitened data, before and after it."""
+        experiment = self._dictionary.experiment
+        before, after = (
+            sqrt(float(each @ each) / experiment.estimation_samples)
+            for each in (experiment.colour(remaining), remaining)
         )
+        return before, after

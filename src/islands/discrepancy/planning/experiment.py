@@ -11,12 +11,13 @@ from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.interfaces.context import Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.planning.channel_noise import ChannelNoise
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredChannel:
-    """A signal of the simulation that is measured with white noise.
+    """A signal of the simulation that is measured with noise.
 
     Attributes
     ----------
@@ -24,15 +25,14 @@ class MeasuredChannel:
     simulator : Simulator
         Simulator whose output is this signal.
     context : SimulationContext
-    noise_std : float
-        Standard deviation of the noise, in the unit of the signal.
+    noise : ChannelNoise
     """
 
     name: str
     unit: str
     simulator: Simulator
     context: SimulationContext
-    noise_std: float
+    noise: ChannelNoise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,9 +60,22 @@ class Experiment:
         return self.channels[0].context
 
     @property
-    def noise_std(self) -> float:
-        """Standard deviation of the noise of the output."""
-        return self.channels[0].noise_std
+    def noise(self) -> ChannelNoise:
+        """Noise of the output."""
+        return self.channels[0].noise
+
+    def colour(self, whitened: Signal) -> Signal:
+        """Undo the whitening of data, and return them in standard deviations of the noise.
+
+        Parameters
+        ----------
+        whitened : ndarray, shape (channels * estimation samples + others,)
+            The others, such as deviations from a prior, are returned unchanged.
+        """
+        ends = self.estimation_samples * np.arange(1, len(self.channels) + 1)
+        *parts, others = np.split(whitened, ends)
+        coloured = [each.noise.colour(part) for each, part in zip(self.channels, parts, strict=True)]
+        return np.concatenate([*coloured, others])
 
     def with_input(self, u: Signal) -> "Experiment":
         """Return the experiment with another input, sampled at the same times.
@@ -131,7 +144,9 @@ class ExperimentModel:
         return self.simulations[0]
 
     def simulate(self, points: Signal) -> Signal:
-        """Simulate the estimation part of all channels, in standard deviations of their noise.
+        """Simulate the estimation part of all channels, and whiten it with their noise.
+
+        All that a plan compares are such data: they are in standard deviations of independent noise.
 
         Parameters
         ----------
@@ -145,7 +160,7 @@ class ExperimentModel:
         fitted = self.experiment.estimation_samples
         return np.concatenate(
             [
-                simulation.simulate_batch(points[:, places])[:, :fitted] / channel.noise_std
+                channel.noise.whiten(simulation.simulate_batch(points[:, places])[:, :fitted])
                 for simulation, places, channel in zip(
                     self.simulations, self._places, self.experiment.channels, strict=True
                 )

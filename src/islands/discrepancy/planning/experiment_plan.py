@@ -16,6 +16,7 @@ from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances
 from islands.discrepancy.planning.alternative_experiments import AlternativeExperiment, compare_alternatives
+from islands.discrepancy.planning.channel_noise import ChannelNoise
 from islands.discrepancy.planning.decisive_experiment import DecisiveExperiment, design_experiment
 from islands.discrepancy.planning.experiment_setup import make_experiment
 from islands.discrepancy.planning.isolability import Isolability, find_isolability
@@ -58,8 +59,8 @@ class ExperimentPlan:
         Record with the input. Its output is simulated if it was not given.
     simulation : str
         Name of the simulation.
-    noise_std : float
-        Standard deviation of the noise, in the unit of the output.
+    noise : ChannelNoise
+        Noise of the output.
     isolability : Isolability
     pair : tuple of str
         Names of the causes to be separated; empty if none were given.
@@ -71,11 +72,16 @@ class ExperimentPlan:
 
     record: Dataset
     simulation: str
-    noise_std: float
+    noise: ChannelNoise
     isolability: Isolability
     pair: tuple[str, ...]
     alternatives: tuple[AlternativeExperiment, ...]
     decisive: DecisiveExperiment | None
+
+    @property
+    def noise_std(self) -> float:
+        """Standard deviation of the noise, in the unit of the output."""
+        return self.noise.std
 
 
 def plan_experiment(
@@ -98,8 +104,8 @@ def plan_experiment(
         Record with the input, and further channels. Its output may be missing.
     simulator : Simulator
     noise_std : float, optional
-        Standard deviation of the white noise of the output, in its unit. By default it is estimated from the
-        measured output.
+        Standard deviation of the white noise of the output, in its unit. By default the noise and its colour
+        are estimated from the measured output.
     tolerance : mapping, optional
         As in `diagnose`.
     pair : sequence of str
@@ -147,7 +153,7 @@ def plan_experiment(
             progress=lambda message, done=None: progress(message, 0.7 + 0.3 * (done or 0.0)),
         )
     return ExperimentPlan(
-        record, simulator.name, experiment.noise_std, isolability, tuple(pair), alternatives, decisive
+        record, simulator.name, experiment.noise, isolability, tuple(pair), alternatives, decisive
     )
 
 

@@ -6,19 +6,18 @@ from dataclasses import replace
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.preparation import (
     MIN_SAMPLES,
     estimation_part,
     make_context,
-    make_target,
     select_effects,
 )
 from islands.discrepancy.effects import EFFECTS
-from islands.discrepancy.inference.noise_floor import explainable_variance, noise_variance_from_periods
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.planning.channel_noise import make_white_noise
 from islands.discrepancy.planning.experiment import Experiment, MeasuredChannel
+from islands.discrepancy.planning.noise_estimate import estimate_noise
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError, SettingsError
@@ -39,7 +38,8 @@ def make_experiment(
         Record with the input, and further channels. Its output may be missing.
     simulator : Simulator
     noise_std : float or None
-        Standard deviation of the noise of the output; None to estimate it from the measured output.
+        Standard deviation of the noise of the output, which is white then; None to estimate a noise model
+        from the measured output.
     prior_std : mapping
         Relative standard deviations of parameters about their nominal values.
 
@@ -55,8 +55,10 @@ def make_experiment(
     fitted = estimation_part(record).samples
     context = make_context(_fill_output(record), simulator, fitted)
     if noise_std is None:
-        noise_std = _estimate_noise_std(record, ExtendedSimulator(simulator, (), context), prior_std, fitted)
-    output = MeasuredChannel(record.output_name, record.output_unit, simulator, context, noise_std)
+        noise = estimate_noise(record, ExtendedSimulator(simulator, (), context), prior_std, fitted)
+    else:
+        noise = make_white_noise(noise_std)
+    output = MeasuredChannel(record.output_name, record.output_unit, simulator, context, noise)
     effects = select_effects(simulator, context, prior_std, catalogue)
     return Experiment((output,), prior_std, fitted), effects
 
@@ -80,23 +82,3 @@ def _check(record: Dataset, simulator: Simulator, noise_std: float | None) -> No
 def _fill_output(record: Dataset) -> Dataset:
     """Return a record whose output is zero where it is missing; the scale of a resting output needs it."""
     return replace(record, y=np.nan_to_num(record.y))
-
-
-def _estimate_noise_std(
-    record: Dataset, simulation: ExtendedSimulator, prior_std: Mapping[str, float], fitted: int
-) -> float:
-    """Return the noise of the measured output: what repeats in no period, or what nothing predicts."""
-    if np.isnan(record.y).any():
-        raise RecordError(
-            "the noise is unknown, since the record has no complete output: give its standard deviation"
-        )
-    base = calibrate(simulation, make_target(record, fitted, prior_std), simulation.nominal)
-    u, residual = record.u[:fitted, 0], (record.y - base.output)[:fitted]
-    variance = noise_variance_from_periods(u, record.y[:fitted], ())
-    if variance is None:
-        rng = np.random.default_rng(0)
-        explained = explainable_variance(residual, u, base.output[:fitted], rng)
-        variance = float(np.mean(residual**2)) - explained
-    if variance <= 0.0:
-        raise RecordError("the output has no noise: give the standard deviation of that in the experiment")
-    return float(np.sqrt(variance))

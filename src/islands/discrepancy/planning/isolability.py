@@ -1,7 +1,7 @@
 """Isolability: which causes an experiment can tell apart, and at which strengths.
 
-The expected log-likelihood ratio between a cause and another effect is the squared distance of its data from
-the manifold of the other effect's data, in standard deviations of the noise. Parameters of the other effect
+The expected log-likelihood ratio between a cause and another effect is the squared distance of its whitened
+data from the manifold of the other effect's data. Parameters of the other effect
 and of the simulation are calibrated within their tolerances.
 """
 
@@ -169,17 +169,18 @@ class _RowFinder:
         scale = CauseScale(dictionary, effect)
         required = require_detection(self.experiment, effect, len(self.effects))
         smallest = required / sqrt(self.experiment.estimation_samples)
-        weakest = scale.find_cause(smallest)
+        weakest = scale.find_cause(smallest, is_whitened=True)
         nothing = (nan,) * len(self.effects)
         if weakest is None:
             return IsolabilityRow(None, None, nothing, nothing)
-        wanted = [misfit for misfit in MISFITS if misfit > _MIN_STEP * smallest]
+        least = smallest * (weakest.misfit / weakest.whitened_misfit)
+        wanted = [misfit for misfit in MISFITS if misfit > _MIN_STEP * least]
         found = (scale.find_cause(misfit) for misfit in wanted)
         causes = [weakest]
         causes += [cause for cause in found if cause is not None and cause.misfit > causes[-1].misfit]
         parameter = effect.parameters(self.experiment.context)[0]
         detectable = DetectableStrength(
-            weakest.misfit, weakest.misfit * self.experiment.noise_std, weakest.values[0], parameter.unit
+            weakest.misfit, weakest.misfit * self.experiment.noise.std, weakest.values[0], parameter.unit
         )
         reference = min(
             range(len(causes)), key=lambda place: abs(log(causes[place].misfit / REFERENCE_MISFIT))
@@ -253,7 +254,7 @@ class PairSearch:
             self._fits[place] = fit_noise_free(model, observed, starts or [model.output.nominal])
         # An effect that explains nothing is as far away as the simulation without it.
         cause = self._causes[place]
-        without = cause.misfit * sqrt(self._dictionary.experiment.estimation_samples)
+        without = cause.whitened_misfit * sqrt(self._dictionary.experiment.estimation_samples)
         return min(sqrt(self._fits[place].squared_distance), without)
 
     def _interpolate(self, low: int, high: int) -> float:

@@ -1,9 +1,9 @@
 """Least squares fit of a hypothesis to an experiment without noise.
 
-Given a cause and noise that is white with a known standard deviation, the expected value of minus twice the
-log-likelihood ratio between the cause and another hypothesis is the least sum of squares that the parameters
-of the hypothesis leave of the noise-free data, in standard deviations of the noise (Kay, Fundamentals of
-Statistical Signal Processing: Detection Theory, section 4.3).
+Given a cause and normal noise of known covariance, the expected value of minus twice the log-likelihood ratio
+between the cause and another hypothesis is the least sum of squares that the parameters of the hypothesis
+leave of the whitened noise-free data (Kay, Fundamentals of Statistical Signal Processing: Detection Theory,
+section 4.3).
 """
 
 from collections.abc import Iterable
@@ -31,13 +31,19 @@ class NoiseFreeFit:
     Attributes
     ----------
     values : ndarray, shape (parameters,)
-    squared_distance : float
-        Sum of the squared differences in standard deviations of the noise, plus the squared deviations from
-        the nominal values in prior standard deviations: the expected minus twice log-likelihood ratio.
+    residual : ndarray, shape (channels * estimation samples + parameters,)
+        Differences of the whitened data, then the deviations from the nominal values in prior standard
+        deviations. NaN if the simulation diverges.
     """
 
     values: Signal
-    squared_distance: float
+    residual: Signal
+
+    @property
+    def squared_distance(self) -> float:
+        """Sum of squares: the expected minus twice log-likelihood ratio; infinite for a diverged fit."""
+        squares = float(self.residual @ self.residual)
+        return squares if np.isfinite(squares) else np.inf
 
 
 def fit_noise_free(
@@ -52,7 +58,7 @@ def fit_noise_free(
     ----------
     model : ExperimentModel
     observed : ndarray, shape (channels * estimation samples,)
-        Data in standard deviations of the noise.
+        Whitened data.
     starts : iterable of ndarray, shape (parameters,)
         Starting points; those at which the simulation diverges are left out.
     max_evaluations : int
@@ -71,10 +77,8 @@ def _fit(model: ExperimentModel, observed: Signal, start: Signal, max_evaluation
         return np.hstack([model.simulate(points) - observed, prior])
 
     first = find_residual(start[None])[0]
-    if not np.isfinite(first).all():
-        return NoiseFreeFit(start, np.inf)
-    if not start.size:
-        return NoiseFreeFit(start, float(first @ first))
+    if not (start.size and np.isfinite(first).all()):
+        return NoiseFreeFit(start, first)
 
     def find_derivatives(steps: Signal) -> Signal:
         values = steps * scales
@@ -92,4 +96,4 @@ def _fit(model: ExperimentModel, observed: Signal, start: Signal, max_evaluation
         ftol=MIN_RELATIVE_DECREASE,
         max_nfev=max_evaluations,
     )
-    return NoiseFreeFit(np.clip(best.x * scales, lower, upper), 2.0 * float(best.cost))
+    return NoiseFreeFit(np.clip(best.x * scales, lower, upper), best.fun)

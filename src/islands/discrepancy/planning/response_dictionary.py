@@ -25,7 +25,7 @@ class ResponseDictionary:
     without : ExperimentModel
         The simulation without effects.
     output : ndarray, shape (channels * estimation samples,)
-        Its output at the nominal values, in standard deviations of the noise.
+        Its whitened output at the nominal values.
     basis : ndarray
         Orthonormal basis of the responses to its parameters, each followed by its prior.
     """
@@ -66,7 +66,7 @@ class ResponseDictionary:
         Parameters
         ----------
         observed : ndarray, shape (channels * estimation samples,)
-            Noise-free data in standard deviations of the noise.
+            Whitened noise-free data.
 
         Returns
         -------
@@ -101,8 +101,9 @@ class ResponseDictionary:
         return self._responses[key]
 
     def _as_residual(self, misfit: Signal) -> Signal:
-        """Return the misfit of the output over all samples, in its unit; zero after the estimation part."""
+        """Return a whitened misfit of the output in its unit; zero after the estimation part."""
         residual = np.zeros(self.experiment.context.u.size)
         fitted = self.experiment.estimation_samples
-        residual[:fitted] = misfit[:fitted] * self.experiment.noise_std
+        noise = self.experiment.noise
+        residual[:fitted] = noise.colour(misfit[:fitted]) * noise.std
         return residual

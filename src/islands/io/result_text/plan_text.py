@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from islands.discrepancy.planning.alternative_experiments import AlternativeExperiment, choose_cheapest
+from islands.discrepancy.planning.channel_noise import NoiseOrigin
 from islands.discrepancy.planning.decisive_experiment import DecisiveExperiment
 from islands.discrepancy.planning.experiment_plan import ExperimentPlan
 from islands.discrepancy.planning.isolability import REFERENCE_MISFIT, Isolability, IsolabilityRow
@@ -10,6 +11,12 @@ from islands.io.result_text.text_layout import WIDTH, wrap
 
 #: A cause is separable as soon as it is detected up to this factor of the smallest detectable strength.
 _SAME = 1.05
+
+_ORIGINS = {
+    NoiseOrigin.GIVEN: "as given",
+    NoiseOrigin.PERIODS: "measured between repeated periods",
+    NoiseOrigin.RESIDUAL: "an upper bound, from the residual of the calibrated simulation",
+}
 
 _LEGEND = (
     ". separable when detected   + from a misfit of up to 1 sigma on   x from more than 1 sigma on   "
@@ -20,12 +27,13 @@ _LEGEND = (
 def plan_text(plan: ExperimentPlan) -> str:
     """Return a plan as text: matrix, detectable strengths, groups, changes, and the decisive experiment.
 
-    Sigma is the standard deviation of the noise.
+    Sigma is the standard deviation of the noise; separations are in that of its innovations.
     """
     record, unit = plan.record, plan.record.output_unit
     lines = wrap(
         f"{plan.simulation}, input {record.input_names[0]}: {record.samples} samples of {record.dt:g} s. "
         f"Noise of the output: sigma = {plan.noise_std:.3g} {unit}".rstrip()
+        + _describe_noise(plan)
     )
     lines += ["", *_format_matrix(plan.isolability), "", *_format_strengths(plan.isolability, unit)]
     groups, absorbed = plan.isolability.groups, plan.isolability.undetectable
@@ -41,8 +49,15 @@ def plan_text(plan: ExperimentPlan) -> str:
     if plan.decisive is None:
         lines += wrap(f"All causes are separable at {REFERENCE_MISFIT:g} sigma: this input is sufficient.")
     else:
-        lines += _format_decisive(plan.decisive)
+        lines += _format_decisive(plan.decisive, _name_unit(plan))
     return "\n".join(lines)
+
+
+def _describe_noise(plan: ExperimentPlan) -> str:
+    noise = plan.noise
+    size = f"{noise.time_constant * plan.record.dt:.2g} s"
+    colour = "white" if noise.is_white else f"coloured, AR({noise.model.order}), time constant {size}"
+    return f", {colour}; {_ORIGINS[noise.origin]}"
 
 
 def _format_matrix(isolability: Isolability) -> Iterator[str]:
@@ -88,8 +103,8 @@ def _format_alternatives(plan: ExperimentPlan) -> Iterator[str]:
     one, other = plan.pair
     required = plan.alternatives[0].separation.required
     yield from wrap(
-        f"{one} or {other} at {REFERENCE_MISFIT:g} sigma: separation in sigma with other experiments, the "
-        f"cheapest first; {required:.1f} are required"
+        f"{one} or {other} at {REFERENCE_MISFIT:g} sigma: separation in {_name_unit(plan)} with other "
+        f"experiments, the cheapest first; {required:.1f} are required"
     )
     unit = plan.record.input_units[0]
     for each in plan.alternatives:
@@ -104,9 +119,14 @@ def _format_change(each: AlternativeExperiment, unit: str) -> str:
     return "\n".join(wrap(text, " " * 11)) if len(text) > WIDTH - 11 else text
 
 
-def _format_decisive(decisive: DecisiveExperiment) -> Iterator[str]:
+def _name_unit(plan: ExperimentPlan) -> str:
+    """Return the unit of separations: white noise is its innovations."""
+    return "sigma" if plan.noise.is_white else "standard deviations of whitened noise"
+
+
+def _format_decisive(decisive: DecisiveExperiment, unit: str) -> Iterator[str]:
     yield from wrap(f"Decisive experiment: {decisive.description}, {decisive.u.size * decisive.dt:.3g} s")
-    yield "Separation in sigma with the given input, with this one, and the required one:"
+    yield from wrap(f"Separation in {unit} with the given input, with this one, and the required one:")
     for pair, before, after in zip(decisive.pairs, decisive.before, decisive.after, strict=True):
         numbers = f"{before.distance:8.1f}{after.distance:8.1f}{after.required:8.1f}"
         yield f"{numbers}  {pair.names[0]} or {pair.names[1]}"

@@ -10,7 +10,6 @@ import islands
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference import noise_floor
 from islands.discrepancy.planning import decisive_experiment
-from islands.discrepancy.planning.experiment_setup import make_experiment
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError, SettingsError
 from islands.figures.matrices.separability import draw_separability
@@ -79,13 +78,6 @@ def test_the_figure_has_a_row_and_a_column_for_each_cause(plan: islands.Experime
     rows, columns = axes.get_yticklabels(), axes.get_xticklabels()
     assert [text.get_text() for text in rows] == [text.get_text() for text in columns]
     assert [text.get_text() for text in rows] == list(plan.isolability.names)
-
-
-def test_noise_is_estimated_from_a_measured_output() -> None:
-    record = input_record(wave((0.5, 3.0), 1200))
-    noisy = replace(record, y=2.0 * record.u[:, 0] + 0.05 * np.random.default_rng(1).standard_normal(1200))
-    experiment, _ = make_experiment(noisy, amplifier(), None, {})
-    assert experiment.noise_std == pytest.approx(0.05, rel=0.1)
 
 
 def test_impossible_plans_are_refused() -> None:

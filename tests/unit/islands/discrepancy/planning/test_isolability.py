@@ -4,13 +4,20 @@ from math import inf, isnan
 
 import numpy as np
 import pytest
+import scipy
 
-from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.planning.isolability import MISFITS, find_isolability
 from islands.discrepancy.planning.pair_separation import separate_pairs
-from islands.discrepancy.planning.response_dictionary import ResponseDictionary
 from islands.discrepancy.planning.separation import require_detection
-from support.planned import amplifier_experiment, make_cause, make_pair, take_effects, wave
+from support.planned import (
+    amplifier_experiment,
+    coloured_noise,
+    make_pair,
+    noise_covariance,
+    take_effects,
+    wave,
+    with_noise,
+)
 
 SLOW, FAST = wave((0.25,)), wave((0.5, 3.0, 7.0))
 
@@ -42,24 +49,37 @@ def test_delay_and_lag_are_separable_with_a_fast_input_only() -> None:
     assert after.expected_ratio > 10.0 * before.expected_ratio
 
 
-def test_expected_ratio_is_the_mean_of_ratios_of_noisy_data() -> None:
-    """An offset c against a drift through the origin of free slope, by least squares."""
-    experiment = amplifier_experiment(wave((0.25, 0.5)))
+@pytest.mark.parametrize("coefficients", [(), (0.9,), (1.6, -0.7)])
+def test_expected_ratio_is_the_quadratic_form_of_the_covariance(coefficients: tuple[float, ...]) -> None:
+    """An offset against a drift through the origin of free slope, by generalised least squares."""
+    experiment = with_noise(amplifier_experiment(wave((0.25, 0.5))), coloured_noise(0.2, *coefficients))
     found = find_isolability(experiment, take_effects("offset", "linear-drift"))
-    offset = make_cause(experiment, "offset")
-    rng = np.random.default_rng(0)
-    dictionary = ResponseDictionary(experiment)
-    drift = dictionary.get_model(CATALOGUE["linear-drift"])
-    slopes = [drift.simulate(drift.insert(CATALOGUE["linear-drift"], (1.0,))[None])[0] - dictionary.output]
-    absorbed = np.column_stack([dictionary.output, *slopes])
-    complete = np.column_stack([absorbed[:, 0], np.ones(len(absorbed))])
-    ratios = []
-    for _ in range(400):
-        noisy = offset.observed + rng.standard_normal(offset.observed.size)
-        squares = [np.linalg.lstsq(design, noisy, rcond=None)[1][0] for design in (absorbed, complete)]
-        ratios.append(squares[0] - squares[1])
-    mean, deviation = np.mean(ratios), 2 * np.sqrt(np.mean(ratios))
-    assert found.rows[0].ratios[1] == pytest.approx(mean, abs=4 * deviation / np.sqrt(len(ratios)))
+    reference = found.rows[0].reference
+    assert reference is not None
+    fitted = experiment.estimation_samples
+    covariance = noise_covariance(0.2, coefficients, fitted)
+    offset = np.full(fitted, reference.values[0])
+    absorbed = np.column_stack([experiment.context.u[:fitted], np.arange(fitted)])
+    precise = scipy.linalg.solve(covariance, absorbed, assume_a="pos")
+    left = offset - absorbed @ np.linalg.solve(absorbed.T @ precise, precise.T @ offset)
+    ratio = left @ scipy.linalg.solve(covariance, left, assume_a="pos")
+    assert found.rows[0].ratios[1] == pytest.approx(ratio, rel=1e-3)
+
+
+def test_slow_noise_hides_an_offset_and_shows_a_delay() -> None:
+    """The noises have the same standard deviation."""
+    white = amplifier_experiment(wave((7.0, 11.0, 19.0)))
+    slow = with_noise(white, coloured_noise(0.2 * (1.0 - 0.95**2) ** 0.5, 0.95))
+    assert slow.noise.std == pytest.approx(white.noise.std)
+    found = [
+        [row.detectable for row in find_isolability(each, take_effects("offset", "delay")).rows]
+        for each in (white, slow)
+    ]
+    (offset, delay), (offset_in_slow, delay_in_slow) = found
+    assert offset_in_slow.misfit > 3.0 * offset.misfit
+    assert delay_in_slow.misfit < 0.5 * delay.misfit
+    # Misfits are those before whitening, in the unit of the output.
+    assert abs(offset_in_slow.value) == pytest.approx(offset_in_slow.misfit_in_output, rel=0.2)
 
 
 def test_detectable_strength_has_the_distance_that_detection_requires() -> None:

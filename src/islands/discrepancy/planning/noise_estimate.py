@@ -1,0 +1,55 @@
+"""Noise model of an output, estimated from its measured values before an experiment is planned."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.calibration.levenberg_marquardt import calibrate
+from islands.discrepancy.calibration.noise_model import fit_noise
+from islands.discrepancy.calibration.preparation import make_target
+from islands.discrepancy.inference.noise_floor import explain_residual, subtract_mean_period
+from islands.discrepancy.planning.channel_noise import ChannelNoise, NoiseOrigin
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.errors import RecordError
+
+#: Largest noise relative to the output that is rounding.
+_ROUNDING = 1e-9
+
+
+def estimate_noise(
+    record: Dataset, simulation: ExtendedSimulator, prior_std: Mapping[str, float], fitted: int
+) -> ChannelNoise:
+    """Estimate the noise of a measured output, and its colour.
+
+    If the input repeats, the noise is what differs between periods. Otherwise it is the part of the residual
+    of the calibrated simulation that a regression on its signals does not predict: an upper bound, since it
+    may contain errors of the simulation.
+
+    Parameters
+    ----------
+    fitted : int
+        Number of samples, from the first on, that are used.
+
+    Raises
+    ------
+    RecordError
+        The output has gaps or no noise.
+    """
+    if np.isnan(record.y).any():
+        raise RecordError(
+            "the noise is unknown, since the record has no complete output: give its standard deviation"
+        )
+    u, y = record.u[:fitted, 0], record.y[:fitted]
+    periods, origin = subtract_mean_period(u, y), NoiseOrigin.PERIODS
+    if periods is None:
+        base = calibrate(simulation, make_target(record, fitted, prior_std), simulation.nominal)
+        output = base.output[:fitted]
+        left = explain_residual(y - output, u, output, np.random.default_rng(0))[1]
+        periods, origin = left[None], NoiseOrigin.RESIDUAL
+    if np.max(np.abs(periods)) <= _ROUNDING * np.max(np.abs(y)):
+        raise RecordError("the output has no noise: give the standard deviation of that in the experiment")
+    # A difference of fractional order would have no stationary variance.
+    model = fit_noise(periods.ravel(), segments=(periods.shape[1],) * len(periods), difference_orders=())
+    # In a record, noise that is slower than it and a drift are the same.
+    return ChannelNoise(model.limit_poles(periods.size), origin)
