@@ -1,19 +1,23 @@
 """Compare planned separations with diagnoses of simulated data.
 
-``python benchmarks/planned_separation.py [SEEDS] [--decisive]`` plans experiments with several simulators,
-simulates records with one cause at the misfit of the plan, and diagnoses them. It prints how often a cause is
-named, how often causes that the plan calls separable are not among its equivalents, and how often those that
-it calls inseparable are. With ``--decisive`` it counts how often a cause is named without the other one of a
-pair as its equivalent, on records of the given input and of the decisive one.
+``python benchmarks/planned_separation.py [SEEDS] [--noise KIND] [--weakest | --decisive]`` plans experiments
+with several simulators, simulates records with one cause at the misfit of the plan, and diagnoses them. It
+prints how often a cause is named, how often causes that the plan calls separable are not among its
+equivalents, and how often those that it calls inseparable are.
+
+With ``--noise`` the noise is of another kind than white: it is measured in one record without a cause, and
+the same is printed for a plan with white noise of the same standard deviation. With ``--weakest`` each cause
+has the smallest detectable misfit of a plan. With ``--decisive`` it counts how often a cause is named without
+the other one of a pair as its equivalent, on records of the given input and of the decisive one.
 """
 
-import sys
+import argparse
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
+from planned_experiments import EXPERIMENTS, Planned, make_plans
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import diagnose
@@ -26,10 +30,9 @@ from islands.discrepancy.planning.isolability import Isolability, find_isolabili
 from islands.discrepancy.planning.pair_separation import CausePair
 from islands.discrepancy.planning.planned_input import find_limits
 from islands.discrepancy.planning.response_dictionary import ResponseDictionary
+from islands.discrepancy.planning.separation import require_detection
 from islands.io.simulator_spec.factory import make_simulator
-from islands.systems.signals import sines
-
-ROOT = Path(__file__).resolve().parents[1]
+from islands.performance.trials.injection.noise import NOISES
 
 #: Number of records of each cause.
 SEEDS = 10
@@ -38,58 +41,11 @@ SEEDS = 10
 #: separable and as inseparable. At the latter, it is separable in less than one of ten.
 SEPARABLE, INSEPARABLE = 1.3, 0.43
 
-
-@dataclass(frozen=True)
-class Planned:
-    """An experiment and the causes that are hidden in its records.
-
-    Attributes
-    ----------
-    spec : str
-        Simulation.
-    u : ndarray, shape (samples,)
-    dt : float
-    noise : float
-        Noise relative to the standard deviation of the output.
-    causes : tuple of str
-    """
-
-    spec: str
-    u: np.ndarray
-    dt: float
-    noise: float
-    causes: tuple[str, ...]
-
-
 #: Misfit at which the given input of the motor does not separate the pairs.
 LOW = 0.4
 
 #: Noise of the motor's speed, and pairs of causes, for decisive experiments.
 NOISE, PAIRS = 0.25, (("cubic-stiffness", "even-nonlinearity"),)
-
-EXPERIMENTS = {
-    "dc-motor": Planned(
-        f"ode:{ROOT}/examples/simulations/dc-motor.toml",
-        sines(0.001, 2.0, (3.0, 1.0), (2.0, 7.3)),
-        0.001,
-        0.01,
-        ("delay", "coulomb-friction", "cubic-stiffness"),
-    ),
-    "second-order": Planned(
-        f"ode:{ROOT}/examples/simulations/second-order.toml",
-        sines(0.01, 16.0, (20.0, 12.0), (0.31, 1.37)),
-        0.01,
-        0.02,
-        ("backlash", "dead-zone", "sensor-lag"),
-    ),
-    "bouc-wen-piezo": Planned(
-        "bouc-wen-piezo",
-        sines(0.005, 8.0, (60.0, 20.0), (0.5, 1.7)) + 75.0,
-        0.005,
-        0.003,
-        ("exponential-creep", "delay", "linear-drift"),
-    ),
-}
 
 
 @dataclass
@@ -104,53 +60,75 @@ class Agreement:
     equivalent: int = 0
 
 
-def compare(planned: Planned, cause: str, seeds: Sequence[int]) -> Agreement:
-    """Plan an experiment, hide a cause in simulated records, and diagnose them."""
-    record = Dataset(u=planned.u, y=np.full(planned.u.size, np.nan), dt=planned.dt)
-    simulator = make_simulator(planned.spec, record)
-    prior_std = get_tolerances(simulator)
-    quiet = make_experiment(record, simulator, 1.0, prior_std)
-    noise = planned.noise * float(np.std(ResponseDictionary(quiet[0]).output))
-    experiment, effects = make_experiment(record, simulator, noise, prior_std)
-    index = [effect.name for effect in effects].index(cause)
-    isolability = find_isolability(experiment, effects)
-    row = isolability.rows[index]
-    assert row.reference is not None
-    dictionary = ResponseDictionary(experiment)
-    model = dictionary.get_model(effects[index])
-    y = model.output.simulate(model.insert(effects[index], row.reference.values))
-    ratios = _rate_by_cause(isolability, index)
-    found = Agreement()
-    for seed in seeds:
-        rng = np.random.default_rng([seed, 41])
-        measured = replace(record, y=y + noise * rng.standard_normal(y.size))
-        diagnosis = diagnose(measured, make_simulator(planned.spec, measured))
-        names = [each for each in diagnosis.effects if each.family != "data"]
-        found.records += 1
-        if not names:
+def compare(planned: Planned, kind: str, seeds: Sequence[int]) -> Iterator[tuple[str, str, Agreement]]:
+    """Hide causes at the reference misfit in simulated records, and diagnose them.
+
+    Yields
+    ------
+    str, str, Agreement
+        Name of the cause, and noise of the plan.
+    """
+    plans = make_plans(planned, kind)
+    found = {name: find_isolability(each, plans.effects) for name, each in plans.experiments.items()}
+    names = [effect.name for effect in plans.effects]
+    for cause in planned.causes:
+        index = names.index(cause)
+        effect, reference = plans.effects[index], next(iter(found.values())).rows[index].reference
+        assert reference is not None
+        listed = plans.diagnose(effect, reference.values, seeds)
+        for name, isolability in found.items():
+            scale = CauseScale(ResponseDictionary(plans.experiments[name]), effect)
+            same = scale.make_cause(reference.values)
+            assert same is not None
+            ratios = _rate_by_cause(isolability, index, same.misfit)
+            yield cause, name, _count(cause.partition(":")[0], listed, ratios)
+
+
+def detect_weakest(
+    planned: Planned, kind: str, seeds: Sequence[int]
+) -> Iterator[tuple[str, str, float, int]]:
+    """Hide causes at the smallest detectable misfit of each plan, and diagnose them.
+
+    Yields
+    ------
+    str, str, float, int
+        Name of the cause, noise of the plan, misfit in standard deviations of the noise, and the number of
+        records in which anything is named.
+    """
+    plans = make_plans(planned, kind)
+    for effect in plans.effects:
+        if effect.name not in planned.causes:
             continue
-        first = names[0]
-        listed = {first.name, *first.equivalents}
-        found.named += cause.partition(":")[0] in listed
+        for name, experiment in plans.experiments.items():
+            required = require_detection(experiment, effect, len(plans.effects))
+            scale = CauseScale(ResponseDictionary(experiment), effect)
+            weakest = scale.find_cause(required / experiment.estimation_samples**0.5, is_whitened=True)
+            assert weakest is not None
+            listed = plans.diagnose(effect, weakest.values, seeds)
+            yield effect.name, name, weakest.misfit, sum(map(bool, listed))
+
+
+def _count(cause: str, listed: Sequence[set[str]], ratios: dict[str, float]) -> Agreement:
+    found = Agreement(len(listed))
+    for names in filter(None, listed):
+        found.named += cause in names
         for other, ratio in ratios.items():
             if ratio > SEPARABLE:
                 found.separable += 1
-                found.separated += other not in listed
+                found.separated += other not in names
             elif ratio < INSEPARABLE:
                 found.inseparable += 1
-                found.equivalent += other in listed
+                found.equivalent += other in names
     return found
 
 
-def _rate_by_cause(isolability: Isolability, index: int) -> dict[str, float]:
-    """Return the reference misfit relative to the one at which each other cause is separable."""
-    row = isolability.rows[index]
-    assert row.reference is not None
+def _rate_by_cause(isolability: Isolability, index: int, misfit: float) -> dict[str, float]:
+    """Return the misfit relative to the one at which each other cause is separable."""
     ratios: dict[str, float] = {}
-    for effect, misfit in zip(isolability.effects, row.misfits, strict=True):
+    for effect, smallest in zip(isolability.effects, isolability.rows[index].misfits, strict=True):
         if effect.cause != isolability.effects[index].cause:
             # The effect of one cause that is the most similar counts.
-            ratios[effect.cause] = min(ratios.get(effect.cause, np.inf), row.reference.misfit / misfit)
+            ratios[effect.cause] = min(ratios.get(effect.cause, np.inf), misfit / smallest)
     return ratios
 
 
@@ -190,20 +168,42 @@ def _is_decided(planned: Planned, u: np.ndarray, y: np.ndarray, pair: tuple[str,
 
 def main() -> None:
     """Print the comparison."""
-    given = [each for each in sys.argv[1:] if each != "--decisive"]
-    seeds = range(int(given[0]) if given else SEEDS)
-    if "--decisive" in sys.argv:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("seeds", type=int, nargs="?", default=SEEDS)
+    parser.add_argument("--noise", choices=tuple(NOISES), default="white")
+    parser.add_argument("--weakest", action="store_true")
+    parser.add_argument("--decisive", action="store_true")
+    given = parser.parse_args()
+    seeds = range(given.seeds)
+    if given.decisive:
         for pair in PAIRS:
             before, after = count_decided(pair, seeds)
             print(f"{pair[0]} alone named: {before} and {after} of {len(seeds)}", flush=True)
         return
-    total: Counter[str] = Counter()
+    if given.weakest:
+        _print_weakest(given.noise, seeds)
+        return
+    totals: dict[str, Counter[str]] = {}
     for name, planned in EXPERIMENTS.items():
-        for cause in planned.causes:
-            found = vars(compare(planned, cause, seeds))
-            total.update(found)
-            print(f"{name:16s}{cause:20s}{_describe(found)}", flush=True)
-    print(f"{'all':36s}{_describe(total)}")
+        for cause, plan, agreement in compare(planned, given.noise, seeds):
+            found = vars(agreement)
+            totals.setdefault(plan, Counter()).update(found)
+            print(f"{name:16s}{cause:20s}plan with {plan} noise: {_describe(found)}", flush=True)
+    for plan, total in totals.items():
+        print(f"{'all':36s}plan with {plan} noise: {_describe(total)}")
+
+
+def _print_weakest(kind: str, seeds: Sequence[int]) -> None:
+    totals: Counter[str] = Counter()
+    records: Counter[str] = Counter()
+    for name, planned in EXPERIMENTS.items():
+        for cause, plan, misfit, detected in detect_weakest(planned, kind, seeds):
+            totals[plan] += detected
+            records[plan] += len(seeds)
+            where = f"{name:16s}{cause:20s}plan with {plan} noise:"
+            print(f"{where} {misfit:.2f} sigma, detected {detected}/{len(seeds)}", flush=True)
+    for plan, total in totals.items():
+        print(f"{'all':36s}plan with {plan} noise: detected {total}/{records[plan]}")
 
 
 def _describe(found: dict[str, int] | Counter[str]) -> str:

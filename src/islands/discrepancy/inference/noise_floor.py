@@ -244,23 +244,29 @@ def subtract_mean_period(u: Signal, y: Signal) -> Signal | None:
     -------
     ndarray, shape (periods, samples of a period)
     """
-    period = detect_period(u)
-    if period is None or y.size < 3 * period:
+    periods = _split_periods(u, y)
+    if periods is None:
         return None
-    periods = y[y.size % period :].reshape(-1, period)[1:]
     count = len(periods)
     return np.array((periods - periods.mean(axis=0)) * np.sqrt(count / (count - 1)))
 
 
 def _subtract_periods(u: Signal, y: Signal) -> Signal | None:
     """Return the differences of successive periods of the output, or None if there are fewer than three."""
-    period = detect_period(u)
-    if period is None or y.size < 3 * period:
+    periods = _split_periods(u, y)
+    if periods is None:
         return None
-    periods = y[y.size % period :].reshape(-1, period)[1:]
     differences = np.diff(periods, axis=0)
     differences = differences[~np.isnan(differences).all(axis=1)]
     is_gap = np.isnan(differences)
     if is_gap.any():
         return np.array(differences - np.nanmean(differences, axis=1, keepdims=True))
     return np.array(differences - differences.mean(axis=1, keepdims=True))
+
+
+def _split_periods(u: Signal, y: Signal) -> Signal | None:
+    """Return the periods of an output after the first one, or None if there are fewer than three."""
+    period = detect_period(u)
+    if period is None or y.size < 3 * period:
+        return None
+    return y[y.size % period :].reshape(-1, period)[1:]

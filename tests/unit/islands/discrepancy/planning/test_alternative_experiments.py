@@ -13,7 +13,15 @@ from islands.discrepancy.planning.experiment_setup import make_experiment
 from islands.discrepancy.planning.pair_separation import CausePair, separate_pairs
 from islands.discrepancy.planning.planned_input import InputLimits
 from islands.io.simulator_spec.factory import make_simulator
-from support.planned import amplifier_experiment, input_record, make_cause, make_pair, wave
+from support.planned import (
+    amplifier_experiment,
+    coloured_noise,
+    input_record,
+    make_cause,
+    make_pair,
+    wave,
+    with_noise,
+)
 from support.repository import ROOT
 
 
@@ -50,6 +58,11 @@ def test_another_state_separates_a_sensor_from_the_process() -> None:
     experiment, effects = make_experiment(record, simulator, 0.5, {})
     states = {channel.name: channel for channel in list_state_channels(experiment)}
     assert set(states) == {"i", "phi"}
+    slow = with_noise(experiment, coloured_noise(0.1, 0.9))
+    for channel in list_state_channels(slow):
+        assert channel.noise.model.coefficients == pytest.approx([0.9])
+        relative = slow.noise.std / slow.context.output_peak
+        assert channel.noise.std == pytest.approx(relative * channel.context.output_peak)
     assert states["i"].unit == "A"
     offset = next(effect for effect in effects if effect.name == "input-offset:i")
     other = next(effect for effect in effects if effect.name == "input-offset:omega")

@@ -10,13 +10,14 @@ import islands
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference import noise_floor
 from islands.discrepancy.planning import decisive_experiment
+from islands.discrepancy.planning.channel_noise import NoiseOrigin
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError, SettingsError
 from islands.figures.matrices.separability import draw_separability
 from islands.io.diagnosis_json import as_json
 from islands.io.plan_json import plan_document
 from islands.io.result_text.plan_text import plan_text
-from support.planned import DT, amplifier, input_record, take_effects, wave
+from support.planned import DT, amplifier, coloured_noise, input_record, take_effects, wave
 
 EFFECTS = tuple(take_effects("delay", "sensor-lag", "offset", "sensor-gain"))
 
@@ -63,6 +64,24 @@ def test_the_document_and_the_text_have_the_same_answers(plan: islands.Experimen
     assert rows[0].split()[2:] == ["x" if np.isfinite(delay.misfits[1]) else "#", "."]
     assert lag.detectable is not None
     assert offset.detectable is not None
+
+
+def test_the_document_and_the_text_say_where_the_noise_comes_from(plan: islands.ExperimentPlan) -> None:
+    assert "sigma = 0.2 um, white; as given" in plan_text(plan)
+    assert plan_document(plan)["noise"]["is_white"]
+    pole = np.exp(-1.0 / 30.0)
+    noise = replace(coloured_noise(0.1, pole), origin=NoiseOrigin.PERIODS)
+    text = " ".join(plan_text(replace(plan, noise=noise)).split())
+    assert "coloured, AR(1), time constant 0.3 s; measured between repeated periods" in text
+    document = plan_document(replace(plan, noise=noise))
+    assert document["noise_std"] == pytest.approx(0.1 / np.sqrt(1.0 - pole**2))
+    assert document["noise"] == {
+        "origin": "repeated periods",
+        "is_white": False,
+        "autoregression": [pole],
+        "innovation_std": pytest.approx(0.1),
+        "time_constant_s": pytest.approx(30 * DT),
+    }
 
 
 def test_a_sufficient_input_needs_no_decisive_experiment() -> None:
