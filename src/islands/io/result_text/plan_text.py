@@ -30,11 +30,8 @@ def plan_text(plan: ExperimentPlan) -> str:
     Sigma is the standard deviation of the noise; separations are in that of its innovations.
     """
     record, unit = plan.record, plan.record.output_unit
-    lines = wrap(
-        f"{plan.simulation}, input {record.input_names[0]}: {record.samples} samples of {record.dt:g} s. "
-        f"Noise of the output: sigma = {plan.noise_std:.3g} {unit}".rstrip()
-        + _describe_noise(plan)
-    )
+    given = f"{plan.simulation}, input {record.input_names[0]}: {record.samples} samples of {record.dt:g} s"
+    lines = [*wrap(given), *wrap(_describe_noise(plan))]
     lines += ["", *_format_matrix(plan.isolability), "", *_format_strengths(plan.isolability, unit)]
     groups, absorbed = plan.isolability.groups, plan.isolability.undetectable
     if groups or absorbed:
@@ -54,10 +51,11 @@ def plan_text(plan: ExperimentPlan) -> str:
 
 
 def _describe_noise(plan: ExperimentPlan) -> str:
-    noise = plan.noise
-    size = f"{noise.time_constant * plan.record.dt:.2g} s"
-    colour = "white" if noise.is_white else f"coloured, AR({noise.model.order}), time constant {size}"
-    return f", {colour}; {_ORIGINS[noise.origin]}"
+    noise, record = plan.noise, plan.record
+    size = f"sigma = {noise.std:.3g} {record.output_unit}".rstrip()
+    slowest = f"{noise.time_constant * record.dt:.2g} s"
+    colour = "white" if noise.is_white else f"coloured, AR({noise.model.order}), time constant {slowest}"
+    return f"Noise of the output: {size}, {colour}; {_ORIGINS[noise.origin]}"
 
 
 def _format_matrix(isolability: Isolability) -> Iterator[str]:
