@@ -232,23 +232,20 @@ def noise_variance_from_periods(u: Signal, y: Signal, segments: Sequence[int] = 
     return float(np.mean(squares)) / 2.0 if squares.size else None
 
 
-def subtract_mean_period(u: Signal, y: Signal) -> Signal | None:
-    """Subtract the mean period from an output without gaps; None if there are fewer than three periods.
+def contrast_periods(u: Signal, y: Signal) -> Signal | None:
+    """Return orthonormal contrasts of the periods of an output without gaps; None without three periods.
 
-    What is left is noise, since a simulation and every effect of the input repeat. It is scaled so that its
-    variance is that of the noise (Pintelon and Schoukens, System Identification, 2012, section 2.5). The
-    first period is left out, since transients decay in it. Noise at multiples of the frequency of the periods
-    is subtracted with the mean.
+    Contrasts are noise, since a simulation and every effect of the input repeat. Their variance is that of
+    the noise (Pintelon and Schoukens, System Identification, 2012, section 2.5). The first period is left
+    out, since transients decay in it. Noise at multiples of the frequency of the periods is not in them.
 
     Returns
     -------
-    ndarray, shape (periods, samples of a period)
+    ndarray, shape (periods - 1, samples of a period)
+        The periods are those after the first one.
     """
     periods = _split_periods(u, y)
-    if periods is None:
-        return None
-    count = len(periods)
-    return np.array((periods - periods.mean(axis=0)) * np.sqrt(count / (count - 1)))
+    return None if periods is None else np.array(scipy.linalg.helmert(len(periods)) @ periods)
 
 
 def _subtract_periods(u: Signal, y: Signal) -> Signal | None:

@@ -8,7 +8,7 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.noise_model import fit_noise
 from islands.discrepancy.calibration.preparation import make_target
-from islands.discrepancy.inference.noise_floor import explain_residual, subtract_mean_period
+from islands.discrepancy.inference.noise_floor import contrast_periods, explain_residual
 from islands.discrepancy.planning.channel_noise import ChannelNoise, NoiseOrigin
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.errors import RecordError
@@ -41,15 +41,15 @@ def estimate_noise(
             "the noise is unknown, since the record has no complete output: give its standard deviation"
         )
     u, y = record.u[:fitted, 0], record.y[:fitted]
-    periods, origin = subtract_mean_period(u, y), NoiseOrigin.PERIODS
-    if periods is None:
+    parts, origin = contrast_periods(u, y), NoiseOrigin.PERIODS
+    if parts is None:
         base = calibrate(simulation, make_target(record, fitted, prior_std), simulation.nominal)
         output = base.output[:fitted]
         left = explain_residual(y - output, u, output, np.random.default_rng(0))[1]
-        periods, origin = left[None], NoiseOrigin.RESIDUAL
-    if np.max(np.abs(periods)) <= _ROUNDING * np.max(np.abs(y)):
+        parts, origin = left[None], NoiseOrigin.RESIDUAL
+    if np.max(np.abs(parts)) <= _ROUNDING * np.max(np.abs(y)):
         raise RecordError("the output has no noise: give the standard deviation of that in the experiment")
     # A difference of fractional order would have no stationary variance.
-    model = fit_noise(periods.ravel(), segments=(periods.shape[1],) * len(periods), difference_orders=())
+    model = fit_noise(parts.ravel(), segments=(parts.shape[1],) * len(parts), difference_orders=())
     # In a record, noise that is slower than it and a drift are the same.
-    return ChannelNoise(model.limit_poles(periods.size), origin)
+    return ChannelNoise(model.limit_poles(parts.size), origin)
