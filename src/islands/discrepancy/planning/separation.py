@@ -14,7 +14,7 @@ from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.planning.experiment import Experiment
 
-#: Probability with which a diagnosis detects a cause, or separates it from another one.
+#: Probability with which the ratio exceeds the margin of detection or separation.
 PROBABILITY = 0.9
 
 #: Probability that the best of all effects is detected by chance.
