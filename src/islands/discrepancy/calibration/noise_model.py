@@ -7,6 +7,7 @@ from operator import attrgetter
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.segments import find_bounds, map_segments
@@ -183,14 +184,17 @@ def take_fractional_difference(signal: Signal, order: float) -> Signal:
     """Return ``(1 - q^-1)^order`` times a signal that is zero before its first sample."""
     if order == 0.0:
         return signal
-    return np.array(scipy.signal.fftconvolve(signal, _make_weights(order, signal.size))[: signal.size])
+    size = scipy.fft.next_fast_len(2 * signal.size - 1, real=True)
+    spectrum = scipy.fft.rfft(signal, size) * _transform_weights(order, signal.size)
+    return np.array(scipy.fft.irfft(spectrum, size)[: signal.size])
 
 
 @lru_cache(maxsize=16)
-def _make_weights(order: float, count: int) -> Signal:
-    """Return the impulse response of the fractional difference (Hosking, 1981, equation 2)."""
+def _transform_weights(order: float, count: int) -> NDArray[np.complex128]:
+    """Return the transform of the impulse response of the difference (Hosking, 1981, equation 2)."""
     lags = np.arange(1, count)
-    return np.concatenate([[1.0], np.cumprod((lags - 1 - order) / lags)])
+    weights = np.concatenate([[1.0], np.cumprod((lags - 1 - order) / lags)])
+    return np.asarray(scipy.fft.rfft(weights, scipy.fft.next_fast_len(2 * count - 1, real=True)))
 
 
 def white_noise(mean_square: float, samples: float) -> NoiseModel:

@@ -7,6 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 import scipy
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
@@ -18,6 +20,9 @@ from islands.discrepancy.interfaces.simulator import (
     simulate_runs,
     take_recording,
 )
+
+#: Samples on each side of a value that the band-limited interpolation reads.
+_REACH = 10
 
 
 class SimulatorWrapper:
@@ -159,17 +164,22 @@ def resample_input(x: Signal, intersample: InterSample, oversampling: int) -> tu
             fine = np.interp(at, np.arange(x.size), x)
         case InterSample.BAND_LIMITED:
             # Both ends are extended by reflection: with zeros beyond the ends, the filter would ring.
-            spare = min(64, x.size - 1)
-            longer = np.concatenate([2 * x[0] - x[spare:0:-1], x, 2 * x[-1] - x[-2 : -spare - 2 : -1]])
-            smooth = scipy.signal.resample_poly(
-                longer, 2 * oversampling, 1, window=_design_low_pass(2 * oversampling)
-            )
-            fine = smooth[2 * oversampling * spare : 2 * oversampling * (spare + x.size) + 1]
+            weights = _design_low_pass(2 * oversampling)
+            longer = np.pad(x, (_REACH, _REACH + 1), "reflect", reflect_type="odd")
+            near = sliding_window_view(longer, 2 * _REACH + 1)
+            fine = (np.ascontiguousarray(near) @ weights).reshape(-1)[: 2 * oversampling * x.size + 1]
     return fine[:-1:2].copy(), np.stack([fine[1::2], fine[2::2]])
 
 
 @lru_cache(maxsize=8)
-def _design_low_pass(factor: int) -> Signal:
-    """Return the impulse response of the low-pass that raises the sampling rate by a factor."""
-    low_pass: Signal = scipy.signal.firwin(20 * factor + 1, 1.0 / factor, window=("kaiser", 8.0))
-    return low_pass
+def _design_low_pass(factor: int) -> NDArray[np.float64]:
+    """Return the weights of the samples around each value of a signal with ``factor`` times as many.
+
+    Returns
+    -------
+    ndarray, shape (2*_REACH + 1, factor)
+        Weights of the samples from `_REACH` before to `_REACH` after one, for each value that follows it.
+    """
+    response = factor * scipy.signal.firwin(2 * _REACH * factor + 1, 1.0 / factor, window=("kaiser", 8.0))
+    phases: NDArray[np.float64] = np.append(response, np.zeros(factor - 1)).reshape(-1, factor)[::-1]
+    return np.ascontiguousarray(phases)
