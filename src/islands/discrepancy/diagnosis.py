@@ -133,7 +133,11 @@ def diagnose(
         outcome = compare_with_free_forms(outcome, forms, fitted, (*effects, *forms), rng, parallel_map)
         effects = [*effects, *(form for form in forms if form in outcome.hypothesis.effects)]
     progress("searching for missing terms", 0.92)
-    terms = None if is_clean else find_missing_terms(base, outcome.hypothesis, outcome.screened, target)
+    terms = (
+        None
+        if is_clean
+        else find_missing_terms(base, outcome.hypothesis, outcome.screened, target, parallel_map)
+    )
     progress("screening alternative causes", 0.95)
     found = make_diagnosis(record, outcome, base, terms, effects, fitted, rng, parallel_map)
     if terms is not None and replaces_effects(terms, base, outcome.hypothesis, target, fitted, rng):

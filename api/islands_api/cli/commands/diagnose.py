@@ -1,7 +1,6 @@
 """``islands diagnose``: errors of a simulation on a record, their causes, and the gain of a correction."""
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -41,6 +40,7 @@ from islands_api.cli.runs.plan_run import (
     with_plan_options,
     write_plan,
 )
+from islands_service.process.process_pool import process_pool
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
 #: File of the result document.
@@ -80,7 +80,7 @@ def diagnose(
     planning: PlanOptions = NO_PLAN,
     workers: Annotated[
         int | None,
-        typer.Option("--workers", min=1, help="Cores; by default 1, for the self-test and plans all."),
+        typer.Option("--workers", min=1, help="Largest number of processes; by default one for each core."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
 ) -> None:
@@ -92,7 +92,7 @@ def diagnose(
         compile_kernels()
         columns_of_input = [options.single_input(options.columns(inputs)), *(channels or [])]
         data = read_input(records or [], columns_of_input, output_column, dt, rows, reading, planning)
-        with progress("plan") as show, _parallel_map(workers, True) as parallel:
+        with progress("plan") as show, process_pool(workers) as parallel:
             simulator = make_simulator(parse_spec(simulated), data)
             plan = plan_experiment(
                 *(data, simulator, planning.noise_std, options.tolerances(tolerance or []), planning.pair),
@@ -118,7 +118,7 @@ def diagnose(
         )
         simulator = make_simulator(spec, data, columns)
         tolerances = options.tolerances(tolerance or [])
-        with _parallel_map(workers, tested) as parallel:
+        with process_pool(workers) as parallel:
             began = perf_counter()
             with keep_fits(out) as fits:
                 diagnosis = run_diagnosis(data, simulator, tolerances, seed, show, fits.record(parallel))
@@ -175,16 +175,6 @@ def _run_self_test(
         show(f"self-test, {message}, {_format_duration(left)} left", fraction)
 
     return self_test(diagnosis, simulator, tolerance, seed, parallel, progress=update)
-
-
-def _parallel_map(workers: int | None, tested: bool) -> AbstractContextManager[ParallelMap]:
-    """Return the built-in map for one worker, else a parallel map on a local Ray."""
-    if workers == 1 or (workers is None and not tested):
-        return nullcontext(map)
-    # Imported here: an analysis of a few seconds must not wait for Ray.
-    from islands_service.runtime.parallel_map import ray_pool  # noqa: PLC0415
-
-    return ray_pool(workers)
 
 
 def _format_duration(seconds: float) -> str:

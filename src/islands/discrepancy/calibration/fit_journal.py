@@ -3,11 +3,16 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 
-from islands.discrepancy.calibration.starts_calibrator import CalibrationTask, StartsCalibrator
+from islands.discrepancy.calibration.starts_calibrator import (
+    CalibratedStart,
+    CalibrationTask,
+    StartsCalibrator,
+)
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 
@@ -24,7 +29,7 @@ class RecordedFit:
     digest : str
         Digest of the task, see `StartsCalibrator.make_digest`.
     values : list of ndarray, each of shape (parameters,)
-        What the calibrator returned.
+        Values that the calibrator returned.
     """
 
     digest: str
@@ -68,18 +73,19 @@ class FitJournal:
 
     def _continue(
         self, calibrator: StartsCalibrator, tasks: Sequence[CalibrationTask], parallel_map: ParallelMap
-    ) -> Iterator[list[Signal]]:
+    ) -> Iterator[list[CalibratedStart]]:
         first = 0
         while first < len(tasks) and (known := self._take_known(calibrator, tasks[first])):
             self._ended.append(known)
+            simulation, _ = tasks[first]
             first += 1
-            yield known.values
+            yield [CalibratedStart(values, simulation.simulate(values)) for values in known.values]
         remaining = tasks[first:]
         if remaining:
-            for task, values in zip(remaining, parallel_map(calibrator, remaining), strict=True):
-                self._ended.append(RecordedFit(calibrator.make_digest(task), values))
+            for digest, fits in parallel_map(partial(_calibrate, calibrator), remaining):
+                self._ended.append(RecordedFit(digest, [fit.values for fit in fits]))
                 self.computed += 1
-                yield values
+                yield fits
 
     def _take_known(self, calibrator: StartsCalibrator, task: CalibrationTask) -> RecordedFit | None:
         """Return the next known fit if it is that of a task; otherwise drop all known fits."""
@@ -96,6 +102,11 @@ class FitJournal:
         return [
             [fit.digest, [values.tolist() for values in fit.values]] for fit in (*self._ended, *self._known)
         ]
+
+
+def _calibrate(calibrator: StartsCalibrator, task: CalibrationTask) -> tuple[str, list[CalibratedStart]]:
+    """Calibrate the starts of a task; return its digest and the results."""
+    return calibrator.make_digest(task), calibrator(task)
 
 
 def journal_from_document(document: Sequence[Any]) -> FitJournal:

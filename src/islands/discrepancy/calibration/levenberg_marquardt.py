@@ -91,7 +91,7 @@ def calibrate(
         Parameters that keep their values; by default none.
     """
     (point,) = minimise(simulation, target, [start], max_iterations, is_fixed=is_fixed)
-    return _make_result(simulation, target, point.values, point.output)
+    return compare_output(simulation, target, point.values, point.output)
 
 
 def minimise(
@@ -191,13 +191,14 @@ def _make_problem(
 
 
 def evaluate_fit(simulation: ExtendedSimulator, target: Target, values: Signal) -> CalibrationResult:
-    """Compare a simulation with a record at the given values, without fitting."""
-    return _make_result(simulation, target, values, simulation.simulate(values))
+    """Simulate at the given values and compare the output with a record, without fitting."""
+    return compare_output(simulation, target, values, simulation.simulate(values))
 
 
-def _make_result(
+def compare_output(
     simulation: ExtendedSimulator, target: Target, values: Signal, output: Signal
 ) -> CalibrationResult:
+    """Compare the output of a simulation at the given values with a record."""
     residual = (target.y - output)[target.estimation_part]
     inverse_std, nominal = prior_precision(simulation, target.prior_std)
     penalty = float(np.sum((inverse_std * (values - nominal)) ** 2))

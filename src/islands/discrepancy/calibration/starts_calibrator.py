@@ -4,16 +4,19 @@ import hashlib
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from islands.discrepancy.calibration.levenberg_marquardt import (
     MAX_ITERATIONS,
     MIN_DECREASE,
+    CalibrationResult,
+    compare_output,
     minimise,
     prior_precision,
 )
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.effect import Signal
+from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 #: Iterations of each start of a rough calibration, if the residual is noise and if it is model error, which
@@ -25,6 +28,13 @@ ROUGH_DECREASE = 0.5
 
 #: A simulation to be calibrated, and its starting points.
 CalibrationTask: TypeAlias = tuple[ExtendedSimulator, Sequence[Signal]]
+
+
+class CalibratedStart(NamedTuple):
+    """Values of the parameters, shape (parameters,), and the output there, shape (samples,)."""
+
+    values: Signal
+    output: Signal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,22 +52,16 @@ class StartsCalibrator:
     target: Target
     is_rough: bool = False
 
-    def __call__(self, task: CalibrationTask) -> list[Signal]:
-        """Return the calibrated values of the starts: of all under model error, otherwise of the best one.
-
-        Returns
-        -------
-        list of ndarray, each of shape (parameters,)
-        """
+    def __call__(self, task: CalibrationTask) -> list[CalibratedStart]:
+        """Calibrate the starts; return all of them under model error, otherwise the best one."""
         simulation, starts = task
         has_model_error = self.target.effective_samples is not None
         first = FIRST_ITERATIONS_WITH_MODEL_ERROR if has_model_error else FIRST_ITERATIONS
         iterations = first if self.is_rough else MAX_ITERATIONS
         decrease = ROUGH_DECREASE if self.is_rough else MIN_DECREASE
         points = minimise(simulation, self.target, starts, iterations, decrease)
-        if has_model_error:
-            return [point.values for point in points]
-        return [min(points, key=attrgetter("cost")).values]
+        best = points if has_model_error else [min(points, key=attrgetter("cost"))]
+        return [CalibratedStart(point.values, point.output) for point in best]
 
     def make_digest(self, task: CalibrationTask) -> str:
         """Return the SHA-256 of all numbers that the result of a task depends on.
@@ -73,6 +77,16 @@ class StartsCalibrator:
         for numbers in (residual, *prior, *limits, simulation.scales, *starts):
             digest.update(numbers.tobytes())
         return digest.hexdigest()
+
+
+def calibrate_all(
+    calibrator: StartsCalibrator, tasks: Sequence[CalibrationTask], parallel_map: ParallelMap
+) -> list[CalibrationResult]:
+    """Return the best fit of each task."""
+    return [
+        min((compare_output(simulation, calibrator.target, *end) for end in ends), key=attrgetter("score"))
+        for (simulation, _), ends in zip(tasks, parallel_map(calibrator, tasks), strict=True)
+    ]
 
 
 def make_task_key(calibrator: StartsCalibrator, task: CalibrationTask) -> Hashable:

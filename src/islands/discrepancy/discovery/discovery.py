@@ -19,6 +19,7 @@ from islands.discrepancy.inference.holdout import cross_validate_gain
 from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
 from islands.discrepancy.inference.verdict import explained_fraction
+from islands.discrepancy.interfaces.parallel import ParallelMap
 
 #: Part of the gain of the terms by which they have to be better than effects. The catalogue has one form of
 #: each effect, and another one, such as a sign for a smoothed sign, is no other cause.
@@ -71,7 +72,11 @@ class MissingTerms:
 
 
 def find_missing_terms(
-    base: CalibrationResult, hypothesis: Hypothesis, screened: Sequence[ScreenedEffect], target: Target
+    base: CalibrationResult,
+    hypothesis: Hypothesis,
+    screened: Sequence[ScreenedEffect],
+    target: Target,
+    parallel_map: ParallelMap = map,
 ) -> MissingTerms | None:
     """Search for missing terms, and compare them with the effects of the catalogue.
 
@@ -85,13 +90,15 @@ def find_missing_terms(
         Single effects, the best first; the nearest one if the hypothesis has none.
     target : Target
         Target of ``base``.
+    parallel_map : ParallelMap
+        Fits the terms.
 
     Returns
     -------
     MissingTerms or None
         None if the simulator has no equations, or if no term gains enough.
     """
-    found = search_terms(base, target)
+    found = search_terms(base, target, parallel_map)
     if found is None:
         return None
     nearest = [] if hypothesis.effects else [each for each in screened if not each.effect.is_free][:1]

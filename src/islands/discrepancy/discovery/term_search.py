@@ -14,6 +14,7 @@ import numpy as np
 from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
 from islands.discrepancy.calibration.projection import Projection
+from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.candidate_terms import (
     CandidateTerm,
@@ -23,6 +24,7 @@ from islands.discrepancy.discovery.candidate_terms import (
 from islands.discrepancy.discovery.equation_simulator import find_equations, with_equations
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.context import Signal
+from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.systems.ode.ode_expression import render
@@ -100,7 +102,9 @@ class TermSearchResult:
         return "; ".join([*lines, ", ".join(f"{name} = {values[name]:.4g}" for name in new)])
 
 
-def search_terms(base: CalibrationResult, target: Target) -> TermSearchResult | None:
+def search_terms(
+    base: CalibrationResult, target: Target, parallel_map: ParallelMap = map
+) -> TermSearchResult | None:
     """Add terms to the equations of a simulation as long as each gains more than any would by chance.
 
     Parameters
@@ -108,6 +112,8 @@ def search_terms(base: CalibrationResult, target: Target) -> TermSearchResult | 
     base : CalibrationResult
         The calibrated simulation.
     target : Target
+    parallel_map : ParallelMap
+        Fits the terms.
 
     Returns
     -------
@@ -130,7 +136,7 @@ def search_terms(base: CalibrationResult, target: Target) -> TermSearchResult | 
     while len(found.terms) < MAX_TERMS:
         target = whiten_target(target, found.fit)
         found = _improve(found, calibrate(found.fit.simulation, target, found.fit.values))
-        best = _find_best_term(found, target, candidates, target_sizes)
+        best = _find_best_term(found, target, candidates, target_sizes, parallel_map)
         if best is None or best.cost > found.cost - MIN_GAIN:
             break
         found = _eliminate_terms(_select_discretisation(best, target), system, target, target_sizes)
@@ -174,22 +180,24 @@ def _find_best_term(
     target: Target,
     candidates: Sequence[CandidateTerm],
     target_sizes: Mapping[str, float],
+    parallel_map: ParallelMap,
 ) -> TermSearchResult | None:
     """Return the equations with the term that is best after a calibration of all parameters."""
     fit, used = found.fit, {(each.term.target, each.term.text) for each in found.terms}
     (number,) = find_free_numbers(_get_system(fit), 1)
     free = [each for each in candidates if (each.target, each.text) not in used]
     log_n, log_choices = float(np.log(fit.noise.effective_samples)), 2.0 * float(np.log(len(candidates)))
+    terms = _rank_terms(fit, target, free, target_sizes)[:FITTED_TERMS]
+    extended = [_add_terms(fit, _get_system(fit), [(term, number)], target_sizes) for term in terms]
+    tasks = [(simulation, [start]) for simulation, start in extended]
     results = []
-    for term in _rank_terms(fit, target, free, target_sizes)[:FITTED_TERMS]:
-        simulation, start = _add_terms(fit, _get_system(fit), [(term, number)], target_sizes)
-        extended = calibrate(simulation, target, start)
-        if not np.isfinite(extended.score):
+    for term, fitted in zip(terms, calibrate_all(StartsCalibrator(target), tasks, parallel_map), strict=True):
+        if not np.isfinite(fitted.score):
             continue
         # Any of the candidates could gain by chance.
         penalty = term.value_count * log_n + log_choices
-        added = DiscoveredTerm(term, number, fit.score - extended.score - penalty, penalty)
-        results.append(TermSearchResult(extended, (*found.terms, added)))
+        added = DiscoveredTerm(term, number, fit.score - fitted.score - penalty, penalty)
+        results.append(TermSearchResult(fitted, (*found.terms, added)))
     return min(results, key=lambda each: each.cost, default=None)
 
 

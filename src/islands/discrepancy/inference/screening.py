@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from operator import attrgetter, itemgetter
+from operator import itemgetter
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.calibration.projection import Projection
-from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator
+from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.interfaces.effect import Effect, Signal
@@ -77,15 +77,17 @@ def screen_effects(
     Parameters
     ----------
     parallel_map : ParallelMap
-        Calibrates the extended simulations.
+        Finds the starting points, and calibrates the extended simulations.
     """
     projection = Projection(base, target)
-    candidates = []
-    for effect in effects:
-        simulation = base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
-        starts = _find_starts(base, simulation, effect, target, projection)
-        if starts:
-            candidates.append((starts[0][0], effect, simulation, [values for _, values in starts]))
+    listed = list(effects)
+    candidates = [
+        (starts[0][0], effect, [values for _, values in starts])
+        for effect, starts in zip(
+            listed, parallel_map(StartFinder(base, target, projection), listed), strict=True
+        )
+        if starts
+    ]
     is_noise = target.effective_samples is None
     if base.simulation.effects and is_noise:
         # If the simulation has effects already, only the most promising further ones are worth a calibration.
@@ -97,43 +99,23 @@ def screen_effects(
             if index < MIN_CALIBRATED_EFFECTS
             or promise > max(bic_penalty(candidate[1], base), MIN_PROMISE * promises[0])
         ]
-    rough = _calibrate_starts(
-        StartsCalibrator(target, is_rough=True),
-        [(effect, simulation, starts) for _, effect, simulation, starts in candidates],
-        parallel_map,
-    )
+    tasks = [(_extend(base, effect), starts) for _, effect, starts in candidates]
+    rough = calibrate_all(StartsCalibrator(target, is_rough=True), tasks, parallel_map)
+    screened = [ScreenedEffect(effect, fit) for (_, effect, _), fit in zip(candidates, rough, strict=True)]
     # Effects that are far from the best ones need no better fit.
-    ranked = sorted(rough, key=lambda each: -each.score_gain(base))
+    ranked = sorted(screened, key=lambda each: -each.score_gain(base))
     gains = [each.score_gain(base) for each in ranked]
     count = sum(gain > gains[0] - MAX_DISTANCE for gain in gains)
     least = MIN_CONVERGED_EFFECTS if is_noise else MIN_CONVERGED_WITH_MODEL_ERROR
-    best = ranked[: max(count, least)]
-    converged = _calibrate_starts(
-        StartsCalibrator(target),
-        [(each.effect, each.fit.simulation, [each.fit.values]) for each in rough if each in best],
-        parallel_map,
+    best = [each for each in screened if each in ranked[: max(count, least)]]
+    converged = calibrate_all(
+        StartsCalibrator(target), [(each.fit.simulation, [each.fit.values]) for each in best], parallel_map
     )
-    found = {each.effect.name: each for each in (*rough, *converged)}
+    found = {each.effect.name: each for each in screened}
+    found |= {
+        each.effect.name: ScreenedEffect(each.effect, fit) for each, fit in zip(best, converged, strict=True)
+    }
     return sorted(found.values(), key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
-
-
-def _calibrate_starts(
-    calibrator: StartsCalibrator,
-    tasks: Sequence[tuple[Effect, ExtendedSimulator, Sequence[Signal]]],
-    parallel_map: ParallelMap,
-) -> list[ScreenedEffect]:
-    """Return the best fit of each effect, in the order of the tasks."""
-    calibrated = parallel_map(calibrator, [(simulation, starts) for _, simulation, starts in tasks])
-    return [
-        ScreenedEffect(
-            effect,
-            min(
-                (evaluate_fit(simulation, calibrator.target, values) for values in ends),
-                key=attrgetter("score"),
-            ),
-        )
-        for (effect, simulation, _), ends in zip(tasks, calibrated, strict=True)
-    ]
 
 
 def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSimulator) -> Signal:
@@ -189,48 +171,65 @@ def simulate_starting_points(
     return points[is_finite], responses[is_finite]
 
 
-def _find_starts(
-    base: CalibrationResult,
-    simulation: ExtendedSimulator,
-    effect: Effect,
-    target: Target,
-    projection: Projection,
-) -> list[tuple[float, Signal]]:
-    """Return the starting points that explain most, each with its strength scaled if that explains more.
+@dataclass(frozen=True, slots=True, eq=False)
+class StartFinder:
+    """Function that finds the starting points of an effect that explain most.
 
-    The starting points of a free form are combined to the one that explains most.
-
-    Returns
-    -------
-    list of (float, ndarray)
-        Remaining sum of squares and parameter values, the smallest sum first.
+    Attributes
+    ----------
+    base : CalibrationResult
+        Simulation without the effect.
+    target : Target
+    projection : Projection
+        Projection for the base.
     """
-    part = simulation.get_slice(effect)
-    lower, upper = simulation.bounds
-    points, changes = simulate_starting_points(base, simulation, effect, target)
-    responses = [projection(change) for change in changes]
-    if effect.is_free and responses:
-        weights = np.linalg.lstsq(np.column_stack(responses), projection.residual, rcond=DEPENDENCE)[0]
-        combined = points[:1].copy()
-        combined[0, part] = weights @ points[:, part]
-        points, responses = combined, [projection(simulation.simulate(combined[0]) - base.output)]
-    sizes = np.array([_sum_squares(response) for response in responses])
-    usable = np.flatnonzero(np.isfinite(sizes) & (sizes > 0.0))
-    starts = [(_sum_squares(projection.residual - responses[index]), points[index]) for index in usable]
-    if effect.linear_parameters and usable.size:
-        scaled = points[usable]
-        for values, index in zip(scaled, usable, strict=True):
-            factor = float(responses[index] @ projection.residual) / sizes[index]
-            values[part.start : part.start + effect.linear_parameters] *= np.clip(
-                factor, -MAX_SCALING, MAX_SCALING
-            )
-        scaled = np.clip(scaled, lower, upper)
-        others = simulation.simulate_batch(scaled) - base.output
-        starts = [
-            min(start, (_sum_squares(projection.residual - projection(other)), values), key=itemgetter(0))
-            for start, other, values in zip(starts, others, scaled, strict=True)
-        ]
-    return sorted((each for each in starts if np.isfinite(each[0])), key=itemgetter(0))[:MAX_STARTS]
+
+    base: CalibrationResult
+    target: Target
+    projection: Projection
+
+    def __call__(self, effect: Effect) -> list[tuple[float, Signal]]:
+        """Return starting points, each with its strength scaled if that explains more.
+
+        The starting points of a free form are combined to the one that explains most.
+
+        Returns
+        -------
+        list of (float, ndarray)
+            Remaining sum of squares and parameter values, the smallest sum first.
+        """
+        base, projection, simulation = self.base, self.projection, _extend(self.base, effect)
+        part = simulation.get_slice(effect)
+        lower, upper = simulation.bounds
+        points, changes = simulate_starting_points(base, simulation, effect, self.target)
+        responses = [projection(change) for change in changes]
+        if effect.is_free and responses:
+            weights = np.linalg.lstsq(np.column_stack(responses), projection.residual, rcond=DEPENDENCE)[0]
+            combined = points[:1].copy()
+            combined[0, part] = weights @ points[:, part]
+            points, responses = combined, [projection(simulation.simulate(combined[0]) - base.output)]
+        sizes = np.array([_sum_squares(response) for response in responses])
+        usable = np.flatnonzero(np.isfinite(sizes) & (sizes > 0.0))
+        starts = [(_sum_squares(projection.residual - responses[index]), points[index]) for index in usable]
+        if effect.linear_parameters and usable.size:
+            scaled = points[usable]
+            for values, index in zip(scaled, usable, strict=True):
+                factor = float(responses[index] @ projection.residual) / sizes[index]
+                values[part.start : part.start + effect.linear_parameters] *= np.clip(
+                    factor, -MAX_SCALING, MAX_SCALING
+                )
+            scaled = np.clip(scaled, lower, upper)
+            others = simulation.simulate_batch(scaled) - base.output
+            starts = [
+                min(start, (_sum_squares(projection.residual - projection(other)), values), key=itemgetter(0))
+                for start, other, values in zip(starts, others, scaled, strict=True)
+            ]
+        return sorted((each for each in starts if np.isfinite(each[0])), key=itemgetter(0))[:MAX_STARTS]
+
+
+def _extend(base: CalibrationResult, effect: Effect) -> ExtendedSimulator:
+    """Return the simulation of a fit with one additional effect."""
+    return base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
 
 
 def _sum_squares(signal: Signal) -> float:

@@ -17,7 +17,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     whiten_target,
 )
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
-from islands.discrepancy.calibration.starts_calibrator import make_task_key
+from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, make_task_key
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.inference.chance_gain import ForwardSelection
 from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis
@@ -125,7 +125,7 @@ def search_with_model_error(
     screened: Sequence[ScreenedEffect] = ()
     hypothesis = Hypothesis(base, base.score, ())
     # The effective sample size changes the score of a fit, but not the fit: both passes share results.
-    parallel_map = memoised_map(parallel_map, make_task_key)
+    parallel_map = memoised_map(parallel_map, StartsCalibrator, make_task_key)
     for _ in range(2):
         # Model error correlates neighbouring samples: the second pass counts them with the best effects
         # included.

@@ -17,14 +17,16 @@ class ParallelMap(Protocol):
         """Apply the function to each argument."""
 
 
-def memoised_map(parallel_map: ParallelMap, key: Callable[[Any, Any], Hashable]) -> ParallelMap:
-    """Return a map that caches results by a key of the function and the argument.
+def memoised_map(parallel_map: ParallelMap, kind: type, key: Callable[[Any, Any], Hashable]) -> ParallelMap:
+    """Return a map that caches the results of functions of one type by a key of function and argument.
 
     Calls with equal keys must have equal results.
     """
     results: dict[Hashable, Any] = {}
 
     def cached_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
+        if not isinstance(function, kind):
+            return parallel_map(function, arguments)
         keyed = [(key(function, argument), argument) for argument in arguments]
         missing = {each: argument for each, argument in keyed if each not in results}
         results.update(zip(missing, parallel_map(function, missing.values()), strict=True))

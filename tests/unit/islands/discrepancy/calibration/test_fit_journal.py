@@ -12,7 +12,11 @@ import pytest
 from islands.discrepancy.calibration.fit_journal import FitJournal, RecordedFit, journal_from_document
 from islands.discrepancy.calibration.noise_model import NoiseModel
 from islands.discrepancy.calibration.preparation import make_context
-from islands.discrepancy.calibration.starts_calibrator import CalibrationTask, StartsCalibrator
+from islands.discrepancy.calibration.starts_calibrator import (
+    CalibratedStart,
+    CalibrationTask,
+    StartsCalibrator,
+)
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -44,8 +48,8 @@ def interrupted(due: tuple[StartsCalibrator, Tasks], at: int) -> Any:
     return json.loads(json.dumps(journal.to_document()))
 
 
-def bits(results: Iterable[list[np.ndarray]]) -> list[list[bytes]]:
-    return [[values.tobytes() for values in each] for each in results]
+def bits(results: Iterable[list[CalibratedStart]]) -> list[list[bytes]]:
+    return [[numbers.tobytes() for end in each for numbers in end] for each in results]
 
 
 def counted(made: list[CalibrationTask]) -> Any:
@@ -112,7 +116,9 @@ def test_stored_floats_are_exact() -> None:
     document = json.loads(json.dumps(FitJournal([RecordedFit("a", values)]).to_document()))
     ((digest, stored),) = journal_from_document(document).to_document()
     assert digest == "a"
-    assert bits([[np.array(each, dtype=np.float64) for each in stored]]) == bits([values])
+    assert [np.array(each, dtype=np.float64).tobytes() for each in stored] == [
+        each.tobytes() for each in values
+    ]
 
 
 def test_other_functions_are_not_recorded() -> None:

@@ -10,6 +10,7 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.fit_journal import FitJournal
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.inference.screening import StartFinder
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.io.diagnosis_json import as_json, diagnosis_document
@@ -29,7 +30,10 @@ def run(record: Dataset, journal: FitJournal, parallel_map: ParallelMap = map) -
 
 
 def interrupted_map(function: object, arguments: Iterable[object]) -> Iterator[object]:
-    """Interrupt after the first result."""
+    """Interrupt after the first fit."""
+    if isinstance(function, StartFinder):
+        yield from map(function, arguments)
+        return
     yield function(next(iter(arguments)))  # type: ignore[operator]
     raise KeyboardInterrupt
 

@@ -1,0 +1,98 @@
+"""Parallel map on processes of this computer."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import lru_cache, partial
+from multiprocessing import active_children, forkserver, get_context
+from signal import SIG_IGN, SIGINT, signal
+from time import monotonic
+from typing import Any, TypeVar
+
+import cloudpickle
+
+from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.errors import IslandsError
+
+#: Seconds of a computation before the first process is used. Shorter ones need none.
+START_AFTER = 2.0
+
+#: Modules that are imported once, in the process from which the others are forked.
+_PRELOADED = [
+    "__main__",
+    "islands.discrepancy.diagnosis",
+    "islands.io.simulator_spec.factory",
+    "scipy.signal",
+]
+
+A = TypeVar("A")
+R = TypeVar("R")
+
+
+class ProcessPoolError(IslandsError):
+    """A process has ended during a computation."""
+
+
+@contextmanager
+def process_pool(workers: int | None = None, start_after: float = START_AFTER) -> Iterator[ParallelMap]:
+    """Provide a parallel map on processes of this computer while the block runs.
+
+    Functions and arguments may be of any type, with functions that are defined in functions.
+
+    Parameters
+    ----------
+    workers : int or None
+        Largest number of processes; None for one per core. One computes in this process.
+    start_after : float
+        Seconds for which calls are evaluated in this process, one after the other.
+
+    Raises
+    ------
+    ProcessPoolError
+        A process has ended. Errors of the function itself are raised unchanged.
+    """
+    workers = workers or len(os.sched_getaffinity(0))
+    if workers == 1:
+        yield map
+        return
+    began, others = monotonic(), set(active_children())
+    context = get_context("forkserver")
+    context.set_forkserver_preload(_PRELOADED)
+    forkserver.ensure_running()  # it imports while this process computes
+    pool = ProcessPoolExecutor(workers, context, initializer=signal, initargs=(SIGINT, SIG_IGN))
+
+    def parallel_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
+        waiting = iter(arguments)
+        for argument in waiting:
+            if monotonic() - began > start_after:
+                yield from _map_on(pool, function, [argument, *waiting])
+                return
+            yield function(argument)
+
+    try:
+        yield parallel_map
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in set(active_children()) - others:
+            process.kill()  # its result is not needed any more
+
+
+def _map_on(pool: ProcessPoolExecutor, function: Callable[[A], R], arguments: Iterable[A]) -> Iterator[R]:
+    call: Any = partial(_call, cloudpickle.dumps(function))
+    try:
+        yield from pool.map(call, map(cloudpickle.dumps, arguments))
+    except BrokenProcessPool as error:
+        raise ProcessPoolError(
+            "a process has ended, perhaps because memory was full: repeat the command with fewer --workers"
+        ) from error
+
+
+def _call(function: bytes, argument: bytes) -> Any:
+    return _load(function)(cloudpickle.loads(argument))
+
+
+@lru_cache(maxsize=1)
+def _load(function: bytes) -> Any:
+    return cloudpickle.loads(function)

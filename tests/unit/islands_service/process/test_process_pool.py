@@ -1,0 +1,61 @@
+"""`process_pool`: results are those of `map`, in its order; errors and lost processes are reported."""
+
+import os
+import signal
+from multiprocessing import active_children
+
+import pytest
+
+from islands_service.process.process_pool import ProcessPoolError, process_pool
+
+pytestmark = pytest.mark.ci
+
+
+def test_pool_evaluates_local_functions_in_other_processes_in_order() -> None:
+    factor = 3
+
+    def multiply(number: int) -> tuple[int, int]:
+        return factor * number, os.getpid()
+
+    with process_pool(2, start_after=0.0) as parallel_map:
+        products, processes = zip(*parallel_map(multiply, range(20)), strict=True)
+        again = [product for product, _ in parallel_map(multiply, [5])]
+    assert (list(products), again) == ([factor * number for number in range(20)], [15])
+    assert os.getpid() not in processes
+    assert len(set(processes)) <= 2
+
+
+def test_one_process_and_the_first_seconds_need_no_pool() -> None:
+    for workers in (1, 2):
+        with process_pool(workers, start_after=60.0) as parallel_map:
+            assert set(parallel_map(lambda _: os.getpid(), range(3))) == {os.getpid()}
+
+
+def test_error_of_the_function_is_raised_and_ends_the_processes() -> None:
+    def fail(number: int) -> int:
+        if number == 3:
+            raise ZeroDivisionError(number)
+        return sum(iter(int, 1)) if number > 3 else number  # without an end
+
+    others = set(active_children())
+    with process_pool(2, start_after=0.0) as parallel_map:
+        results = parallel_map(fail, range(10))
+        assert next(results) == 0
+        processes = set(active_children()) - others
+        with pytest.raises(ZeroDivisionError):
+            list(results)
+    for process in processes:
+        process.join(10.0)
+    assert processes
+    assert not any(process.is_alive() for process in processes)
+
+
+def test_killed_process_is_an_error_that_says_what_to_do() -> None:
+    def end(_: int) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    with (
+        pytest.raises(ProcessPoolError, match="fewer --workers"),
+        process_pool(2, start_after=0.0) as parallel_map,
+    ):
+        list(parallel_map(end, range(2)))
