@@ -29,6 +29,9 @@ from islands.discrepancy.interfaces.parallel import ParallelMap
 #: nothing in either direction.
 MAX_HOLDOUT_LOSS_PERCENT = 0.5
 
+#: Confidence that a claimed cause has at least. Below it, others are more than five times as probable.
+MIN_CONFIDENCE = 0.15
+
 
 def make_gross_diagnosis(
     record: Dataset, base: CalibrationResult, errors: Sequence[GrossError], fitted: int
@@ -137,6 +140,8 @@ def make_diagnosis(
         findings, equivalents = describe_effects(fitted_outcome, effects, rival, parallel_map)
         if verdict == Verdict.REMAINDER:
             findings = (findings[0], *(replace(each, is_claimed=False) for each in findings[1:]))
+        if all(each.confidence < MIN_CONFIDENCE for each in findings if each.is_claimed):
+            findings, equivalents, gain, verdict = (), (), None, Verdict.UNKNOWN
     residual = (record.y - hypothesis.fit.output)[:fitted]
     context = hypothesis.fit.simulation.context
     noise = describe_noise(record.y[:fitted], residual, context) if verdict != Verdict.UNKNOWN else ()

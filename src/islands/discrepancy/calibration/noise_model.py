@@ -132,6 +132,11 @@ def fit_noise(
     return best
 
 
+def fit_integrated_noise(residual: Signal, segments: Sequence[int] = ()) -> NoiseModel:
+    """Fit a noise model to the differences of a residual: a random walk, filtered by an autoregression."""
+    return _fit_autoregression(residual, 1.0, MAX_ORDER, segments)
+
+
 def fit_whitening(residual: Signal, segments: Sequence[int] = ()) -> NoiseModel:
     """Fit the noise model that whitens residuals in a calibration: an autoregression of low order.
 

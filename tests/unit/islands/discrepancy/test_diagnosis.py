@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.discrepancy import diagnosis_assembly
 from islands.discrepancy.calibration.preparation import HOLDOUT_FRACTION, MIN_SAMPLES
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
@@ -106,6 +108,16 @@ def test_recorded_output_can_be_diagnosed(record: Dataset) -> None:
     found = diagnose(drifted, RecordedOutput("theirs", simulated))
     assert [each.name for each in found.effects if each.explained_fraction is not None] == ["linear-drift"]
     assert found.effects[0].parameters["c"].value == pytest.approx(0.5, rel=0.05)
+
+
+def test_cause_of_little_confidence_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(diagnosis_assembly, "MIN_CONFIDENCE", 1.01)
+    u = np.sin(np.arange(400.0))
+    record = Dataset(u[:, None], 0.03 + u + 0.05 * np.random.default_rng(1).standard_normal(400), 1.0)
+    found = diagnose(record, RecordedOutput("theirs", u), catalogue=[CATALOGUE["offset"]])
+    assert (found.verdict, found.effects, found.gain) == (Verdict.UNKNOWN, (), None)
+    assert found.candidates[0].name == "offset"
+    assert found.best is found.base
 
 
 def _nominal(record: Dataset) -> tuple:

@@ -38,3 +38,28 @@ def test_random_walk_begins_at_its_level_and_spreads(randomisation: Randomisatio
         spread = np.std(drawn[:, first : first + 500] - walk[0], axis=0)
         assert 2.0 < spread[50] < 12.0
         assert spread[450] > 1.5 * spread[50]
+
+
+@pytest.mark.parametrize("randomisation", Randomisation)
+def test_thresholds_hold_for_a_random_walk_whose_slow_part_is_absorbed(randomisation: Randomisation) -> None:
+    """A calibration absorbs slow functions. What is left rarely exceeds the threshold of surrogates."""
+    samples, count = 1500, 24
+    absorbed = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, samples), 4))[0]
+    jumps = remove(absorbed, np.tri(samples)[:, 50:-50:50])
+    jumps /= np.linalg.norm(jumps, axis=0)
+
+    def find_best_jump(signals: np.ndarray) -> np.ndarray:
+        rest = remove(absorbed, signals)
+        return np.max((jumps.T @ rest) ** 2, axis=0) / np.sum(rest**2, axis=0)
+
+    alarms = 0
+    for seed in range(count):
+        walk = np.cumsum(np.random.default_rng(seed).standard_normal(samples + 5))
+        residual = remove(absorbed, np.convolve(walk, np.ones(6) / 6, "valid"))
+        threshold = np.quantile(find_best_jump(draw(residual, randomisation).T), 0.95)
+        alarms += find_best_jump(residual[:, None])[0] > threshold
+    assert alarms <= 4  # 5 % are 1.2 of 24; more than 4 have a probability of 0.7 %
+
+
+def remove(absorbed: np.ndarray, signals: np.ndarray) -> np.ndarray:
+    return signals - absorbed @ (absorbed.T @ signals)
