@@ -9,10 +9,11 @@ from islands.discrepancy.calibration.noise_model import fit_integrated_noise, fi
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.segments import find_bounds
 
-#: Loss of minus twice the log-likelihood up to which a residual is a random walk. Calibration absorbs most of
-#: the slowest part of such noise, so that other models fit the residual better, by 4 to 28 if five slow
-#: functions are absorbed. Their surrogates lack that part, and noise exceeds their thresholds too often.
-MAX_UNIT_ROOT_LOSS = 30.0
+#: Loss of minus twice the log-likelihood, per sample, up to which a residual is a random walk. Calibration
+#: absorbs most of the slowest part of such noise, so that other models fit the rest better, by 4 to 28. Their
+#: surrogates lack that part, and noise exceeds their thresholds too often. A short record cannot exclude a
+#: random walk, whose thresholds would hide all slow causes in it.
+MAX_UNIT_ROOT_LOSS = 1.0 / 150.0
 
 
 class Randomisation(Enum):
@@ -53,7 +54,8 @@ def draw_surrogates(
     """
     noise = fit_noise(residual, segments=segments)
     integrated = fit_integrated_noise(residual, segments)
-    if integrated.minus_twice_log_likelihood < noise.minus_twice_log_likelihood + MAX_UNIT_ROOT_LOSS:
+    loss = integrated.minus_twice_log_likelihood - noise.minus_twice_log_likelihood
+    if loss < MAX_UNIT_ROOT_LOSS * residual.size:
         noise = integrated
     innovations = noise.whiten(residual, segments)
     stable = noise.limit_poles(residual.size)

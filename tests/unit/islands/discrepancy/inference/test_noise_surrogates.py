@@ -43,9 +43,9 @@ def test_random_walk_begins_at_its_level_and_spreads(randomisation: Randomisatio
 @pytest.mark.parametrize("randomisation", Randomisation)
 def test_thresholds_hold_for_a_random_walk_whose_slow_part_is_absorbed(randomisation: Randomisation) -> None:
     """A calibration absorbs slow functions. What is left rarely exceeds the threshold of surrogates."""
-    samples, count = 1500, 24
+    samples, count = 4500, 24
     absorbed = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, samples), 4))[0]
-    jumps = remove(absorbed, np.tri(samples)[:, 50:-50:50])
+    jumps = remove(absorbed, np.arange(samples)[:, None] >= np.arange(150, samples - 150, 150))
     jumps /= np.linalg.norm(jumps, axis=0)
 
     def find_best_jump(signals: np.ndarray) -> np.ndarray:
