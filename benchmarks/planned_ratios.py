@@ -1,9 +1,9 @@
 """Compare planned log-likelihood ratios with those of fits to simulated data in coloured noise.
 
-``python benchmarks/planned_ratios.py [SEEDS] [--noise KIND]`` measures noise in one record without a cause,
-and plans with its noise model, and with white noise of the same standard deviation. It hides a cause of at
-most 1 sigma in other records, and calibrates it and every other effect to them: whitened with the noise model
-of the true cause's residual, and as a diagnosis does, which fits a noise model to the residual of each
+``python benchmarks/planned_ratios.py [--seeds N] [--noise KIND]`` measures noise in one record without a
+cause, and plans with its noise model, and with white noise of the same standard deviation. It hides a cause
+of at most 1 sigma in other records, and calibrates it and every other effect to them: whitened with the noise
+model of the true cause's residual, and as a diagnosis does, which fits a noise model to the residual of each
 effect. It prints the quotient of the mean realised ratio and the planned one, of all pairs of causes with a
 realised ratio in `RANGE`: the median, and the quantiles at 10 % and 90 %.
 """
@@ -115,7 +115,7 @@ def _calibrate(
 def main() -> None:
     """Print the comparison."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("seeds", type=int, nargs="?", default=SEEDS)
+    parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--noise", choices=tuple(NOISES), action="append")
     given = parser.parse_args()
     for kind in given.noise or KINDS:

@@ -1,8 +1,8 @@
 """Compare planned separations with diagnoses of simulated data.
 
-``python benchmarks/planned_separation.py [SEEDS] [--noise KIND] [--weakest | --decisive]`` plans experiments
-with several simulators, simulates records with one cause at the misfit of the plan, and diagnoses them. It
-prints how often a cause is named, how often causes that the plan calls separable are not among its
+``python benchmarks/planned_separation.py [--seeds N] [--noise KIND] [--weakest | --decisive]`` plans
+experiments with several simulators, simulates records with one cause at the misfit of the plan, and diagnoses
+them. It prints how often a cause is named, how often causes that the plan calls separable are not among its
 equivalents, and how often those that it calls inseparable are.
 
 With ``--noise`` the noise is of another kind than white: it is measured in one record without a cause, and
@@ -169,7 +169,7 @@ def _is_decided(planned: Planned, u: np.ndarray, y: np.ndarray, pair: tuple[str,
 def main() -> None:
     """Print the comparison."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("seeds", type=int, nargs="?", default=SEEDS)
+    parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--noise", choices=tuple(NOISES), default="white")
     parser.add_argument("--weakest", action="store_true")
     parser.add_argument("--decisive", action="store_true")
