@@ -20,11 +20,13 @@ def test_error_of_the_check_ends_running_and_waiting_calls(ray_address, tmp_path
 
     # A nested function is sent with its code: workers cannot import this module.
     def compute_for_ever(path):
-        path.write_text(str(os.getpid()))
+        draft = path.with_suffix(".draft")
+        draft.write_text(str(os.getpid()))
+        draft.rename(path)  # a file that exists has its content
         return sum(iter(int, 1))  # does not return to the interpreter
 
     def check():
-        if any(file.exists() and file.read_text() for file in files):
+        if any(file.exists() for file in files):
             raise StopError
 
     with cluster(ray_address):
