@@ -94,13 +94,13 @@ def explain_residual(
     is_known = ~np.isnan(residual)
     raw, residual = _make_features(u, simulated, segments)[is_known], residual[is_known]
     designs = _make_designs(raw, rng)
-    explained = float(_predict_mean_square(designs, residual[:, None])[0])
-    if explained <= 0.0:
-        return 0.0, residual
-    left = min(
-        (np.concatenate(errors)[:, 0] for errors in _cross_validate(designs, residual[:, None])),
-        key=lambda errors: float(errors @ errors),
-    )
+    total = best = float(np.sum(residual[:, None] ** 2, axis=0)[0])
+    left = residual
+    for errors in _cross_validate(designs, residual[:, None]):
+        squares = float(_sum_squares(errors)[0])
+        if squares < best:
+            best, left = squares, np.concatenate(errors)[:, 0]
+    explained = (total - best) / residual.size
     if explained <= MIN_FRACTION * float(np.mean(residual**2)):
         return explained, left
     runs = count_runs(is_known, segments)
@@ -141,11 +141,16 @@ def _predict_mean_square(designs: Sequence[Signal], residuals: Signal) -> Signal
     total = np.sum(residuals**2, axis=0)
     best = total
     for errors in _cross_validate(designs, residuals):
-        squared_error = np.zeros(total.size)
-        for each in errors:
-            squared_error += np.sum(each**2, axis=0)
-        best = np.minimum(best, squared_error)
+        best = np.minimum(best, _sum_squares(errors))
     return (total - best) / len(residuals)
+
+
+def _sum_squares(errors: Sequence[Signal]) -> Signal:
+    """Return the sum of squares of each residual's errors in all folds, shape (residuals,)."""
+    squares = np.zeros(errors[0].shape[1])
+    for each in errors:
+        squares += np.sum(each**2, axis=0)
+    return squares
 
 
 def _cross_validate(designs: Sequence[Signal], residuals: Signal) -> Iterator[list[Signal]]:
