@@ -10,7 +10,10 @@ import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
+from islands.discrepancy.simulators.ode_preparation import make_ode_simulator
+from islands.discrepancy.simulators.record_channels import make_nominal_context
 from islands.discrepancy.simulators.shooting import smooth
+from islands.errors import RecordError
 from islands.systems.ode.lane_simulation import LaneInput, interpolate_linearly, simulate_lanes
 from islands.systems.ode.ode_program import generate_program
 from islands.systems.ode.ode_system import OdeSystem
@@ -24,6 +27,13 @@ _LEVEL_RATIOS = (0.3, 1.0, 3.0)
 
 #: Rate vs within which the dry friction of an axis changes its sign, relative to the typical rate.
 _RELATIVE_RATE = 0.01
+
+#: Windows of the filter whose estimates of an axis are compared, in samples.
+_WINDOWS = (9, 17, 33, 65)
+
+#: Least and most integration steps per sample of an axis. A friction that changes its sign within one step
+#: makes the error of the simulation an irregular function of vs, and its calibration ends at a local minimum.
+_STEPS = (4, 32)
 
 #: A system with estimated parameters, and estimates of its states at the first sample by name.
 Estimate = tuple[OdeSystem, Mapping[str, float]]
@@ -80,23 +90,46 @@ def estimate_axis(system: OdeSystem, given: Mapping[str, float], record: Dataset
     """Estimate the parameters of ``rigid-axis``; arguments as of `estimate_oscillator`.
 
     The estimate uses the inverse dynamics: least squares of the force on smoothed acceleration, rate and
-    direction (Olsen and Petersen 2001).
+    direction (Olsen and Petersen 2001). Noise of the acceleration makes the mass too small, and a long window
+    of the filter smooths the motion, so that the window with the smallest error of a simulation is used.
     """
-    rate, acceleration = smooth(record.y, record, 1), smooth(record.y, record, 2)
+    shortest = min(record.segments)
+    candidates = [_invert_axis(system, given, record, each) for each in _WINDOWS if each <= shortest]
+    part = record.longest_segment
+    return min(candidates, key=lambda each: _measure_error(each, part)), {}
+
+
+def _measure_error(system: OdeSystem, record: Dataset) -> float:
+    """Return the mean squared error of a simulation of one recording; infinity if it diverges."""
+    try:
+        simulator = make_ode_simulator(system, record)
+    except RecordError:
+        return np.inf
+    context = make_nominal_context(record)
+    nominal = np.array([each.nominal for each in simulator.parameters])
+    return float(np.mean((simulator.simulate(nominal, context.u, context, {}, ()) - record.y) ** 2))
+
+
+def _invert_axis(system: OdeSystem, given: Mapping[str, float], record: Dataset, window: int) -> OdeSystem:
+    """Return an axis whose parameters fit the force of a record that is smoothed with a window."""
+    rate, acceleration = (smooth(record.y, record, order, window) for order in (1, 2))
     typical_rate = float(np.std(rate)) or 1.0
     columns = np.column_stack([acceleration, rate, np.tanh(rate / (0.02 * typical_rate))])
     names = ("m", "c", "F")
     free = [place for place, name in enumerate(names) if name not in given]
     known = np.array([given.get(name, 0.0) for name in names])
-    force = smooth(record.u[:, 0], record)
+    force = smooth(record.u[:, 0], record, window=window)
     known[free] = scipy.optimize.lsq_linear(
         columns[:, free], force - columns @ known, bounds=(1e-12, np.inf)
     ).x
     mass, damping, dry = map(float, known)
     # Bounds of friction are relative to a typical force, since the friction may be close to zero.
     most = 20.0 * (dry + damping * typical_rate + mass * typical_rate / (system.shooting / 5.0))
-    values = {"m": mass, "c": damping, "F": dry, "vs": given.get("vs", _RELATIVE_RATE * typical_rate)}
-    return _set(system, values, {"c": (0.0, most / typical_rate), "F": (0.0, most)}), {}
+    slip_rate = given.get("vs", _RELATIVE_RATE * typical_rate)
+    stiffness = dry / (mass * slip_rate) * record.dt
+    system = replace(system, steps=2 ** int(np.ceil(np.log2(np.clip(4.0 * stiffness, *_STEPS)))))
+    values = {"m": mass, "c": damping, "F": dry, "vs": slip_rate}
+    return _set(system, values, {"c": (0.0, most / typical_rate), "F": (0.0, most)})
 
 
 def _set(

@@ -31,7 +31,10 @@ SMOOTHING_WINDOW = 9
 _STEP = 1e-4
 
 #: Number of Gauss-Newton steps.
-_ITERATIONS = 2
+_ITERATIONS = 3
+
+#: Lengths of each step that are tried in each interval.
+_STEP_LENGTHS = (1.0, 0.4, 0.15)
 
 #: Responses whose energy in other directions is a smaller part are not distinguished.
 _RANK_TOLERANCE = 1e-12
@@ -86,27 +89,33 @@ class Shots:
         sizes : mapping
             Sizes of the states that are fitted.
         """
-        moved = [{**starts, name: starts[name] + _STEP * size} for name, size in sizes.items()]
-        every = range(runs)
-        outputs = simulate([(run, states) for run in every for states in (starts, *moved)])
-        outputs = outputs.reshape(runs, 1 + len(sizes), -1)
-        y, responses = outputs[:, 0], np.nan_to_num(outputs[:, 1:] - outputs[:, :1])
+
+        def simulate_states(points: Signal) -> Signal:
+            """Return the outputs of points, shape (points, runs, states, intervals)."""
+            asked = [
+                (run, {**starts, **dict(zip(sizes, values, strict=True))})
+                for point in points
+                for run, values in enumerate(point)
+            ]
+            return simulate(asked).reshape(len(points), runs, -1)
+
         place = np.arange(self.measured.size) // self.interval
-        inverse = _invert(_sum_intervals(responses[:, :, None] * responses[:, None], place))
+        unit = _STEP * np.array(list(sizes.values()))
         states = np.array([[starts[name] for name in sizes]] * runs)
-        unit = _STEP * np.array(list(sizes.values()))[:, None]
         for _ in range(_ITERATIONS):
-            errors = np.nan_to_num(self.measured - y)
-            slope = _sum_intervals(responses * errors[:, None], place)
-            trial = states + unit * np.einsum("krij,krj->rik", inverse, slope)
-            moved_y = simulate(
-                [(run, {**starts, **dict(zip(sizes, trial[run], strict=True))}) for run in every]
-            )
-            # While a mass sticks the response is nonlinear, and a full step may increase the error.
-            before, after = (_sum_intervals((self.measured - each) ** 2, place).T for each in (y, moved_y))
-            closer = after < before
-            states = np.where(closer[:, None], trial, states)
-            y = np.where(closer[:, place], moved_y, y)
+            moved = states + np.diag(unit)[:, None, :, None]
+            y, *moved_y = simulate_states(np.stack([states, *moved]))
+            responses = np.nan_to_num(np.stack(moved_y, axis=1) - y[:, None])
+            squares = _sum_intervals(responses[:, :, None] * responses[:, None], place)
+            slope = _sum_intervals(responses * np.nan_to_num(self.measured - y)[:, None], place)
+            step = unit[:, None] * np.einsum("krij,krj->rik", _invert(squares), slope)
+            # Where a mass sticks the response is nonlinear, and a full step may increase the error.
+            trials = np.stack([states, *(states + length * step for length in _STEP_LENGTHS)])
+            outputs = np.concatenate([y[None], simulate_states(trials[1:])])
+            errors = _sum_intervals((self.measured - outputs) ** 2, place)
+            best = np.argmin(np.nan_to_num(errors, nan=np.inf), axis=1).T
+            states = np.take_along_axis(trials, best[None, :, None], axis=0)[0]
+            y = np.take_along_axis(outputs, best[None, :, place], axis=0)[0]
         return y
 
 
@@ -147,8 +156,16 @@ def make_shots(system: OdeSystem, record: Dataset) -> Shots:
     return Shots(max(MIN_SAMPLES, round(system.shooting / record.dt)), record.y, guesses)
 
 
-def smooth(signal: Signal, record: Dataset, order: int = 0) -> Signal:
+def smooth(signal: Signal, record: Dataset, order: int = 0, window: int = SMOOTHING_WINDOW) -> Signal:
     """Smooth a signal of a record, or its derivative of the given order.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (samples,)
+    record : Dataset
+    order : int
+    window : int
+        Window of the Savitzky-Golay filter in samples; at most those of the shortest recording.
 
     Raises
     ------
@@ -158,7 +175,7 @@ def smooth(signal: Signal, record: Dataset, order: int = 0) -> Signal:
     if (shortest := min(record.segments)) < MIN_SAMPLES:
         raise RecordError(f"shooting needs {MIN_SAMPLES} samples of each recording, one has {shortest}")
     return map_segments(
-        lambda part: scipy.signal.savgol_filter(part, SMOOTHING_WINDOW, 3, deriv=order, delta=record.dt),
+        lambda part: scipy.signal.savgol_filter(part, window, 3, deriv=order, delta=record.dt),
         signal,
         record.segments,
     )

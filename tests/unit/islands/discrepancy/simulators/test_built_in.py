@@ -1,6 +1,7 @@
 """Built-in simulators: their outputs, the places of effects, and documents of earlier versions."""
 
 import json
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -228,6 +229,41 @@ def test_shooting_fits_the_states_of_every_interval() -> None:
     assert np.std(found - position) < 0.25e-3
     jumps = np.abs(np.diff(found) - np.diff(position))
     assert set(np.flatnonzero(jumps > 1e-4) % 50) <= {49}
+
+
+def make_sticking_axis(seed: int, samples: int = 1500) -> tuple[Dataset, float]:
+    """Return a record of an axis that sticks at times, with 2 % of noise, and the noise."""
+    rng = np.random.default_rng(seed)
+    time = 0.01 * np.arange(samples)
+    phases = np.outer(time, rng.uniform(1.3, 12.6, 12)) + rng.uniform(0, 6.3, 12)
+    u = 10.0 * np.sin(phases).sum(axis=1) * np.minimum(1.0, time)
+    x, v, h, position = 0.0, 0.0, 5e-4, []
+    for k, force in enumerate(np.interp(h * np.arange(20 * samples), time, u).tolist()):
+        if k % 20 == 0:
+            position.append(x)
+        v += h * (force - 6.0 * v - 4.0 * math.tanh(v / 0.01)) / 2.0
+        x += h * v
+    sigma = 0.02 * float(np.std(position))
+    return recorded(u, np.array(position) + sigma * rng.standard_normal(samples), units=("N", "m")), sigma
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_shots_of_an_axis_that_sticks_have_the_error_of_the_noise(seed: int) -> None:
+    """A full Gauss-Newton step increases the error where the axis sticks, and shorter steps decrease it."""
+    record, sigma = make_sticking_axis(seed)
+    truth = {"m": 2.0, "c": 6.0, "F": 4.0, "vs": 0.01}
+    simulator = make_simulator(PhysicalSpec(kind="rigid-axis", parameters=truth), record)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
+    assert np.std(record.y - simulation.simulate(simulation.nominal)) < 1.02 * sigma
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_hardly_changes_the_estimate_of_an_axis(seed: int) -> None:
+    record, _ = make_sticking_axis(seed)
+    simulator = make_simulator("rigid-axis", record)
+    found = {each.name: each.nominal for each in simulator.parameters}
+    assert found["m"] == pytest.approx(2.0, rel=0.2)
+    assert found["c"] == pytest.approx(6.0, rel=0.2)
 
 
 def test_recordings_begin_with_a_shooting_interval() -> None:
