@@ -187,8 +187,8 @@ class OdeSimulator:
         return replace(self, shots=self.shots.for_samples(first, last)) if self.shots else self
 
     def _is_term(self, law: ForceLaw) -> bool:
-        """Whether a force law becomes a term; shooting restarts no states but those of the system."""
-        return bool(law.equation) and not (law.state_derivative and (self.shots or not law.state_equation))
+        """Whether a force law becomes a term of the equations; otherwise it is called."""
+        return bool(law.equation) and not (law.state_derivative and not law.state_equation)
 
     def _get_program(
         self, active: tuple[OdeEffect, ...], has_factor: bool, laws: tuple[ForceLaw, ...]

@@ -96,12 +96,12 @@ class LaneLimits(NamedTuple):
 
 
 class LaneRestarts(NamedTuple):
-    """Samples at which states are set to given values; those of force laws are kept. Size 0 for none.
+    """Samples at which the first states are set to given values; the others are kept. Size 0 for none.
 
     Attributes
     ----------
     samples : ndarray of int64, shape (restarts,)
-    states : ndarray, shape (restarts, states*16)
+    states : ndarray, shape (restarts, restarted*16)
     """
 
     samples: NDArray[np.int64]

@@ -94,7 +94,8 @@ class LaneInput:
         For a state with an upper limit, the state that receives a part of what the limit cuts off, and that
         part. The receivers are the same in all lanes.
     restarts : mapping
-        States at the first sample of each shooting interval by name, each of shape (intervals,).
+        States at the first sample of each shooting interval by name, each of shape (intervals,). States that
+        are not named are kept; they follow the others.
     """
 
     parameters: Mapping[str, float]
@@ -137,11 +138,10 @@ def simulate_lanes(
         signals, order = pack_signals(program.signals, dt, full)
         instructions = program.instructions._replace(signals=program.instructions.signals[order])
         arena, limits = pack_arena(program, full), pack_limits(program.states, full)
-        native = None if interval else find_native_code(instructions, signals, limits)
-        if native:
-            native.integrate(arena, signals, dt, limits, len(group), first, every, out)
-            continue
         restarts = _pack_restarts(program.states, full, samples, interval)
+        if native := find_native_code(instructions, signals, limits, restarts):
+            native.integrate(arena, signals, dt, limits, restarts, len(group), first, every, out)
+            continue
         integrate(
             *(instructions, arena, signals, dt, limits, restarts, pack_elements(full)),
             *(len(group), first, every, out),
@@ -252,7 +252,8 @@ def _pack_restarts(
 ) -> LaneRestarts:
     if not interval:
         return LaneRestarts(np.empty(0, dtype=np.int64), np.empty((0, 0)))
-    values = [[(lane.restarts or {})[name] for lane in lanes] for name in states]
+    restarted = [name for name in states if name in (lanes[0].restarts or {})]
+    values = [[(lane.restarts or {})[name] for lane in lanes] for name in restarted]
     first = np.arange(0, samples, interval, dtype=np.int64)
     return LaneRestarts(first, np.ascontiguousarray(np.array(values).reshape(-1, first.size).T))
 

@@ -47,8 +47,7 @@ LOGARITHM = 32
 SINE = 33
 COSINE = 34
 TANGENT = 35
-HYPERBOLIC_TANGENT = 36
-ARC_TANGENT = 37
+ARC_TANGENT = 36
 
 #: Instruction that sums the force laws; the operands are the coordinate and its rate.
 FORCES = 40
@@ -125,8 +124,6 @@ def _apply(operation, arena, target, first, second, lanes):
             y = math.cos(x)
         elif operation == TANGENT:
             y = math.tan(x)
-        elif operation == HYPERBOLIC_TANGENT:
-            y = math.tanh(x)
         else:
             y = math.atan(x)
         arena[LANES * target + lane] = y
@@ -267,7 +264,8 @@ def integrate(instructions, arena, signals, dt, limits, restarts, laws, lanes, f
                 _advance(stage, dt, slope, *addresses, base + _ROW * (states + i))
         if limits.lower.size > 0:
             _limit(arena, states, before, limits.lower, limits.upper, limits.receivers, limits.caught)
-        if k % _CHECK == 0 and not _is_any_finite(before, lanes):
+        # A restart makes the states of a lane finite again.
+        if restarts.samples.size == 0 and k % _CHECK == 0 and not _is_any_finite(before, lanes):
             break
     for lane in range(lanes):
         if not _is_finite(before, lane):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from islands.errors import ModelError
 from islands.kernels.interpreter import ADD, MULTIPLY, SIGN, SUBTRACT
 from islands.systems.ode import ode_kernel
+from islands.systems.ode.composite_functions import generate_power, generate_tanh
 from islands.systems.ode.equation_parser import FORCE, TIME
 from islands.systems.ode.kernel_arguments import Instructions
 from islands.systems.ode.ode_expression import (
@@ -50,7 +51,6 @@ _OPERATIONS: Mapping[str, int] = MappingProxyType(
         "sin": ode_kernel.SINE,
         "cos": ode_kernel.COSINE,
         "tan": ode_kernel.TANGENT,
-        "tanh": ode_kernel.HYPERBOLIC_TANGENT,
         "atan": ode_kernel.ARC_TANGENT,
         "sign": SIGN,
         "min": ode_kernel.MINIMUM,
@@ -211,7 +211,9 @@ class _Generator:
             case Operation(function, _) if function in SIGNAL_FUNCTIONS or function == FMU:
                 return self._signal(expression, _STATES if function == FMU else _SIGNALS)
             case Operation("pow", (base, Number(power))) if power in range(2, MAX_MULTIPLIED_POWER + 1):
-                return self._multiply(self._make(base), int(power))
+                return generate_power(self._make(base), int(power), self._operation)
+            case Operation("tanh", (argument,)):
+                return generate_tanh(self._make(argument), self._operation, self._number)
             case Operation(function, arguments):
                 return self._operation(_OPERATIONS[function], *map(self._make, arguments))
 
@@ -239,13 +241,6 @@ class _Generator:
             # The states of the laws change even if the coordinate does not.
             self._known["force"] = self._operation(ode_kernel.FORCES, *operands, level=_STATES)
         return self._known["force"]
-
-    def _multiply(self, base: int, power: int) -> int:
-        if power == 1:
-            return base
-        half = self._multiply(base, power // 2)
-        square = self._operation(MULTIPLY, half, half)
-        return self._operation(MULTIPLY, square, base) if power % 2 else square
 
     def _operation(self, operation: int, *operands: int, level: int = _PARAMETERS) -> int:
         key = operation, operands

@@ -36,18 +36,18 @@ class RowOperations:
         same = ir.Constant(ir.VectorType(_PLACE, LANES), [0] * LANES)
         return self._build.shuffle_vector(first, _UNDEFINED, same)
 
-    def load(self, array: Any, place: int) -> Any:
+    def load(self, array: Any, place: Any) -> Any:
         """Read a row from a place of an array."""
-        row = self._build.load(self._point(array, ir.IntType(64)(place)))
+        row = self._build.load(self._point(array, place))
         row.align = 8
         return row
 
     def store(self, row: Any, array: Any, place: Any) -> None:
         """Write a row to a place of an array."""
-        place = ir.IntType(64)(place) if isinstance(place, int) else place
         self._build.store(row, self._point(array, place)).align = 8
 
     def _point(self, array: Any, place: Any) -> Any:
+        place = ir.IntType(64)(place) if isinstance(place, int) else place
         return self._build.bitcast(self._build.gep(array, [place]), _ROW.as_pointer())
 
     def gather(self, array: Any, places: Sequence[Any]) -> Any:

@@ -28,7 +28,7 @@ ARITHMETIC = {
         dx/dt = v
         dv/dt = F - c*v - k*x - b*x**3 + 0.1*abs(v)*x - rate(T)*0.01 + sign(v)*0.2 - t/50
         dy/dt = -y + min(x, T) - max(v, -y)/(2 + x**2) + sqrt(abs(x)) + where(x - v, y, 0.3)
-        dp/dt = -p**5 + (x < v)*a + (y <= 0)*b
+        dp/dt = -p**5 + (x < v)*a + (y <= 0)*b - tanh(v/0.1)
     """,
     "output": "x + 0.1*y + p*F",
     "parameters": {"a": 0.4, "b": 2.0, "c": 1.2, "k": 80.0},
@@ -53,13 +53,13 @@ def make_lanes() -> list[LaneInput]:
 
 
 def simulate_natively(
-    program: OdeProgram, lanes: list[LaneInput], monkeypatch: pytest.MonkeyPatch
+    program: OdeProgram, lanes: list[LaneInput], monkeypatch: pytest.MonkeyPatch, interval: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return outputs of the interpreter and of machine code."""
     monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", np.inf)
-    interpreted = simulate_lanes(program, DT, lanes)
+    interpreted = simulate_lanes(program, DT, lanes, interval)
     monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", 0)
-    return interpreted, simulate_lanes(program, DT, lanes)
+    return interpreted, simulate_lanes(program, DT, lanes, interval)
 
 
 def test_machine_code_has_the_bits_of_the_interpreter(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,11 +85,31 @@ def test_limits_and_overflow_have_the_bits_of_the_interpreter(monkeypatch: pytes
     assert not np.array_equal(native[2, 1], native[3, 1])
 
 
+@pytest.mark.parametrize(("interval", "restarted"), [(30, "xvyp"), (30, "xv"), (SAMPLES, "x")])
+def test_restarted_runs_have_the_bits_of_the_interpreter(
+    interval: int, restarted: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lanes = make_lanes()
+    starts = np.random.default_rng(1).standard_normal((19, len(restarted), -(-SAMPLES // interval)))
+    starts[2, 0, -1] = 1e200
+    lanes = [
+        replace(each, restarts=dict(zip(restarted, own, strict=True)))
+        for each, own in zip(lanes, starts, strict=True)
+    ]
+    program = generate_program(make_system(ARITHMETIC), (Symbol("x"),))
+    interpreted, native = simulate_natively(program, lanes, monkeypatch, interval)
+    assert native.tobytes() == interpreted.tobytes()
+    assert np.array_equal(native[4, 0, ::interval], starts[4, 0])
+    # Overflowing powers remain if their state is not restarted.
+    diverging = [2] if "p" in restarted else [2, 3]
+    assert np.flatnonzero(np.isnan(native).all(axis=(1, 2))).tolist() == diverging
+
+
 def test_functions_of_the_library_remain_interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", 0)
     monkeypatch.setattr(native_code, "_compile", pytest.fail)
     system = make_system(
-        {"name": "s", "input": "F", "equations": "dx/dt = F - tanh(x)", "output": "x", "states": {"x": {}}}
+        {"name": "s", "input": "F", "equations": "dx/dt = F - atan(x)", "output": "x", "states": {"x": {}}}
     )
     lane = LaneInput({}, {"x": 0.0}, {"F": interpolate_linearly(FORCE)})
     assert np.isfinite(simulate_lanes(generate_program(system), DT, [lane])).all()
