@@ -17,7 +17,7 @@ from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.errors import IslandsError
 
 #: Seconds of a computation before the first process is used. Shorter ones need none.
-START_AFTER = 2.0
+START_AFTER = 1.0
 
 #: Modules that are imported once, in the process from which the others are forked.
 _PRELOADED = [

@@ -53,6 +53,10 @@ class Projection:
         """Project a response, shape (samples,), followed by a zero for the prior of each parameter."""
         return self._project(self._stack(response, np.zeros(self._values)))
 
+    def project_whitened(self, signals: Signal) -> Signal:
+        """Project whitened signals over the estimation part, shape (signals, selected); one is a column."""
+        return self._project(np.vstack([signals.T / self._sigma, np.zeros((self._values, len(signals)))]))
+
     def absorb(self, response: Signal) -> Signal:
         """Return the change of the base's parameters that reproduces most of a response, (parameters,)."""
         change = np.zeros(self._values)

@@ -13,7 +13,7 @@ import numpy as np
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, compute_form_chance
-from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, with_effect, without_effect
+from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, remove_each_effect, with_effect
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.stepwise_search import (
     MAX_EFFECTS,
@@ -99,17 +99,20 @@ def search_free_forms(
         if found.effects:
             starts.append(_screen_forms(found, forms, target, parallel_map))
         if len(found.effects) > 1:
+            reduced = remove_each_effect(found, target, parallel_map)
             alternatives = {
-                effect.name: _screen_forms(without_effect(found, effect, target), forms, target, parallel_map)
-                for effect in found.effects
+                effect.name: _screen_forms(without, forms, target, parallel_map)
+                for effect, without in zip(found.effects, reduced, strict=True)
                 if not effect.is_free
             }
         extended = [
-            eliminate_backward(with_effect(each.without, each.screened[0]), target, EQUIVALENCE_MARGIN)
+            eliminate_backward(
+                with_effect(each.without, each.screened[0]), target, EQUIVALENCE_MARGIN, parallel_map
+            )
             for each in (*starts, *alternatives.values())
             if each.screened
         ]
-        beam, refitted = refit_with_ar_noise(sorted(extended, key=attrgetter("rank")), target)
+        beam, refitted = refit_with_ar_noise(sorted(extended, key=attrgetter("rank")), target, parallel_map)
         if not beam or not _explains_more(beam[0], found, outcome):
             break
         found, target, alternatives = beam[0], refitted, {}

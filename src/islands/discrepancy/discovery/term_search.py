@@ -187,7 +187,7 @@ def _find_best_term(
     (number,) = find_free_numbers(_get_system(fit), 1)
     free = [each for each in candidates if (each.target, each.text) not in used]
     log_n, log_choices = float(np.log(fit.noise.effective_samples)), 2.0 * float(np.log(len(candidates)))
-    terms = _rank_terms(fit, target, free, target_sizes)[:FITTED_TERMS]
+    terms = _rank_terms(fit, target, free, target_sizes, parallel_map)[:FITTED_TERMS]
     extended = [_add_terms(fit, _get_system(fit), [(term, number)], target_sizes) for term in terms]
     tasks = [(simulation, [start]) for simulation, start in extended]
     results = []
@@ -206,13 +206,13 @@ def _rank_terms(
     target: Target,
     candidates: Sequence[CandidateTerm],
     target_sizes: Mapping[str, float],
+    parallel_map: ParallelMap,
 ) -> list[CandidateTerm]:
     """Return the terms in the order of the part of the residual that their linear responses explain."""
     projection = Projection(fit, target)
-    explained: list[float] = []
-    for first in range(0, len(candidates), TERMS_PER_CALL):
+
+    def explain_group(group: Sequence[CandidateTerm]) -> list[float]:
         # Each lane has the coefficient of one of the terms.
-        group = candidates[first : first + TERMS_PER_CALL]
         numbers = find_free_numbers(_get_system(fit), len(group))
         numbered = list(zip(group, numbers, strict=True))
         simulation, start = _add_terms(fit, _get_system(fit), numbered, target_sizes)
@@ -222,7 +222,12 @@ def _rank_terms(
             place = places[term.name_parameters(number)[0]]
             point[place] = simulation.parameters[place].nominal
         outputs = simulation.simulate_batch(points)
-        explained += [_explain(output - fit.output, projection) for output in outputs]
+        return [_explain(output - fit.output, projection) for output in outputs]
+
+    groups = [
+        candidates[first : first + TERMS_PER_CALL] for first in range(0, len(candidates), TERMS_PER_CALL)
+    ]
+    explained = [each for group in parallel_map(explain_group, groups) for each in group]
     order = np.argsort(-np.array(explained), kind="stable")
     return [candidates[index] for index in order if explained[index] > 0.0]
 

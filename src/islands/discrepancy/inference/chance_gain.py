@@ -5,7 +5,6 @@ changing variance, heavy tails and colour that the noise model does not whiten m
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -34,7 +33,12 @@ SEED = 20
 
 
 def compute_chance_gain(
-    fit: CalibrationResult, without: CalibrationResult, effect: Effect, target: Target, effect_count: int
+    fit: CalibrationResult,
+    without: CalibrationResult,
+    effect: Effect,
+    target: Target,
+    effect_count: int,
+    surrogates: Sequence[Signal],
 ) -> float:
     """Return the gain of one effect that noise exceeds with a probability of `FALSE_ALARM_PROBABILITY`.
 
@@ -47,14 +51,16 @@ def compute_chance_gain(
         The simulation with the effect and without it.
     effect_count : int
         Number of effects that are searched for.
+    surrogates : sequence of ndarray
+        Surrogates of the noise, see `draw_noise`: of the fit with the effect, since a noise model that is
+        fitted without a true effect contains it as colour; without a noise model of the fit without the
+        effect, since the whole residual competes with it.
 
     Returns
     -------
     float
         Gain in minus twice the log-likelihood, without a penalty on the values of the effect.
     """
-    if target.effective_samples is None:
-        target = replace(target, noise=fit.noise)
     projection = Projection(without, target)
     start = fit.simulation.nominal
     changes = []
@@ -72,11 +78,8 @@ def compute_chance_gain(
         )
         return gains
 
-    # A noise model that was fitted without a true effect contains it as colour, and so would the surrogates.
-    # Without a noise model, the whole residual competes with the effect.
-    noise = fit if target.effective_samples is None else without
     probability = FALSE_ALARM_PROBABILITY / effect_count
-    return _find_threshold(noise, target, projection, compute_gains, probability) if bases else 0.0
+    return _find_threshold(surrogates, projection, compute_gains, probability) if bases else 0.0
 
 
 class ForwardSelection:
@@ -113,7 +116,8 @@ class ForwardSelection:
 
     def compute_chance_gain(self, probability: float = FALSE_ALARM_PROBABILITY) -> float:
         """Return the gain that is exceeded with a probability if the residual is noise."""
-        return _find_threshold(self._base, self._target, self._projection, self._compute_gains, probability)
+        surrogates = draw_noise(self._base, self._target)
+        return _find_threshold(surrogates, self._projection, self._compute_gains, probability)
 
     def _compute_gains(self, residuals: Signal) -> Signal:
         products = self._dictionary.T @ residuals
@@ -122,23 +126,28 @@ class ForwardSelection:
         return _compute_gain(residuals, remaining, self._target, self._base)
 
 
+def draw_noise(fit: CalibrationResult, target: Target) -> list[Signal]:
+    """Draw surrogates of the residual of a fit, whitened: arrays of shape (surrogates, selected samples)."""
+    part, rng = target.estimation_part, np.random.default_rng(SEED)
+    residual = (target.y - fit.output)[part]
+    kinds = []
+    for randomisation in Randomisation:
+        drawn = draw_surrogates(residual, target.fitted_segments, randomisation, SURROGATES, rng)
+        kinds.append(np.stack([target.select(_insert(each, part)) for each in drawn]))
+    return kinds
+
+
 def _find_threshold(
-    noise: CalibrationResult,
-    target: Target,
+    surrogates: Sequence[Signal],
     projection: Projection,
     compute_gains: Callable[[Signal], Signal],
     probability: float,
 ) -> float:
-    """Return the gain that is exceeded with a probability in surrogates of the residual of ``noise``."""
-    part = target.estimation_part
-    residual = (target.y - noise.output)[part]
-    rng = np.random.default_rng(SEED)
-    thresholds = []
-    for randomisation in Randomisation:
-        drawn = draw_surrogates(residual, target.fitted_segments, randomisation, SURROGATES, rng)
-        residuals = np.column_stack([projection(_insert(each, part)) for each in drawn])
-        thresholds.append(_extrapolate_quantile(compute_gains(residuals), probability))
-    return max(thresholds)
+    """Return the gain that is exceeded with a probability in surrogates of the noise."""
+    return max(
+        _extrapolate_quantile(compute_gains(projection.project_whitened(drawn)), probability)
+        for drawn in surrogates
+    )
 
 
 def _insert(signal: Signal, part: NDArray[np.bool_]) -> Signal:

@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.screening import (
@@ -67,23 +69,48 @@ def with_effect(hypothesis: Hypothesis, screened: ScreenedEffect) -> Hypothesis:
     return Hypothesis(screened.fit, cost, (*hypothesis.effects, screened.effect))
 
 
-def refit(hypothesis: Hypothesis, target: Target) -> Hypothesis:
-    """Calibrate a hypothesis to a target, and return it unchanged if that does not improve its rank."""
-    fit = calibrate(hypothesis.fit.simulation, target, hypothesis.fit.values)
-    refitted = Hypothesis(fit, hypothesis.cost + fit.score - hypothesis.fit.score, hypothesis.effects)
-    return refitted if refitted.rank < hypothesis.rank else hypothesis
+def refit(
+    hypotheses: Sequence[Hypothesis], target: Target, parallel_map: ParallelMap = map
+) -> list[Hypothesis]:
+    """Calibrate hypotheses to a target; a hypothesis whose rank does not improve is returned unchanged."""
+    tasks = [(each.fit.simulation, [each.fit.values]) for each in hypotheses]
+    fits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
+    refitted = [
+        Hypothesis(fit, each.cost + fit.score - each.fit.score, each.effects)
+        for each, fit in zip(hypotheses, fits, strict=True)
+    ]
+    return [min(pair, key=attrgetter("rank")) for pair in zip(hypotheses, refitted, strict=True)]
 
 
 def without_effect(hypothesis: Hypothesis, effect: Effect, target: Target) -> Hypothesis:
     """Return a hypothesis without one of its effects, refitted."""
-    fit = hypothesis.fit
-    remaining = tuple(each for each in hypothesis.effects if each is not effect)
-    simulation = fit.simulation.with_effects(catalogue_order(remaining))
-    refitted = calibrate(simulation, target, transfer_parameters(fit.values, fit.simulation, simulation))
-    if not np.isfinite(refitted.score):  # the simulation diverges at these values without the effect
-        refitted = calibrate(simulation, target, simulation.nominal)
-    cost = refitted.score + (hypothesis.cost - fit.score) - bic_penalty(effect, fit)
-    return Hypothesis(refitted, cost, remaining)
+    (found,) = _remove_each(hypothesis, [effect], target)
+    return found
+
+
+def remove_each_effect(
+    hypothesis: Hypothesis, target: Target, parallel_map: ParallelMap = map
+) -> list[Hypothesis]:
+    """Return the hypotheses without each of the effects in turn, refitted."""
+    return _remove_each(hypothesis, hypothesis.effects, target, parallel_map)
+
+
+def _remove_each(
+    hypothesis: Hypothesis, effects: Sequence[Effect], target: Target, parallel_map: ParallelMap = map
+) -> list[Hypothesis]:
+    fit, found, tasks = hypothesis.fit, [], []
+    remaining = [tuple(each for each in hypothesis.effects if each is not effect) for effect in effects]
+    for each in remaining:
+        simulation = fit.simulation.with_effects(catalogue_order(each))
+        tasks.append((simulation, [transfer_parameters(fit.values, fit.simulation, simulation)]))
+    refits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
+    for effect, others, refitted in zip(effects, remaining, refits, strict=True):
+        best, simulation = refitted, refitted.simulation
+        if not np.isfinite(best.score):  # the simulation diverges at these values without the effect
+            best = calibrate(simulation, target, simulation.nominal)
+        cost = best.score + (hypothesis.cost - fit.score) - bic_penalty(effect, fit)
+        found.append(Hypothesis(best, cost, others))
+    return found
 
 
 def find_alternatives(
@@ -91,8 +118,7 @@ def find_alternatives(
 ) -> tuple[Alternatives, ...]:
     """Remove each effect in turn, and screen the effects that could take its place, itself included."""
     alternatives = []
-    for effect in hypothesis.effects:
-        without = without_effect(hypothesis, effect, target)
+    for without in remove_each_effect(hypothesis, target, parallel_map):
         others = [each for each in effects if each not in without.effects]
         alternatives.append(Alternatives(without, screen_effects(without.fit, target, others, parallel_map)))
     return tuple(alternatives)

@@ -14,8 +14,8 @@ from islands.discrepancy.inference.hypothesis import (
     Hypothesis,
     find_alternatives,
     refit,
+    remove_each_effect,
     with_effect,
-    without_effect,
 )
 from islands.discrepancy.inference.screening import SCORE_TIE, ScreenedEffect, screen_effects
 from islands.discrepancy.interfaces.effect import Effect
@@ -90,7 +90,7 @@ def stepwise_search(
                 if is_accepted and (key not in extended or found.cost < extended[key].cost):
                     extended[key] = found
         beam = sorted(extended.values(), key=attrgetter("rank"))[:width]
-        beam, new_target = refit_with_ar_noise(beam, target)
+        beam, new_target = refit_with_ar_noise(beam, target, parallel_map)
         if beam and beam[0].cost < best.cost - min_gain:
             best, target = beam[0], new_target
         elif not (is_first and pairs):
@@ -106,12 +106,14 @@ def _count_causes(hypothesis: Hypothesis) -> int:
     return sum(effect.cause != model_form.CORE_SHAPE for effect in hypothesis.effects)
 
 
-def refit_with_ar_noise(beam: list[Hypothesis], target: Target) -> tuple[list[Hypothesis], Target]:
+def refit_with_ar_noise(
+    beam: list[Hypothesis], target: Target, parallel_map: ParallelMap = map
+) -> tuple[list[Hypothesis], Target]:
     """Refit hypotheses, whitened by the noise model of the best one, until its cost stops decreasing."""
     for _ in range(MAX_REFITS if beam and target.effective_samples is None else 0):
         before = beam[0].cost
         target = whiten_target(target, beam[0].fit)
-        beam = sorted((refit(each, target) for each in beam), key=attrgetter("rank"))
+        beam = sorted(refit(beam, target, parallel_map), key=attrgetter("rank"))
         if beam[0].cost > before - SCORE_TIE:
             break
     return beam, target
@@ -137,7 +139,7 @@ def refine_by_swaps(
     """
     complete = hypothesis.effects
     min_gain = _get_min_further_gain(target, effects)
-    hypothesis = eliminate_backward(hypothesis, target, min_gain)
+    hypothesis = eliminate_backward(hypothesis, target, min_gain, parallel_map)
     while hypothesis.effects:
         alternatives: tuple[Alternatives, ...] = ()
         candidates = []
@@ -162,7 +164,8 @@ def refine_by_swaps(
             refined = replace(hypothesis, fit=best.fit, cost=best.cost, alternatives=alternatives)
             return refined, target
         complete = best.effects
-        (hypothesis,), target = refit_with_ar_noise([eliminate_backward(best, target, min_gain)], target)
+        best = eliminate_backward(best, target, min_gain, parallel_map)
+        (hypothesis,), target = refit_with_ar_noise([best], target)
     return hypothesis, target
 
 
@@ -179,14 +182,17 @@ def _get_min_further_gain(target: Target, effects: Sequence[Effect]) -> float:
     )
 
 
-def eliminate_backward(hypothesis: Hypothesis, target: Target, min_gain: float) -> Hypothesis:
+def eliminate_backward(
+    hypothesis: Hypothesis, target: Target, min_gain: float, parallel_map: ParallelMap = map
+) -> Hypothesis:
     """Remove effects that are redundant given the others, and sort the rest, the most important first.
 
     The last effect may be removed too: refitted values and the noise model estimated with it may make it
     unnecessary.
     """
     while hypothesis.effects:
-        without = {effect.name: without_effect(hypothesis, effect, target) for effect in hypothesis.effects}
+        reduced = remove_each_effect(hypothesis, target, parallel_map)
+        without = {effect.name: each for effect, each in zip(hypothesis.effects, reduced, strict=True)}
         cheapest = min(without.values(), key=attrgetter("rank"))
         threshold = min_gain if len(hypothesis.effects) > 1 else MIN_GAIN
         if cheapest.cost - hypothesis.cost >= threshold:

@@ -1,6 +1,7 @@
 """Verdict: whether effects explain a residual, more than chance does and on blocks that were left out."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
@@ -8,13 +9,13 @@ import numpy as np
 from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.discrepancy.calibration.target import Target
-from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain
+from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain, draw_noise
 from islands.discrepancy.inference.confounders import find_confounder
 from islands.discrepancy.inference.holdout import bound_reduction, cross_validate_gain
 from islands.discrepancy.inference.hypothesis import Hypothesis, without_effect
 from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
-from islands.discrepancy.interfaces.effect import Effect
+from islands.discrepancy.interfaces.effect import Effect, Signal
 
 #: Minimum fraction of the explainable misfit that the effects have to explain.
 MIN_EXPLAINED_FRACTION = 0.5
@@ -60,11 +61,17 @@ def remove_chance_effects(
         gain = base.score - hypothesis.fit.score
         selection = ForwardSelection(base, target, effects, len(hypothesis.effects))
         return hypothesis if gain > selection.compute_chance_gain() else Hypothesis(base, base.score, ())
+    surrogates: list[Signal] = []
     for effect in hypothesis.effects[::-1]:
-        without = without_effect(hypothesis, effect, target)
-        gain = without.cost - hypothesis.cost + bic_penalty(effect, hypothesis.fit)
-        if gain <= compute_chance_gain(hypothesis.fit, without.fit, effect, target, len(effects)):
-            hypothesis = without
+        fit, without, whitened = hypothesis.fit, without_effect(hypothesis, effect, target), target
+        if target.effective_samples is None:
+            whitened = replace(target, noise=fit.noise)
+            surrogates = surrogates or draw_noise(fit, whitened)
+        else:
+            surrogates = draw_noise(without.fit, whitened)
+        gain = without.cost - hypothesis.cost + bic_penalty(effect, fit)
+        if gain <= compute_chance_gain(fit, without.fit, effect, whitened, len(effects), surrogates):
+            hypothesis, surrogates = without, []
     return hypothesis
 
 

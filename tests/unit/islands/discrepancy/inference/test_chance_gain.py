@@ -10,7 +10,7 @@ from islands.discrepancy.calibration.noise_model import estimate_effective_sampl
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain
+from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain, draw_noise
 from islands.discrepancy.inference.screening import bic_penalty, screen_effects
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -38,7 +38,10 @@ def measure_gain(noise: np.ndarray, effect: Effect) -> tuple[float, float]:
     """Return the gain of an effect, and the gain that it reaches by chance."""
     base, target = calibrated(noise)
     fit = screen_effects(base, target, [effect])[0].fit
-    return base.score - fit.score, compute_chance_gain(fit, base, effect, target, len(EFFECTS))
+    if target.effective_samples is None:
+        target = replace(target, noise=fit.noise)
+    surrogates = draw_noise(fit if target.effective_samples is None else base, target)
+    return base.score - fit.score, compute_chance_gain(fit, base, effect, target, len(EFFECTS), surrogates)
 
 
 @pytest.mark.ci
