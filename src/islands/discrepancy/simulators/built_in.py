@@ -32,7 +32,8 @@ _RELATIVE_RATE = 0.01
 _WINDOWS = (9, 17, 33, 65)
 
 #: Least and most integration steps per sample of an axis. A friction that changes its sign within one step
-#: makes the error of the simulation an irregular function of vs, and its calibration ends at a local minimum.
+#: makes the error of the simulation an irregular function of vs, and its calibration ends at a local minimum:
+#: the nominal vs is passed in four steps or more, and no smaller vs in less than one.
 _STEPS = (4, 32)
 
 #: A system with estimated parameters, and estimates of its states at the first sample by name.
@@ -126,10 +127,12 @@ def _invert_axis(system: OdeSystem, given: Mapping[str, float], record: Dataset,
     # Bounds of friction are relative to a typical force, since the friction may be close to zero.
     most = 20.0 * (dry + damping * typical_rate + mass * typical_rate / (system.shooting / 5.0))
     slip_rate = given.get("vs", _RELATIVE_RATE * typical_rate)
-    stiffness = dry / (mass * slip_rate) * record.dt
-    system = replace(system, steps=2 ** int(np.ceil(np.log2(np.clip(4.0 * stiffness, *_STEPS)))))
+    change = dry / mass * record.dt  # of the rate within a sample
+    steps = 2 ** int(np.ceil(np.log2(np.clip(4.0 * change / slip_rate, *_STEPS))))
     values = {"m": mass, "c": damping, "F": dry, "vs": slip_rate}
-    return _set(system, values, {"c": (0.0, most / typical_rate), "F": (0.0, most)})
+    lower = min(max(0.05 * slip_rate, change / steps), slip_rate)
+    bounds = {"c": (0.0, most / typical_rate), "F": (0.0, most), "vs": (lower, 20.0 * slip_rate)}
+    return _set(replace(system, steps=steps), values, bounds)
 
 
 def _set(
