@@ -13,7 +13,7 @@ import numpy as np
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, compute_form_chance
-from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, remove_each_effect, with_effect
+from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, remove_each, with_effect
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.stepwise_search import (
     MAX_EFFECTS,
@@ -99,7 +99,7 @@ def search_free_forms(
         if found.effects:
             starts.append(_screen_forms(found, forms, target, parallel_map))
         if len(found.effects) > 1:
-            reduced = remove_each_effect(found, target, parallel_map)
+            reduced = remove_each(found, found.effects, target, parallel_map)
             alternatives = {
                 effect.name: _screen_forms(without, forms, target, parallel_map)
                 for effect, without in zip(found.effects, reduced, strict=True)

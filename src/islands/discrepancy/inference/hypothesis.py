@@ -84,33 +84,24 @@ def refit(
 
 def without_effect(hypothesis: Hypothesis, effect: Effect, target: Target) -> Hypothesis:
     """Return a hypothesis without one of its effects, refitted."""
-    (found,) = _remove_each(hypothesis, [effect], target)
-    return found
+    return remove_each(hypothesis, [effect], target)[0]
 
 
-def remove_each_effect(
-    hypothesis: Hypothesis, target: Target, parallel_map: ParallelMap = map
-) -> list[Hypothesis]:
-    """Return the hypotheses without each of the effects in turn, refitted."""
-    return _remove_each(hypothesis, hypothesis.effects, target, parallel_map)
-
-
-def _remove_each(
+def remove_each(
     hypothesis: Hypothesis, effects: Sequence[Effect], target: Target, parallel_map: ParallelMap = map
 ) -> list[Hypothesis]:
-    fit, found, tasks = hypothesis.fit, [], []
+    """Return a hypothesis without each of some of its effects in turn, refitted."""
+    fit, reduced = hypothesis.fit, []
     remaining = [tuple(each for each in hypothesis.effects if each is not effect) for effect in effects]
-    for each in remaining:
-        simulation = fit.simulation.with_effects(catalogue_order(each))
-        tasks.append((simulation, [transfer_parameters(fit.values, fit.simulation, simulation)]))
-    refits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
-    for effect, others, refitted in zip(effects, remaining, refits, strict=True):
-        best, simulation = refitted, refitted.simulation
-        if not np.isfinite(best.score):  # the simulation diverges at these values without the effect
-            best = calibrate(simulation, target, simulation.nominal)
+    simulations = [fit.simulation.with_effects(catalogue_order(each)) for each in remaining]
+    tasks = [(each, [transfer_parameters(fit.values, fit.simulation, each)]) for each in simulations]
+    fits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
+    for effect, others, simulation, found in zip(effects, remaining, simulations, fits, strict=True):
+        # The simulation may diverge at these values without the effect.
+        best = found if np.isfinite(found.score) else calibrate(simulation, target, simulation.nominal)
         cost = best.score + (hypothesis.cost - fit.score) - bic_penalty(effect, fit)
-        found.append(Hypothesis(best, cost, others))
-    return found
+        reduced.append(Hypothesis(best, cost, others))
+    return reduced
 
 
 def find_alternatives(
@@ -118,7 +109,7 @@ def find_alternatives(
 ) -> tuple[Alternatives, ...]:
     """Remove each effect in turn, and screen the effects that could take its place, itself included."""
     alternatives = []
-    for without in remove_each_effect(hypothesis, target, parallel_map):
+    for without in remove_each(hypothesis, hypothesis.effects, target, parallel_map):
         others = [each for each in effects if each not in without.effects]
         alternatives.append(Alternatives(without, screen_effects(without.fit, target, others, parallel_map)))
     return tuple(alternatives)

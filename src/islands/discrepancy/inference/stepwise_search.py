@@ -14,7 +14,7 @@ from islands.discrepancy.inference.hypothesis import (
     Hypothesis,
     find_alternatives,
     refit,
-    remove_each_effect,
+    remove_each,
     with_effect,
 )
 from islands.discrepancy.inference.screening import SCORE_TIE, ScreenedEffect, screen_effects
@@ -191,7 +191,7 @@ def eliminate_backward(
     unnecessary.
     """
     while hypothesis.effects:
-        reduced = remove_each_effect(hypothesis, target, parallel_map)
+        reduced = remove_each(hypothesis, hypothesis.effects, target, parallel_map)
         without = {effect.name: each for effect, each in zip(hypothesis.effects, reduced, strict=True)}
         cheapest = min(without.values(), key=attrgetter("rank"))
         threshold = min_gain if len(hypothesis.effects) > 1 else MIN_GAIN

@@ -61,14 +61,12 @@ def remove_chance_effects(
         gain = base.score - hypothesis.fit.score
         selection = ForwardSelection(base, target, effects, len(hypothesis.effects))
         return hypothesis if gain > selection.compute_chance_gain() else Hypothesis(base, base.score, ())
-    surrogates: list[Signal] = []
+    has_noise_model, surrogates = target.effective_samples is None, list[Signal]()
     for effect in hypothesis.effects[::-1]:
-        fit, without, whitened = hypothesis.fit, without_effect(hypothesis, effect, target), target
-        if target.effective_samples is None:
-            whitened = replace(target, noise=fit.noise)
-            surrogates = surrogates or draw_noise(fit, whitened)
-        else:
-            surrogates = draw_noise(without.fit, whitened)
+        fit, without = hypothesis.fit, without_effect(hypothesis, effect, target)
+        whitened = replace(target, noise=fit.noise) if has_noise_model else target
+        # Without a noise model there is one effect; otherwise all effects of a fit have the same surrogates.
+        surrogates = surrogates or draw_noise(fit if has_noise_model else without.fit, whitened)
         gain = without.cost - hypothesis.cost + bic_penalty(effect, fit)
         if gain <= compute_chance_gain(fit, without.fit, effect, whitened, len(effects), surrogates):
             hypothesis, surrogates = without, []

@@ -116,7 +116,10 @@ class OdeSimulator:
         if force is None or not force.rate:
             return input_coordinate(context, output)
         expressions = Symbol(force.coordinate), force.drive
-        parts = [self.simulate_nominal(part, expressions) for part in context.split()]
+        parts = [
+            self.for_samples(*ends).simulate_nominal(part, expressions)
+            for ends, part in zip(context.bounds, context.split(), strict=True)
+        ]
         coordinate, drive = np.concatenate(parts, axis=1)
         unit = {each.name: each.unit for each in self.system.states}.get(force.coordinate) or "1"
         given, peak = force.unit or context.input_unit, peak_amplitude(drive)
@@ -144,7 +147,8 @@ class OdeSimulator:
         laws = runs[0].forces if self._has_force_equation else ()
         program = self._get_program(active, has_factor, tuple(law for law, _ in laws))
         if self.shots is None:
-            outputs = self._run(program, active, runs, context, every=every)[:, 0]
+            lanes = self._make_lanes(program, active, runs, context)
+            outputs = self._integrate(program, lanes, context, every)[:, 0]
         else:
             outputs = self._fit_shots(self.shots, program, active, runs, context)[:, ::every]
         if not self._has_force_equation and runs[0].forces:
@@ -161,7 +165,8 @@ class OdeSimulator:
         """Simulate expressions of the system at its nominal values, shape (expressions, samples)."""
         nominal = np.array([each.nominal for each in self.parameters])
         program = generate_program(self.system, outputs)
-        return self._run(program, (), [SimulationRun(nominal, context.u, {}, ())], context)[0]
+        lanes = self._make_lanes(program, (), [SimulationRun(nominal, context.u, {}, ())], context)
+        return self._integrate(program, lanes, context)[0]
 
     def _fit_shots(
         self,
@@ -174,10 +179,11 @@ class OdeSimulator:
         """Simulate runs with fitted states at each shooting interval; between samples outputs are held."""
         steps = runs[0].x.size // shots.measured.size
         sizes = {each.name: self.sizes[each.name] for each in self.system.states if not each.fixed}
+        lanes = self._make_lanes(program, active, runs, context)
 
         def simulate(asked: Sequence[tuple[int, Mapping[str, Signal]]]) -> Signal:
-            starts = [states for _, states in asked]
-            return self._run(program, active, [runs[run] for run, _ in asked], context, starts, steps)[:, 0]
+            restarted = [replace(lanes[run], restarts=states) for run, states in asked]
+            return self._integrate(program, restarted, context, steps)[:, 0]
 
         fitted = shots.fit_states(simulate, len(runs), shots.get_starts(self.initial), sizes)
         return np.repeat(fitted, steps, axis=1)
@@ -188,7 +194,7 @@ class OdeSimulator:
 
     def _is_term(self, law: ForceLaw) -> bool:
         """Whether a force law becomes a term of the equations; otherwise it is called."""
-        return bool(law.equation) and not (law.state_derivative and not law.state_equation)
+        return bool(law.equation and (law.state_equation or not law.state_derivative))
 
     def _get_program(
         self, active: tuple[OdeEffect, ...], has_factor: bool, laws: tuple[ForceLaw, ...]
@@ -205,20 +211,13 @@ class OdeSimulator:
             self._programs[key] = generate_program(system, laws=calls)
         return self._programs[key]
 
-    def _run(
-        self,
-        program: OdeProgram,
-        active: tuple[OdeEffect, ...],
-        runs: Sequence[SimulationRun],
-        context: SimulationContext,
-        starts: Sequence[Mapping[str, Signal]] | None = None,
-        every: int = 1,
+    def _integrate(
+        self, program: OdeProgram, lanes: Sequence[LaneInput], context: SimulationContext, every: int = 1
     ) -> Signal:
         steps, interval = max(self.system.steps, 1), 0
         if self.shots is not None:
-            interval = self.shots.interval * steps * (runs[0].x.size // self.shots.measured.size)
-            starts = starts or [self.shots.get_starts(self.initial)] * len(runs)
-        lanes = self._make_lanes(program, active, runs, context, starts)
+            samples = lanes[0].signals[self.system.input].start.size
+            interval = self.shots.interval * (samples // self.shots.measured.size)
         dt = context.dt / steps
         return self._simulate_lanes(program, context.start_time, dt, lanes, interval, every * steps)
 
@@ -240,8 +239,8 @@ class OdeSimulator:
         active: tuple[OdeEffect, ...],
         runs: Sequence[SimulationRun],
         context: SimulationContext,
-        starts: Sequence[Mapping[str, Signal]] | None = None,
     ) -> list[LaneInput]:
+        starts = self.shots.get_starts(self.initial) if self.shots else None
         steps, samples = max(self.system.steps, 1), runs[0].x.size
         common = make_time(context.start_time, samples, context.dt) if Symbol(TIME) in program.signals else {}
         common |= sample_channels(context, self.channels, samples, is_held=not self.is_continuous_time)
@@ -250,7 +249,7 @@ class OdeSimulator:
         names = [each.name for each in self.parameters]
         fixed = {each.name: each.value for each in self.system.parameters}
         lanes = []
-        for index, run in enumerate(runs):
+        for run in runs:
             effects = run.effect_parameters
             gain = gain_over_time(effects, context)
             signals = dict(common)
@@ -277,7 +276,7 @@ class OdeSimulator:
                     signals,
                     pack_force_laws(calls, context, balance=True) if calls else None,
                     *find_limits(self.system, effects),
-                    starts[index] if starts else None,
+                    starts,
                 )
             )
         return lanes

@@ -26,13 +26,14 @@ from islands.systems.ode.kernel_arguments import (
 )
 from islands.systems.ode.native_generator import FUNCTION, NativeGenerator, ProgramCode
 
-#: Interpreted steps after which a program is compiled: they take as long as the compilation.
-COMPILED_FROM_STEPS = 100_000
+#: Interpreted instructions, once per step, after which a program is compiled: they take as long as the
+#: compilation.
+COMPILED_FROM = 1_500_000
 
 #: Largest number of instructions of a compiled program; the time of a compilation grows with it.
 MAX_INSTRUCTIONS = 300
 
-#: Number of programs whose steps are counted, and of those whose machine code is kept, about 1 MB each.
+#: Number of programs whose instructions are counted, and of those with machine code, about 1 MB each.
 _COUNTED, _KEPT = 256, 64
 
 _counts: OrderedDict[ProgramCode, int] = OrderedDict()
@@ -88,7 +89,7 @@ class NativeCode:
 def find_native_code(
     instructions: Instructions, signals: LaneSignals, limits: LaneLimits, restarts: LaneRestarts
 ) -> NativeCode | None:
-    """Return the machine code of a program that runs often, and count the steps of others."""
+    """Return the machine code of a program that runs often, and count the instructions of others."""
     if not _is_supported(instructions):
         return None
     program = ProgramCode(
@@ -104,11 +105,11 @@ def find_native_code(
         restarted=restarts.states.shape[1] // LANES,
     )
     with _lock:
-        steps = _counts.pop(program, 0)
-        _counts[program] = steps + signals.shared.shape[0]
+        executed = _counts.pop(program, 0)
+        _counts[program] = executed + signals.shared.shape[0] * len(instructions.code)
         while len(_counts) > _COUNTED:
             _counts.popitem(last=False)
-        return _compile(program) if steps >= COMPILED_FROM_STEPS else None
+        return _compile(program) if executed >= COMPILED_FROM else None
 
 
 def _is_supported(instructions: Instructions) -> bool:

@@ -56,9 +56,9 @@ def simulate_natively(
     program: OdeProgram, lanes: list[LaneInput], monkeypatch: pytest.MonkeyPatch, interval: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return outputs of the interpreter and of machine code."""
-    monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", np.inf)
+    monkeypatch.setattr(native_code, "COMPILED_FROM", np.inf)
     interpreted = simulate_lanes(program, DT, lanes, interval)
-    monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", 0)
+    monkeypatch.setattr(native_code, "COMPILED_FROM", 0)
     return interpreted, simulate_lanes(program, DT, lanes, interval)
 
 
@@ -106,7 +106,7 @@ def test_restarted_runs_have_the_bits_of_the_interpreter(
 
 
 def test_functions_of_the_library_remain_interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", 0)
+    monkeypatch.setattr(native_code, "COMPILED_FROM", 0)
     monkeypatch.setattr(native_code, "_compile", pytest.fail)
     system = make_system(
         {"name": "s", "input": "F", "equations": "dx/dt = F - atan(x)", "output": "x", "states": {"x": {}}}
@@ -116,14 +116,14 @@ def test_functions_of_the_library_remain_interpreted(monkeypatch: pytest.MonkeyP
 
 
 def test_program_is_compiled_once_it_has_run_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(native_code, "COMPILED_FROM_STEPS", 3 * SAMPLES)
+    program = generate_program(make_system(ARITHMETIC))
+    monkeypatch.setattr(native_code, "COMPILED_FROM", 3 * SAMPLES * len(program.instructions.code))
     monkeypatch.setattr(native_code, "_counts", type(native_code._counts)())
     calls: list[int] = []
     run = native_code.NativeCode.integrate
     monkeypatch.setattr(
         native_code.NativeCode, "integrate", lambda *given: (calls.append(len(calls)), run(*given))[1]
     )
-    program = generate_program(make_system(ARITHMETIC))
     found = [simulate_lanes(program, DT, [motion(1)]).tobytes() for _ in range(5)]
     assert len(calls) == 2
     assert len(set(found)) == 1
