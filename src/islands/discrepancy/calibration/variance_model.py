@@ -43,16 +43,17 @@ class VarianceModel:
     scale: Signal
 
 
-def fit_variance_model(innovations: Signal, y: Signal) -> VarianceModel:
+def fit_variance_model(innovations: Signal, output: Signal) -> VarianceModel:
     """Fit the variance of innovations (Davidian and Carroll, Variance function estimation, 1987).
 
     Parameters
     ----------
-    innovations, y : ndarray, shape (samples,)
-        Whitened residual, and the measured output at the same samples.
+    innovations, output : ndarray, shape (samples,)
+        Whitened residual, and the simulated output at the same samples. The measured output contains the
+        noise, so that large values of one are large values of the other.
     """
     n = innovations.size
-    size = np.abs(y) / max(float(np.max(np.abs(y))), np.finfo(float).tiny)
+    size = np.abs(output) / max(float(np.max(np.abs(output))), np.finfo(float).tiny)
     strength, strength_gain = _fit_strength(innovations, size)
     scale = 1.0 + strength * size
     part = np.arange(n) * PARTS // n

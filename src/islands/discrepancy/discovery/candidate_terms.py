@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from islands.discrepancy.discovery.term_unit import divide_units, find_expression_unit, find_factor_unit
 from islands.systems.ode.equation_parser import TIME, parse_expression
 from islands.systems.ode.ode_expression import (
     FMU,
@@ -58,12 +59,16 @@ class CandidateTerm:
         Typical largest value of the expression.
     scale : float or None
         Nominal scale; None if the expression has none.
+    unit, scale_unit : str
+        Units of the coefficient and of the scale; empty if they are not known.
     """
 
     target: str
     text: str
     size: float
     scale: float | None = None
+    unit: str = ""
+    scale_unit: str = ""
 
     @property
     def value_count(self) -> int:
@@ -85,12 +90,14 @@ class CandidateTerm:
             Largest absolute value of the right-hand side, for the bounds of the coefficient.
         """
         coefficient, *scales = self.name_parameters(number)
-        unit = target_size / self.size
+        size = target_size / self.size
         # The typical change of a parameter is relative to its nominal value, which is therefore not zero.
         parameters = [
-            OdeParameter(coefficient, NOMINAL * unit, lower=-LIMIT * unit, upper=LIMIT * unit),
+            OdeParameter(coefficient, NOMINAL * size, self.unit, lower=-LIMIT * size, upper=LIMIT * size),
         ]
-        parameters += [OdeParameter(name, self.scale) for name in scales if self.scale is not None]
+        parameters += [
+            OdeParameter(name, self.scale, self.scale_unit) for name in scales if self.scale is not None
+        ]
         text = self.text.format(scale="".join(scales))
         return system.with_term(self.target, f"{coefficient}*({text})", parameters)
 
@@ -103,7 +110,7 @@ def find_free_numbers(system: OdeSystem, count: int) -> list[int]:
 
 
 def list_candidate_terms(
-    system: OdeSystem, sizes: Mapping[str, float], duration: float
+    system: OdeSystem, sizes: Mapping[str, float], duration: float, units: Mapping[str, str]
 ) -> tuple[CandidateTerm, ...]:
     """Return the candidate terms of a system.
 
@@ -115,24 +122,29 @@ def list_candidate_terms(
         Largest absolute values of the states, of the input, and of its rate (``rate(u)``).
     duration : float
         Duration of the record in seconds.
+    units : mapping
+        Units of the states, of the input, and of the output (``output``); empty if they are not known.
     """
     states = [name for name, _ in system.derivatives]
     # Only the output can depend on the output of an FMU, which is computed once for each sample.
     outputs = [f"{FMU}({name})" for name in system.of_fmu if name not in states]
     rate = f"rate({system.input})"
-    values = {**sizes, TIME: duration}
+    values, units = {**sizes, TIME: duration}, {**units, TIME: "s"}
     terms = []
     for target in (*system.balances, OUTPUT):
         own = system.output if target == OUTPUT else dict(system.derivatives)[target]
+        unit = units.get(target, "") if target == OUTPUT else divide_units(units.get(target, ""), "s")
         signals = [*states, *(outputs if target == OUTPUT else ()), system.input]
         for text in dict.fromkeys(_list_texts(signals, rate)):
             expression = parse_expression(text)
             if render(expression) == render(own):
                 continue
-            terms.append(CandidateTerm(target, text, _compute_size(expression, values)))
+            size, own_unit = _compute_size(expression, values), find_factor_unit(unit, expression, units)
+            terms.append(CandidateTerm(target, text, size, unit=own_unit))
         for signal in signals:
-            scale = NOMINAL_SCALE * sizes[signal]
-            terms.append(CandidateTerm(target, SATURATION.format(signal=signal, scale="{scale}"), 1.0, scale))
+            text, scale = SATURATION.format(signal=signal, scale="{scale}"), NOMINAL_SCALE * sizes[signal]
+            scale_unit = find_expression_unit(parse_expression(signal), units)
+            terms.append(CandidateTerm(target, text, 1.0, scale, unit, scale_unit))
     return tuple(terms)
 
 

@@ -158,7 +158,8 @@ def describe_terms(
         values = {}
         for name in each.parameters:
             value, half = float(fit.values[places[name]]), 1.96 * float(deviations[places[name]])
-            values[name] = Value(value, "", (value - half, value + half))
+            unit = fit.simulation.parameters[places[name]].unit
+            values[name] = Value(value, unit, (value - half, value + half))
         share = explained_fraction(base, fit, floor)
         findings.append(Finding(MISSING_TERM, FAMILY, confidence, (), values, each.gain, share))
     return tuple(findings)

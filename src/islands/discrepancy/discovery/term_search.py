@@ -95,11 +95,12 @@ class TermSearchResult:
             f"{target if target == OUTPUT else f'd{target}/dt'} = {render(right_sides[target])}"
             for target in changed
         ]
-        new = [name for each in self.terms for name in each.parameters]
-        values = dict(
-            zip((each.name for each in self.fit.simulation.parameters), self.fit.values, strict=True)
-        )
-        return "; ".join([*lines, ", ".join(f"{name} = {values[name]:.4g}" for name in new)])
+        values = {
+            parameter.name: f"{parameter.name} = {value:.4g} {parameter.unit}".rstrip()
+            for parameter, value in zip(self.fit.simulation.parameters, self.fit.values, strict=True)
+        }
+        new = [values[name] for each in self.terms for name in each.parameters]
+        return "; ".join([*lines, ", ".join(new)])
 
 
 def search_terms(
@@ -127,7 +128,9 @@ def search_terms(
     system = equations.system
     rate = peak_amplitude(context.take_differences(context.u)) / context.dt
     sizes = {**equations.sizes, system.input: context.input_peak, f"rate({system.input})": rate}
-    candidates = list_candidate_terms(system, sizes, context.duration)
+    units = {each.name: each.unit for each in system.states}
+    units |= {system.input: context.input_unit, OUTPUT: context.output_unit}
+    candidates = list_candidate_terms(system, sizes, context.duration, units)
     target_sizes = {
         OUTPUT: context.output_peak,
         **{name: sizes[f"d{name}/dt"] for name, _ in system.derivatives},

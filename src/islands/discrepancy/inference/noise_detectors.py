@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from islands.data.channel_names import simplify_unit
 from islands.discrepancy.calibration.noise_model import fit_noise
@@ -139,24 +138,23 @@ _OUTLIER_DISTANCE = 5.5
 _MIN_OUTLIERS = 3
 
 
-def _whiten(residual: Signal, context: SimulationContext) -> tuple[Signal, NDArray[np.bool_]]:
-    """Return the whitened residual, and a mask without the first samples of recordings after the first one.
+def _whiten(y: Signal, residual: Signal, context: SimulationContext) -> tuple[Signal, Signal]:
+    """Return the whitened residual, and the simulated output at the same samples.
 
-    The filter starts at rest, so that these samples are not innovations. Those of a single recording are too
-    few to matter.
+    The first samples of recordings after the first one are left out: the filter starts at rest, so that they
+    are not innovations. Those of a single recording are too few to matter.
     """
     noise = fit_noise(residual, segments=context.segments)
     is_innovation = np.ones(residual.size, dtype=bool)
     for first, _ in find_bounds(context.segments, residual.size)[1:]:
         is_innovation[first : first + noise.order] = False
-    return noise.whiten(residual, context.segments), is_innovation
+    return noise.whiten(residual, context.segments)[is_innovation], (y - residual)[is_innovation]
 
 
 def _detect_outliers(y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
-    whitened, is_innovation = _whiten(residual, context)
-    whitened = whitened[is_innovation]
+    whitened, output = _whiten(y, residual, context)
     # Noise that is large at times is no series of outliers.
-    scale = fit_variance_model(whitened, y[is_innovation]).scale
+    scale = fit_variance_model(whitened, output).scale
     standardised = whitened / scale
     robust = float(np.median(np.abs(standardised - np.median(standardised)))) / MAD
     if robust == 0.0:
@@ -187,11 +185,11 @@ OUTLIERS = NoiseDetector(
 def _detect_heteroscedastic_noise(
     y: Signal, residual: Signal, context: SimulationContext
 ) -> NoiseFinding | None:
-    whitened, is_innovation = _whiten(residual, context)
-    found = fit_variance_model(whitened[is_innovation], y[is_innovation])
+    whitened, output = _whiten(y, residual, context)
+    found = fit_variance_model(whitened, output)
     if found.strength_gain <= 0.0:
         return None
-    strength = found.strength / float(np.max(np.abs(y[is_innovation])))
+    strength = found.strength / float(np.max(np.abs(output)))
     return NoiseFinding({"k": (strength, simplify_unit(f"1/{context.output_unit}"))}, found.strength_gain)
 
 
@@ -208,8 +206,7 @@ HETEROSCEDASTIC_NOISE = NoiseDetector(
 
 
 def _detect_changing_noise(y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
-    whitened, is_innovation = _whiten(residual, context)
-    found = fit_variance_model(whitened[is_innovation], y[is_innovation])
+    found = fit_variance_model(*_whiten(y, residual, context))
     if found.levels_gain <= 0.0:
         return None
     ratio = float(np.max(found.levels) / np.min(found.levels))

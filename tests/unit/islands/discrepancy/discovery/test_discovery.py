@@ -131,7 +131,7 @@ def test_definition_of_a_rate_gets_no_terms() -> None:
         OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), simulate(LAWS["product"][0])
     )
     sizes = {"x": 1.0, "v": 2.0, "F": 3.0, "rate(F)": 4.0}
-    terms = list_candidate_terms(simulator.system, sizes, 10.0)  # type: ignore[attr-defined]
+    terms = list_candidate_terms(simulator.system, sizes, 10.0, {})  # type: ignore[attr-defined]
     assert {each.target for each in terms} == {"v", "output"}
     assert len({(each.target, each.text) for each in terms}) == len(terms)
     assert {each.size for each in terms if each.text == "x**2*v"} == {2.0}
@@ -143,7 +143,7 @@ def test_many_signals_have_no_products() -> None:
     document = {**DOCUMENT, "equations": equations, "parameters": {"c": 1.0}, "states": {}, "output": "x0"}
     system = OdeSpec.model_validate({"kind": "ode", **document, "force": None}).make_system()
     sizes = {**dict.fromkeys([*names, "F"], 1.0), "rate(F)": 1.0}
-    texts = {each.text for each in list_candidate_terms(system, sizes, 10.0)}
+    texts = {each.text for each in list_candidate_terms(system, sizes, 10.0, {})}
     assert {"x0**2", "t*x7", "rate(F)*x3"} < texts
     assert not any("x0*x1" in text for text in texts)
 
