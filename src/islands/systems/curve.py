@@ -1,11 +1,16 @@
 """Curve through equally spaced values, a cubic between neighbours (Catmull and Rom, 1974)."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.kernels.jit_cache import kernel
 
 #: Number of values of a curve between the ends of its range, where it is zero.
 VALUES = 7
+
+#: Places of the values of a curve in its range. The straight line through its ends is a gain and an offset,
+#: which are not part of the curve (terminal-based linearity).
+PLACES = np.linspace(-1.0, 1.0, VALUES + 2)[1:-1]
 
 
 @kernel(inline="always")
@@ -37,6 +42,36 @@ def interpolate(place, values):
         + f * f * (3.0 - 2.0 * f) * right
         - f * f * (1.0 - f) * last
     )
+
+
+def write_curve(place: str) -> str:
+    """Write a curve as an expression: a sum of cubics, each from one value on.
+
+    Parameters
+    ----------
+    place : str
+        Expression of the place in the range from -1 to 1. The values are ``n0``, ``n1``, and so on.
+    """
+    # Each row has the weights of all values: a value, its neighbours, and the slopes and cubics between them.
+    heights = np.zeros((VALUES + 4, VALUES))
+    heights[2:-2] = np.eye(VALUES)
+    heights[0], heights[-1] = heights[3] - 3.0 * heights[2], heights[-4] - 3.0 * heights[-3]
+    slopes, rises = 0.5 * (heights[2:] - heights[:-2]), np.diff(heights[1:-1], axis=0)
+    squares = 3.0 * rises - 2.0 * slopes[:-1] - slopes[1:]
+    cubes = slopes[:-1] + slopes[1:] - 2.0 * rises
+    # The changes of both at each value; the curve begins with zero at the lower end.
+    squares[1:], cubes[1:] = np.diff(squares, axis=0) - 3.0 * cubes[:-1], np.diff(cubes, axis=0)
+
+    def weigh(row: NDArray[np.float64]) -> str:
+        terms = [f"({weight})*n{index}" for index, weight in enumerate(row) if weight]
+        return f"({' + '.join(terms) or '0'})"
+
+    position = f"min(max((({place}) + 1)*{0.5 * (VALUES + 1)}, 0), {VALUES + 1})"
+    parts = [f"{position}*{weigh(slopes[0])}"]
+    for index, (square, cube) in enumerate(zip(squares, cubes, strict=True)):
+        behind = f"max({position} - {index}, 0)"
+        parts.append(f"{behind}**2*({weigh(square)} + {behind}*{weigh(cube)})")
+    return " + ".join(parts)
 
 
 @kernel

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.discrepancy.calibration.levenberg_marquardt import estimate_deviations
-from islands.discrepancy.effects.free_forms import PLACES, RATE_RANGE
+from islands.discrepancy.effects.free_forms import RATE_RANGE
 from islands.discrepancy.inference.strategies import SearchOutcome
 from islands.discrepancy.interfaces.context import Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.force import ForceLaw
+from islands.systems.curve import PLACES
 
 #: Places of the curve of a named effect, relative to the range of its signal; every thirtieth is in `PLACES`.
 GRID = np.linspace(-1.0, 1.0, 241)

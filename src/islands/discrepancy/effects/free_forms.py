@@ -12,12 +12,8 @@ import numpy as np
 from islands.discrepancy.effects.filters import low_pass
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Map, Signal, SimulationContext, Site
-from islands.systems.curve import VALUES, interpolate, interpolate_curve
+from islands.systems.curve import PLACES, VALUES, interpolate, interpolate_curve, write_curve
 from islands.systems.hysteresis_operators import play_from
-
-#: Places of the values of a curve, relative to the peak of its signal. The straight line through its ends is
-#: a gain and an offset, which are not part of the curve (terminal-based linearity).
-PLACES = np.linspace(-1.0, 1.0, VALUES + 2)[1:-1]
 
 #: Range of the rates of a damping curve, relative to the typical rate.
 RATE_RANGE = 3.0
@@ -210,6 +206,7 @@ FREE_FORMS: tuple[Effect, ...] = (
             _damping_force,
             constants=lambda context: (RATE_RANGE * context.force_coordinate.rate,),
             is_dissipative=True,
+            equation=write_curve(f"v/n{VALUES}"),
         ),
         _CURVE,
         _DAMPING,
@@ -224,7 +221,11 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any force that depends on the coordinate: a curve through seven values",
         "shape",
         Site.FORCE,
-        ForceLaw(_stiffness_force, constants=lambda context: (context.force_coordinate.peak,)),
+        ForceLaw(
+            _stiffness_force,
+            constants=lambda context: (context.force_coordinate.peak,),
+            equation=write_curve(f"x/n{VALUES}"),
+        ),
         _CURVE,
         _STATIC,
         "cubic-stiffness, even-nonlinearity, input-curve",

@@ -77,7 +77,6 @@ class FmuSimulator(OdeSimulator):
         start_time: float,
         dt: float,
         lanes: Sequence[LaneInput],
-        _interval: int,
         every: int,
     ) -> Signal:
         fmu = load_fmu(self.model.description)

@@ -20,7 +20,7 @@ from islands.discrepancy.simulators.ode_effects import (
     list_values,
 )
 from islands.discrepancy.simulators.record_channels import sample_channels
-from islands.discrepancy.simulators.shooting import Shots
+from islands.discrepancy.simulators.shooting import Shots, ShotSimulation
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.lane_simulation import (
     LaneInput,
@@ -166,7 +166,9 @@ class OdeSimulator:
         nominal = np.array([each.nominal for each in self.parameters])
         program = generate_program(self.system, outputs)
         lanes = self._make_lanes(program, (), [SimulationRun(nominal, context.u, {}, ())], context)
-        return self._integrate(program, lanes, context)[0]
+        if self.shots is None:
+            return self._integrate(program, lanes, context)[0]
+        return self._restart(self.shots, program, lanes, context, 1).simulate_starts()[0]
 
     def _fit_shots(
         self,
@@ -177,16 +179,22 @@ class OdeSimulator:
         context: SimulationContext,
     ) -> Signal:
         """Simulate runs with fitted states at each shooting interval; between samples outputs are held."""
-        steps = runs[0].x.size // shots.measured.size
-        sizes = {each.name: self.sizes[each.name] for each in self.system.states if not each.fixed}
+        oversampling = runs[0].x.size // shots.measured.size
         lanes = self._make_lanes(program, active, runs, context)
+        sizes = {each.name: self.sizes[each.name] for each in self.system.states if not each.fixed}
+        fitted = self._restart(shots, program, lanes, context, oversampling).fit_states(sizes)
+        return np.repeat(fitted, oversampling, axis=1)
 
-        def simulate(asked: Sequence[tuple[int, Mapping[str, Signal]]]) -> Signal:
-            restarted = [replace(lanes[run], restarts=states) for run, states in asked]
-            return self._integrate(program, restarted, context, steps)[:, 0]
-
-        fitted = shots.fit_states(simulate, len(runs), shots.get_starts(self.initial), sizes)
-        return np.repeat(fitted, steps, axis=1)
+    def _restart(
+        self,
+        shots: Shots,
+        program: OdeProgram,
+        lanes: Sequence[LaneInput],
+        context: SimulationContext,
+        oversampling: int,
+    ) -> ShotSimulation:
+        steps = max(self.system.steps, 1)
+        return shots.make_simulation(program, context.dt / steps, lanes, self.initial, oversampling * steps)
 
     def for_samples(self, first: int, last: int) -> "OdeSimulator":
         """Return the simulator of one recording."""
@@ -214,12 +222,8 @@ class OdeSimulator:
     def _integrate(
         self, program: OdeProgram, lanes: Sequence[LaneInput], context: SimulationContext, every: int = 1
     ) -> Signal:
-        steps, interval = max(self.system.steps, 1), 0
-        if self.shots is not None:
-            samples = lanes[0].signals[self.system.input].start.size
-            interval = self.shots.interval * (samples // self.shots.measured.size)
-        dt = context.dt / steps
-        return self._simulate_lanes(program, context.start_time, dt, lanes, interval, every * steps)
+        steps = max(self.system.steps, 1)
+        return self._simulate_lanes(program, context.start_time, context.dt / steps, lanes, every * steps)
 
     def _simulate_lanes(
         self,
@@ -227,11 +231,10 @@ class OdeSimulator:
         _start_time: float,
         dt: float,
         lanes: Sequence[LaneInput],
-        interval: int,
         every: int,
     ) -> Signal:
         """Simulate the outputs of a program, shape (lanes, outputs, samples)."""
-        return simulate_lanes(program, dt, lanes, interval, every)
+        return simulate_lanes(program, dt, lanes, every)
 
     def _make_lanes(
         self,
@@ -240,7 +243,6 @@ class OdeSimulator:
         runs: Sequence[SimulationRun],
         context: SimulationContext,
     ) -> list[LaneInput]:
-        starts = self.shots.get_starts(self.initial) if self.shots else None
         steps, samples = max(self.system.steps, 1), runs[0].x.size
         common = make_time(context.start_time, samples, context.dt) if Symbol(TIME) in program.signals else {}
         common |= sample_channels(context, self.channels, samples, is_held=not self.is_continuous_time)
@@ -276,7 +278,6 @@ class OdeSimulator:
                     signals,
                     pack_force_laws(calls, context, balance=True) if calls else None,
                     *find_limits(self.system, effects),
-                    starts,
                 )
             )
         return lanes

@@ -4,7 +4,7 @@ After Bock, with the states eliminated: they are fitted within each simulation b
 intervals at once, since the states of one interval do not affect the others.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,10 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.segments import map_segments
 from islands.errors import RecordError
+from islands.systems.ode.interval_simulation import IntervalSimulation
+from islands.systems.ode.lane_simulation import LaneInput
 from islands.systems.ode.ode_expression import Symbol
+from islands.systems.ode.ode_program import OdeProgram
 from islands.systems.ode.ode_system import OdeSystem
 
 #: Smallest number of samples in a shooting interval.
@@ -30,17 +33,21 @@ SMOOTHING_WINDOW = 9
 #: Change of a state for its response, relative to its size.
 _STEP = 1e-4
 
-#: Number of Gauss-Newton steps.
+#: Maximum number of Gauss-Newton steps.
 _ITERATIONS = 3
 
 #: Lengths of each step that are tried in each interval.
 _STEP_LENGTHS = (1.0, 0.4, 0.15)
 
+#: Part of the promised decrease at which no shorter step is tried.
+_SUFFICIENT_DECREASE = 0.5
+
+#: Least promised decrease of the sum of squares of an interval for another step, relative to their mean. The
+#: outputs for finite differences must not depend on the number of steps.
+_MIN_DECREASE = 1e-8
+
 #: Responses whose energy in other directions is a smaller part are not distinguished.
 _RANK_TOLERANCE = 1e-12
-
-#: Simulates one output, shape (samples,), for each index of a run and its states at the intervals by name.
-SimulateShots = Callable[[Sequence[tuple[int, Mapping[str, Signal]]]], Signal]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,67 +73,138 @@ class Shots:
         guesses = {name: signal[first:last] for name, signal in self.guesses.items()}
         return Shots(self.interval, self.measured[first:last], guesses)
 
-    def get_starts(self, initial: Mapping[str, float]) -> dict[str, Signal]:
-        """Return the states at the intervals before they are fitted; by default the initial ones."""
-        count = -(-self.measured.size // self.interval)
-        return {
-            name: self.guesses[name][:: self.interval] if name in self.guesses else np.full(count, value)
-            for name, value in initial.items()
-        }
-
-    def fit_states(
-        self, simulate: SimulateShots, runs: int, starts: Mapping[str, Signal], sizes: Mapping[str, float]
-    ) -> Signal:
-        """Fit the states of all intervals, and return the outputs, shape (runs, samples).
+    def make_simulation(
+        self,
+        program: OdeProgram,
+        dt: float,
+        lanes: Sequence[LaneInput],
+        initial: Mapping[str, float],
+        every: int,
+    ) -> "ShotSimulation":
+        """Make the simulation of lanes whose states at the intervals are the guesses, or the initial states.
 
         Parameters
         ----------
-        simulate : callable
-        runs : int
-            Number of runs, each with other parameters.
-        starts : mapping
-            States at the intervals, before they are fitted.
+        program, dt, lanes
+            As of `simulate_lanes`.
+        initial : mapping
+            States that restart, with their values at intervals without a guess.
+        every : int
+            Steps of a sample.
+        """
+        count = -(-self.measured.size // self.interval)
+        starts = {
+            name: self.guesses[name][:: self.interval]
+            if name in self.guesses
+            else np.full(count, initial[name])
+            for name in program.states
+            if name in initial
+        }
+        simulation = IntervalSimulation(program, dt, lanes, list(starts), self.interval * every, every)
+        return ShotSimulation(simulation, self.measured, self.interval, starts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShotSimulation:
+    """Simulation of lanes that restart at shooting intervals.
+
+    Attributes
+    ----------
+    simulation : IntervalSimulation
+    measured : ndarray, shape (samples,)
+    interval : int
+        Samples of an interval.
+    starts : mapping
+        States at the intervals before they are fitted, each of shape (intervals,).
+    """
+
+    simulation: IntervalSimulation
+    measured: Signal
+    interval: int
+    starts: Mapping[str, Signal]
+
+    def simulate_starts(self) -> Signal:
+        """Simulate with the states before they are fitted; return the outputs, (lanes, outputs, samples)."""
+        states = self._list_states()
+        found = self.simulation.simulate(
+            np.arange(len(states)), states, np.ones(states.shape[:2], dtype=bool)
+        )
+        return found.reshape(*found.shape[:2], -1)[..., : self.measured.size]
+
+    def _list_states(self) -> Signal:
+        """Return the states before they are fitted, shape (lanes, intervals, states)."""
+        return np.array([np.column_stack(list(self.starts.values()))] * len(self.simulation.lanes))
+
+    def fit_states(self, sizes: Mapping[str, float]) -> Signal:
+        """Fit the states of all intervals in each lane, and return the first output, shape (lanes, samples).
+
+        Parameters
+        ----------
         sizes : mapping
             Sizes of the states that are fitted.
         """
+        samples, states = self.measured.size, self._list_states()
+        lanes = np.arange(len(states))
+        measured = np.pad(self.measured, (0, -samples % self.interval)).reshape(-1, self.interval)
+        last = samples - self.interval * (len(measured) - 1)
+        moves = _STEP * np.array([[sizes[own] * (own == name) for name in self.starts] for own in sizes])
 
-        def simulate_states(points: Signal) -> Signal:
-            """Return the outputs of points, shape (points, runs, states, intervals)."""
-            asked = [
-                (run, {**starts, **dict(zip(sizes, values, strict=True))})
-                for point in points
-                for run, values in enumerate(point)
-            ]
-            return simulate(asked).reshape(len(points), runs, -1)
+        def simulate(points: Signal, is_asked: NDArray[np.bool_]) -> Signal:
+            """Simulate points of shape (points, lanes, intervals, states); NaN where nothing is asked for."""
+            runs, asked = np.tile(lanes, len(points)), np.tile(is_asked, (len(points), 1))
+            outputs = self.simulation.simulate(runs, points.reshape(-1, *states.shape[1:]), asked)[:, 0]
+            outputs[:, -1, last:] = 0.0
+            return outputs.reshape(len(points), lanes.size, *measured.shape)
 
-        place = np.arange(self.measured.size) // self.interval
-        unit = _STEP * np.array(list(sizes.values()))
-        states = np.array([[starts[name] for name in sizes]] * runs)
+        is_active = np.ones(states.shape[:2], dtype=bool)
+        y = simulate(states[None], is_active)[0]
+        error = _sum_squares(measured - y)
         for _ in range(_ITERATIONS):
-            moved = states + np.diag(unit)[:, None, :, None]
-            y, *moved_y = simulate_states(np.stack([states, *moved]))
-            responses = np.nan_to_num(np.stack(moved_y, axis=1) - y[:, None])
-            squares = _sum_intervals(responses[:, :, None] * responses[:, None], place)
-            slope = _sum_intervals(responses * np.nan_to_num(self.measured - y)[:, None], place)
-            step = unit[:, None] * np.einsum("krij,krj->rik", _invert(squares), slope)
+            responses = np.nan_to_num(simulate(states + moves[:, None, None], is_active) - y)
+            inverse = _invert(np.einsum("aril,bril->riab", responses, responses))
+            steps, promised = _find_steps(responses, inverse, measured - y)
+            first, before, is_tried = states, error, is_active
             # Where a mass sticks the response is nonlinear, and a full step may increase the error.
-            trials = np.stack([states, *(states + length * step for length in _STEP_LENGTHS)])
-            outputs = np.concatenate([y[None], simulate_states(trials[1:])])
-            errors = _sum_intervals((self.measured - outputs) ** 2, place)
-            best = np.argmin(np.nan_to_num(errors, nan=np.inf), axis=1).T
-            states = np.take_along_axis(trials, best[None, :, None], axis=0)[0]
-            y = np.take_along_axis(outputs, best[None, :, place], axis=0)[0]
-        return y
+            for length in _STEP_LENGTHS:
+                trial = first + length * (steps @ moves)
+                (output,) = simulate(trial[None], is_tried)
+                found = _sum_squares(measured - output)
+                is_better = found < error
+                states = np.where(is_better[..., None], trial, states)
+                y = np.where(is_better[..., None], output, y)
+                error = np.where(is_better, found, error)
+                is_tried = is_tried & (before - error < _SUFFICIENT_DECREASE * promised)
+            _, promised = _find_steps(responses, inverse, measured - y)
+            least = _MIN_DECREASE * np.mean(error, axis=1, keepdims=True)
+            is_active = is_active & (error < before) & (promised > least)
+        if not self.simulation.is_independent:
+            y = simulate(states[None], np.ones_like(is_active))[0]
+        return y.reshape(lanes.size, -1)[:, :samples]
 
 
-def _sum_intervals(signals: Signal, place: NDArray[np.int64]) -> Signal:
-    """Sum signals of shape (..., samples) over each interval; the intervals come first in the result."""
-    first = np.flatnonzero(np.diff(place, prepend=-1))
-    return np.moveaxis(np.add.reduceat(signals, first, axis=-1), -1, 0)
+def _sum_squares(residual: Signal) -> Signal:
+    """Return the sum of squares of each interval; infinity if it is not finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.nan_to_num(np.einsum("...l,...l", residual, residual), nan=np.inf)
+
+
+def _find_steps(responses: Signal, inverse: Signal, residual: Signal) -> tuple[Signal, Signal]:
+    """Return the Gauss-Newton step in each interval, and the decrease of the squares that it promises.
+
+    Parameters
+    ----------
+    responses : ndarray, shape (states, lanes, intervals, interval)
+    inverse : ndarray, shape (lanes, intervals, states, states)
+        Inverse of the products of responses.
+    residual : ndarray, shape (lanes, intervals, interval)
+    """
+    slope = np.einsum("aril,ril->ria", responses, np.nan_to_num(residual))
+    steps = np.einsum("riab,rib->ria", inverse, slope)
+    return steps, np.einsum("ria,ria->ri", slope, steps)
 
 
 def _invert(squares: Signal) -> Signal:
-    """Return the pseudoinverses of scaled matrices, shape (intervals, runs, states, states)."""
+    """Return the pseudoinverses of scaled matrices, shape (lanes, intervals, states, states)."""
     scale = np.sqrt(np.maximum(np.diagonal(squares, axis1=-2, axis2=-1), np.finfo(float).tiny))
     both = scale[..., :, None] * scale[..., None, :]
     return np.asarray(np.linalg.pinv(squares / both, rcond=_RANK_TOLERANCE, hermitian=True) / both)

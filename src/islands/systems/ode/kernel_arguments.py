@@ -55,8 +55,9 @@ class LaneSignals(NamedTuple):
         Signals that are equal in all lanes.
     own : ndarray, shape (samples, 3, different)
         Signals of single lanes.
-    places : ndarray of int64, shape (signals, 16)
-        Index in ``own`` of each further signal in each lane.
+    places : ndarray of int64, shape (restarts or 1, signals, 16)
+        Index in ``own``, as one row, of the first value of each further signal in each lane. If there are
+        several, each restart has its own.
     """
 
     shared: NDArray[np.float64]
@@ -97,6 +98,8 @@ class LaneLimits(NamedTuple):
 
 class LaneRestarts(NamedTuple):
     """Samples at which the first states are set to given values; the others are kept. Size 0 for none.
+
+    The first sample is one of them, and the distances between them are equal.
 
     Attributes
     ----------

@@ -17,6 +17,8 @@ from islands.systems.ode.ode_program import OdeProgram
 
 Signal = NDArray[np.float64]
 
+_NO_RESTARTS = LaneRestarts(np.empty(0, dtype=np.int64), np.empty((0, 0)))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampledSignal:
@@ -93,9 +95,6 @@ class LaneInput:
     spills : mapping
         For a state with an upper limit, the state that receives a part of what the limit cuts off, and that
         part. The receivers are the same in all lanes.
-    restarts : mapping
-        States at the first sample of each shooting interval by name, each of shape (intervals,). States that
-        are not named are kept; they follow the others.
     """
 
     parameters: Mapping[str, float]
@@ -104,11 +103,10 @@ class LaneInput:
     elements: Elements | None = None
     limits: Mapping[str, tuple[float, float]] | None = None
     spills: Mapping[str, tuple[str, float]] | None = None
-    restarts: Mapping[str, Signal] | None = None
 
 
 def simulate_lanes(
-    program: OdeProgram, dt: float, lanes: Sequence[LaneInput], interval: int = 0, every: int = 1
+    program: OdeProgram, dt: float, lanes: Sequence[LaneInput], every: int = 1
 ) -> NDArray[np.float64]:
     """Simulate a system, `LANES` at a time.
 
@@ -119,8 +117,6 @@ def simulate_lanes(
         Step in seconds, one per sample.
     lanes : sequence of LaneInput
         All have the same force laws.
-    interval : int
-        Steps of a shooting interval; 0 for none.
     every : int
         The outputs have one sample of ``every`` successive ones, the first.
 
@@ -134,20 +130,48 @@ def simulate_lanes(
     out = np.empty((-(-samples // every), program.instructions.outputs.size, -(-len(lanes) // LANES) * LANES))
     for first in range(0, len(lanes), LANES):
         group = lanes[first : first + LANES]
-        full = [*group, *[group[0]] * (LANES - len(group))]
-        signals, order = pack_signals(program.signals, dt, full)
-        instructions = program.instructions._replace(signals=program.instructions.signals[order])
-        arena, limits = pack_arena(program, full), pack_limits(program.states, full)
-        restarts = _pack_restarts(program.states, full, samples, interval)
-        if native := find_native_code(instructions, signals, limits, restarts):
-            native.integrate(arena, signals, dt, limits, restarts, len(group), first, every, out)
-            continue
-        integrate(
-            *(instructions, arena, signals, dt, limits, restarts, pack_elements(full)),
-            *(len(group), first, every, out),
-        )
+        signals, order = pack_signals(program.signals, dt, fill_group(group))
+        integrate_group(program, group, signals, order, _NO_RESTARTS, dt, first, every, out)
     found: NDArray[np.float64] = out.transpose(2, 1, 0)[: len(lanes)]
     return found
+
+
+def fill_group(lanes: Sequence[LaneInput]) -> list[LaneInput]:
+    """Return `LANES` lanes: the given ones, then the first one again."""
+    return [*lanes, *[lanes[0]] * (LANES - len(lanes))]
+
+
+def integrate_group(
+    program: OdeProgram,
+    group: Sequence[LaneInput],
+    signals: LaneSignals,
+    order: NDArray[np.int64],
+    restarts: LaneRestarts,
+    dt: float,
+    first: int,
+    every: int,
+    out: NDArray[np.float64],
+) -> None:
+    """Simulate up to `LANES` lanes, as machine code if the program runs often.
+
+    Parameters
+    ----------
+    signals, order
+        As of `pack_signals`.
+    restarts : LaneRestarts
+    first : int
+        Place of the first lane in ``out``.
+    out : ndarray, shape (samples, outputs, lanes)
+        Receives the outputs.
+    """
+    instructions = program.instructions._replace(signals=program.instructions.signals[order])
+    full = fill_group(group)
+    arena, limits = pack_arena(program, full), pack_limits(program.states, full)
+    if native := find_native_code(instructions, signals, limits, restarts):
+        native.integrate(arena, signals, dt, limits, restarts, len(group), first, every, out)
+        return
+    laws = pack_elements(full)
+    integrate(instructions, arena, signals, dt, limits, restarts, laws, len(group), first, every, out)
 
 
 def pack_arena(program: OdeProgram, lanes: Sequence[LaneInput]) -> NDArray[np.float64]:
@@ -178,7 +202,7 @@ def pack_signals(
     shared, own, places = list[SampledSignal](), list[SampledSignal](), list[list[int]]()
     shared_order, own_order = list[int](), list[int]()
     for index, expression in enumerate(expressions):
-        found = [_make_signal(expression, dt, lane, made) for lane in lanes]
+        found = [make_signal(expression, dt, lane, made) for lane in lanes]
         different = {id(each): each for each in found}
         if len(different) == 1:
             shared.append(found[0])
@@ -189,14 +213,14 @@ def pack_signals(
             places.append([place[id(each)] for each in found])
             own_order.append(index)
     signals = LaneSignals(
-        _stack(shared, samples),
-        _stack(own, samples),
-        np.array(places, dtype=np.int64).reshape(-1, len(lanes)),
+        stack_signals(shared, samples),
+        stack_signals(own, samples),
+        np.array(places, dtype=np.int64).reshape(1, -1, len(lanes)),
     )
     return signals, np.array([*shared_order, *own_order], dtype=np.int64)
 
 
-def _stack(signals: Sequence[SampledSignal], samples: int) -> NDArray[np.float64]:
+def stack_signals(signals: Sequence[SampledSignal], samples: int) -> NDArray[np.float64]:
     """Return signals as one array, shape (samples, 3, signals)."""
     stacked = np.empty((samples, 3, len(signals)))
     for index, signal in enumerate(signals):
@@ -208,9 +232,10 @@ def _stack(signals: Sequence[SampledSignal], samples: int) -> NDArray[np.float64
     return stacked
 
 
-def _make_signal(
+def make_signal(
     expression: OdeExpression, dt: float, lane: LaneInput, made: dict[tuple[object, ...], SampledSignal]
 ) -> SampledSignal:
+    """Return a signal of a lane; ``made`` keeps those that are computed, for lanes with the same ones."""
     match expression:
         case Symbol(name):
             return lane.signals[name]
@@ -245,17 +270,6 @@ def pack_limits(states: Sequence[str], lanes: Sequence[LaneInput]) -> LaneLimits
             receivers[states.index(name)] = states.index(receiver)
     caught = [[(lane.spills or {}).get(name, ("", 0.0))[1] for lane in lanes] for name in states]
     return LaneLimits(lower, upper, receivers, np.array(caught).reshape(-1))
-
-
-def _pack_restarts(
-    states: Sequence[str], lanes: Sequence[LaneInput], samples: int, interval: int
-) -> LaneRestarts:
-    if not interval:
-        return LaneRestarts(np.empty(0, dtype=np.int64), np.empty((0, 0)))
-    restarted = [name for name in states if name in (lanes[0].restarts or {})]
-    values = [[(lane.restarts or {})[name] for lane in lanes] for name in restarted]
-    first = np.arange(0, samples, interval, dtype=np.int64)
-    return LaneRestarts(first, np.ascontiguousarray(np.array(values).reshape(-1, first.size).T))
 
 
 def pack_elements(lanes: Sequence[LaneInput]) -> LaneForces:

@@ -82,8 +82,9 @@ class NativeCode:
         interval = int(restarts.samples[1]) if restarts.samples.size > 1 else samples
         sizes = samples, every, interval, signals.own.shape[2], out.shape[2]
         self._function(*sizes, dt, *(each.ctypes.data for each in arrays))
-        is_finite = np.isfinite(arena.reshape(-1, LANES)[self._states, :lanes]).all(axis=0)
-        out[:, :, first : first + lanes][:, :, ~is_finite] = np.nan
+        if not restarts.samples.size:
+            is_finite = np.isfinite(arena.reshape(-1, LANES)[self._states, :lanes]).all(axis=0)
+            out[:, :, first : first + lanes][:, :, ~is_finite] = np.nan
 
 
 def find_native_code(
@@ -103,6 +104,7 @@ def find_native_code(
         receivers=tuple(limits.receivers.tolist()) if limits.lower.size else None,
         is_spilling=limits.caught.size > 0,
         restarted=restarts.states.shape[1] // LANES,
+        is_moving=signals.places.shape[0] > 1,
     )
     with _lock:
         executed = _counts.pop(program, 0)

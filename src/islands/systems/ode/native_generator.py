@@ -34,6 +34,8 @@ class ProgramCode(NamedTuple):
         Whether receivers get a part of what the upper limits cut off.
     restarted : int
         Number of states that are set to given values at regular intervals.
+    is_moving : bool
+        Whether each restart has its own places of signals.
     """
 
     code: bytes
@@ -46,6 +48,7 @@ class ProgramCode(NamedTuple):
     receivers: tuple[int, ...] | None
     is_spilling: bool
     restarted: int
+    is_moving: bool
 
 
 class NativeGenerator:
@@ -91,7 +94,7 @@ class NativeGenerator:
                 (self._caught, program.is_spilling),
             )
         ]
-        own_places = self._load_places()
+        own_places = [] if program.is_moving else self._load_places(_INTEGER(0))
         build.branch(loop)
 
         build.position_at_end(loop)
@@ -101,7 +104,11 @@ class NativeGenerator:
         for phi, start in zip(carried, starts, strict=True):
             phi.add_incoming(start, entry)
         before = [*self._restart(carried[: program.restarted], sample), *carried[program.restarted :]]
-        self._read_signals(sample, 0, own_places)
+        own_sample = sample
+        if program.is_moving:
+            own_sample = build.urem(sample, self._interval)
+            own_places = self._load_places(build.udiv(sample, self._interval))
+        self._read_signals(sample, own_sample, 0, own_places)
         slopes = self._differentiate(before, program.ends[0])
         self._write_outputs(sample)
         following = build.add(sample, _INTEGER(1))
@@ -114,7 +121,7 @@ class NativeGenerator:
             part = half if stage < 3 else self._scale(1.0)
             moved = [build.fadd(x, build.fmul(part, slope)) for x, slope in zip(before, slopes, strict=True)]
             if stage != 2:  # the signals in the middle of the step are known
-                self._read_signals(sample, (stage + 1) // 2, own_places)
+                self._read_signals(sample, own_sample, (stage + 1) // 2, own_places)
             slopes = self._differentiate(moved, program.ends[1 if stage == 2 else 0])
             if stage < 3:
                 twice = (build.fmul(self._row.constant(2.0), slope) for slope in slopes)
@@ -160,23 +167,29 @@ class NativeGenerator:
     def _scale(self, factor: float) -> Any:
         return self._row.fill(self._build.fmul(self._dt, _DOUBLE(factor)))
 
-    def _load_places(self) -> list[list[Any]]:
+    def _load_places(self, restart: Any) -> list[list[Any]]:
         """Return the place of each own signal in each lane."""
         build, own = self._build, len(self._program.signals) - self._program.shared
         integers = build.bitcast(self._places, _INTEGER.as_pointer())
+        first = build.mul(restart, _INTEGER(LANES * own))
         return [
-            [build.load(build.gep(integers, [_INTEGER(LANES * index + lane)])) for lane in range(LANES)]
+            [
+                build.load(build.gep(integers, [build.add(first, _INTEGER(LANES * index + lane))]))
+                for lane in range(LANES)
+            ]
             for index in range(own)
         ]
 
-    def _read_signals(self, sample: Any, moment: int, own_places: list[list[Any]]) -> None:
+    def _read_signals(self, sample: Any, own_sample: Any, moment: int, own_places: list[list[Any]]) -> None:
         build, shared = self._build, self._program.shared
-        moments = build.add(build.mul(sample, _INTEGER(3)), _INTEGER(moment))
+        moments, own_moments = (
+            build.add(build.mul(each, _INTEGER(3)), _INTEGER(moment)) for each in (sample, own_sample)
+        )
         first = build.mul(moments, _INTEGER(shared))
         for index, row in enumerate(self._program.signals[:shared]):
             place = build.gep(self._shared, [build.add(first, _INTEGER(index))])
             self._rows[row] = self._row.fill(build.load(place))
-        first = build.mul(moments, self._own_count)
+        first = build.mul(own_moments, self._own_count)
         for places, row in zip(own_places, self._program.signals[shared:], strict=True):
             self._rows[row] = self._row.gather(self._own, [build.add(first, place) for place in places])
 

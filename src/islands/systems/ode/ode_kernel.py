@@ -220,20 +220,23 @@ def integrate(instructions, arena, signals, dt, limits, restarts, laws, lanes, f
 
     ``arena`` (rows*16,) contains constants, parameters and initial states. ``out`` is (samples, outputs, all
     lanes) and receives the first of ``every`` successive samples. The kernel computes ``lanes`` lanes, and
-    overwrites the values of 16, from ``first``. All outputs of a lane that diverges are NaN.
+    overwrites the values of 16, from ``first``. Without restarts, all outputs of a lane that diverges are
+    NaN.
     """
     ends, states = instructions.ends, instructions.states
     rows, slopes, outputs = instructions.signals, instructions.slopes, instructions.outputs
-    shared, own, places = signals.shared, signals.own, signals.places
+    shared, own, places = signals.shared, signals.own.reshape(-1), signals.places
     size = slopes.size * LANES
     before, total = arena[LANES * states : LANES * states + size].copy(), np.empty(size)
     base, result = arena.ctypes.data, out.ctypes.data
-    samples, restart = shared.shape[0], 0
+    samples, restart, start, block = shared.shape[0], 0, 0, 0
     for k in range(samples):
         if restart < restarts.samples.size and restarts.samples[restart] == k:
             for i in range(restarts.states.shape[1]):
                 before[i] = restarts.states[restart, i]
                 arena[LANES * states + i] = before[i]
+            if places.shape[0] > 1:
+                start, block = k, restart
             restart += 1
         for stage in range(4):
             is_read = stage == 0 and k % every == 0
@@ -244,11 +247,11 @@ def integrate(instructions, arena, signals, dt, limits, restarts, laws, lanes, f
                 moment = (stage + 1) // 2
                 for s in range(shared.shape[2]):
                     write(base + _ROW * rows[s], _fill(shared[k, moment, s]))
-                values = own[k, moment]
-                for s in range(places.shape[0]):
+                values = (3 * (k - start) + moment) * signals.own.shape[2]
+                for s in range(places.shape[1]):
                     row = LANES * rows[shared.shape[2] + s]
                     for lane in range(lanes):
-                        arena[row + lane] = values[places[s, lane]]
+                        arena[row + lane] = own[values + places[block, s, lane]]
             if k == 0 and stage == 0:
                 begin = 0
             execute_code(instructions, begin, end, base, arena, laws, lanes)
@@ -268,5 +271,5 @@ def integrate(instructions, arena, signals, dt, limits, restarts, laws, lanes, f
         if restarts.samples.size == 0 and k % _CHECK == 0 and not _is_any_finite(before, lanes):
             break
     for lane in range(lanes):
-        if not _is_finite(before, lane):
+        if restarts.samples.size == 0 and not _is_finite(before, lane):
             out[:, :, first + lane] = np.nan

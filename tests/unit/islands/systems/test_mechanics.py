@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from islands.discrepancy.effects import hysteresis
 from islands.systems.mechanics import WIDTH, Elements, compile_law, integrate_along
+from islands.systems.ode.interval_simulation import IntervalSimulation
 from islands.systems.ode.lane_simulation import LaneInput, SampledSignal, simulate_lanes
 from islands.systems.ode.ode_program import generate_program
 from islands.systems.ode.system_document import make_system
@@ -89,20 +90,19 @@ def simulate(
 ) -> Array:
     """Integrate the motion, with restarts from a state after each interval, in samples."""
     t = dt * np.arange(round(seconds / dt) + 1)
-    count = -(-t.size // interval) if interval else 0
-    states = {
-        name: np.array([first, *[again] * (count - 1)])
-        for name, first, again in zip("xv", start, restart, strict=True)
-    }
     lane = LaneInput(
         {"m": MASS, "c": DAMPING, "k": STIFFNESS},
         dict(zip("xv", start, strict=True)),
         {"F": SampledSignal(u(t), u(t + dt / 2), u(t + dt))},
         parts if parts.forces.size else None,
-        restarts=states if interval else None,
     )
     program = generate_program(MOTION, laws=parts.forces.size)
-    return simulate_lanes(program, dt, [lane], interval)[0, 0]
+    if not interval:
+        return simulate_lanes(program, dt, [lane])[0, 0]
+    states = np.array([[start, *[restart] * (-(-t.size // interval) - 1)]])
+    simulation = IntervalSimulation(program, dt, [lane], "xv", interval)
+    found = simulation.simulate(np.array([0]), states, np.ones(states.shape[:2], dtype=bool))
+    return found[0, 0].reshape(-1)[: t.size]
 
 
 def reference(

@@ -6,7 +6,7 @@ import pytest
 import islands
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.effects.filters import low_pass
-from islands.discrepancy.effects.free_forms import FREE_FORMS, PLACES
+from islands.discrepancy.effects.free_forms import FREE_FORMS
 from islands.discrepancy.interfaces.context import SimulationContext
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
@@ -14,6 +14,7 @@ from islands.figures.diagnosis.form_values import draw_free_forms
 from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import simulate_spec
 from islands.performance.trials.trial import Trial, run_trial
+from islands.systems.curve import PLACES
 from support.simulated_records import recorded, wave
 
 U = wave(2000) / 20.0

@@ -1,0 +1,154 @@
+"""Simulation that restarts at regular intervals from given states.
+
+Unless a state is kept at the restarts, the intervals do not depend on one another, and are simulated side by
+side.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.systems.ode.kernel_arguments import LANES, LaneRestarts, LaneSignals
+from islands.systems.ode.lane_simulation import (
+    LaneInput,
+    SampledSignal,
+    Signal,
+    integrate_group,
+    make_signal,
+    stack_signals,
+)
+from islands.systems.ode.ode_program import OdeProgram
+
+#: Time of a call of the kernel, in intervals.
+_CALL_TIME = 1.0
+
+
+class IntervalSimulation:
+    """Simulation of lanes that restart at the same samples.
+
+    Parameters
+    ----------
+    program : OdeProgram
+    dt : float
+        Step in seconds, one per sample.
+    lanes : sequence of LaneInput
+        All have the same force laws.
+    restarted : sequence of str
+        States that are given at each restart, the first ones of the program; others are kept.
+    interval : int
+        Samples of an interval; the last one may be shorter.
+    every : int
+        The outputs have one sample of ``every`` successive ones, the first; a divisor of ``interval``.
+    """
+
+    def __init__(
+        self,
+        program: OdeProgram,
+        dt: float,
+        lanes: Sequence[LaneInput],
+        restarted: Sequence[str],
+        interval: int,
+        every: int = 1,
+    ) -> None:
+        assert tuple(restarted) == tuple(program.states[: len(restarted)])
+        self._program, self._dt, self.lanes = program, dt, lanes
+        self._interval, self._every = interval, every
+        elements = lanes[0].elements
+        has_state = elements is not None and bool(elements.state_derivatives.any())
+        self.is_independent = len(restarted) == len(program.states) and not has_state
+        samples = len(next(iter(lanes[0].signals.values())).start)
+        self._count = -(-samples // interval)
+        made: dict[tuple[object, ...], SampledSignal] = {}
+        used: dict[int, SampledSignal] = {}
+        indices: list[list[int]] = []
+        for lane in lanes:
+            found = [make_signal(expression, dt, lane, made) for expression in program.signals]
+            used |= {id(each): each for each in found}
+            place = {key: index for index, key in enumerate(used)}
+            indices.append([place[id(each)] for each in found])
+        self._indices = np.array(indices, dtype=np.int64).reshape(len(lanes), -1)
+        self._signals = np.zeros((self._count * interval, 3, len(used)))
+        self._signals[:samples] = stack_signals(list(used.values()), samples)
+
+    def simulate(
+        self, lanes: NDArray[np.int64], states: Signal, is_asked: NDArray[np.bool_]
+    ) -> NDArray[np.float64]:
+        """Simulate intervals.
+
+        Parameters
+        ----------
+        lanes : ndarray of int64, shape (runs,)
+            Index of the lane of each run.
+        states : ndarray, shape (runs, intervals, restarted)
+            States at the start of each interval.
+        is_asked : ndarray of bool, shape (runs, intervals)
+            The intervals to be simulated. If they depend on one another, all of them are.
+
+        Returns
+        -------
+        ndarray, shape (runs, outputs, intervals, interval // every)
+            NaN for intervals that are not simulated; not finite where a simulation diverges.
+        """
+        outputs = self._program.instructions.outputs.size
+        found = np.full((len(lanes), outputs, self._count, self._interval // self._every), np.nan)
+        runs, intervals = self._plan_columns(is_asked)
+        if not runs.size:
+            return found
+        rows = intervals.shape[1]
+        size = rows * self._interval
+        restarts = np.arange(0, size, self._interval)
+        shared = np.empty((size, 3, 0))
+        order = np.arange(len(self._program.signals))
+        out = np.empty((size // self._every, outputs, LANES))
+        for first in range(0, len(runs), LANES):
+            run, places = runs[first : first + LANES], intervals[first : first + LANES]
+            full = np.pad(run, (0, LANES - len(run)), "edge")
+            begins = np.pad(places, ((0, LANES - len(run)), (0, 0)), "edge")
+            given = states[full[:, None], begins].transpose(1, 2, 0)
+            offsets = begins * (self._interval * 3 * self._signals.shape[2])
+            signals = LaneSignals(
+                shared,
+                self._signals,
+                np.ascontiguousarray(offsets.T[:, None] + self._indices[lanes[full]].T),
+            )
+            integrate_group(
+                self._program,
+                [self.lanes[index] for index in lanes[run]],
+                signals,
+                order,
+                LaneRestarts(restarts, np.ascontiguousarray(given.reshape(rows, -1))),
+                self._dt,
+                0,
+                self._every,
+                out,
+            )
+            parts = out[..., : len(run)].reshape(rows, -1, outputs, len(run))
+            found[run[:, None], :, places] = parts.transpose(3, 0, 2, 1)
+        return found
+
+    def _plan_columns(self, is_asked: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the run of each lane of the kernel, and the intervals that it simulates one after another.
+
+        Returns
+        -------
+        ndarray of int64, shape (columns,)
+        ndarray of int64, shape (columns, rows)
+            The last interval is repeated where fewer are asked for.
+        """
+        if not self.is_independent:
+            runs = np.flatnonzero(is_asked.any(axis=1))
+            return runs, np.tile(np.arange(self._count), (runs.size, 1))
+        counts = np.count_nonzero(is_asked, axis=1)
+        if not counts.any():
+            return np.empty(0, dtype=np.int64), np.empty((0, 1), dtype=np.int64)
+        rows = np.arange(1, counts.max() + 1)
+        columns = np.sum(-(-counts // rows[:, None]), axis=1)
+        best = int(rows[np.argmin(-(-columns // LANES) * (rows + _CALL_TIME))])
+        parts = []
+        for asked in is_asked:
+            places = np.flatnonzero(asked)
+            lacking = -places.size % best
+            parts.append(np.append(places, places[-1:].repeat(lacking)).reshape(-1, best))
+        runs = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+        return runs, np.concatenate(parts)
