@@ -8,7 +8,7 @@ receives the outputs.
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias, TypeVar
+from typing import NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,23 @@ DIFFERENCE_STEP = 1e-2
 
 T = TypeVar("T")
 
-#: Computation that yields points, shape (points, parameters), and receives their outputs, (points, samples).
-Simulated: TypeAlias = Generator[Signal, Signal, T]
+
+class Points(NamedTuple):
+    """Points to be simulated.
+
+    Attributes
+    ----------
+    values : ndarray, shape (points, parameters)
+    are_near_last : bool
+        Whether all points are small changes of the last one, for derivatives.
+    """
+
+    values: Signal
+    are_near_last: bool = False
+
+
+#: Computation that yields points and receives their outputs, shape (points, samples).
+Simulated: TypeAlias = Generator[Points, Signal, T]
 
 
 class Weighting(Protocol):
@@ -90,16 +105,16 @@ class CalibrationProblem:
         """Simulate at the given values, clipped to their bounds, and around them for the derivatives."""
         values = np.clip(values, *self._bounds)
         if not with_jacobian:
-            (output,) = yield values[None]
+            (output,) = yield Points(values[None])
             return self._compare(values, output)
         points, steps = self._list_differences(values)
         # The last simulations are cached.
-        *shifted, output = yield np.vstack([points, values])
+        *shifted, output = yield Points(np.vstack([points, values]), are_near_last=True)
         return self._differentiate(self._compare(values, output), shifted, steps)
 
     def evaluate_all(self, points: Signal) -> Simulated[list[FittedPoint]]:
         """Simulate at several points, shape (points, parameters), within the bounds."""
-        outputs = yield points
+        outputs = yield Points(points)
         return [self._compare(values, output) for values, output in zip(points, outputs, strict=True)]
 
     def linearise(self, point: FittedPoint) -> Simulated[FittedPoint]:
@@ -107,8 +122,12 @@ class CalibrationProblem:
         if point.jacobian is not None:
             return point
         points, steps = self._list_differences(point.values)
-        shifted = (yield points) if self._free.size else points
-        return self._differentiate(point, list(shifted), steps)
+        if not self._free.size:
+            return self._differentiate(point, [], steps)
+        if not self._simulation.fits_states:
+            return self._differentiate(point, list((yield Points(points))), steps)
+        *shifted, _ = yield Points(np.vstack([points, point.values]), are_near_last=True)
+        return self._differentiate(point, shifted, steps)
 
     def _list_differences(self, values: Signal) -> tuple[Signal, Signal]:
         """Return the points for the derivatives, and the step of each as a fraction of the scale."""
@@ -179,7 +198,7 @@ def simulate_together(simulation: ExtendedSimulator, computations: Sequence[Simu
         Result of each computation. It does not depend on the others.
     """
     results: dict[int, T] = {}
-    asked: dict[int, Signal] = {}
+    asked: dict[int, Points] = {}
 
     def resume(index: int, outputs: Signal | None) -> None:
         asked.pop(index, None)
@@ -193,8 +212,12 @@ def simulate_together(simulation: ExtendedSimulator, computations: Sequence[Simu
         resume(index, None)
     while asked:
         indices, points = list(asked), list(asked.values())
-        outputs = simulation.simulate_batch(np.vstack(points))
-        ends = np.cumsum([len(each) for each in points])
+        ends = np.cumsum([len(each.values) for each in points])
+        near = np.arange(ends[-1])
+        for each, end in zip(points, ends, strict=True):
+            if each.are_near_last:
+                near[end - len(each.values) : end] = end - 1
+        outputs = simulation.simulate_batch(np.vstack([each.values for each in points]), near)
         for index, part in zip(indices, np.split(outputs, ends[:-1]), strict=True):
             resume(index, part)
     return [results[index] for index in range(len(computations))]

@@ -52,8 +52,7 @@ def _make_free_form(
         return tuple(Parameter(label, unit(context), 0.0, change) for label in labels(context))
 
     def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        starts = START * size(context) * np.eye(len(labels(context)))
-        return tuple(tuple(start) for start in starts.tolist())
+        return tuple(map(tuple, (START * size(context) * np.eye(len(labels(context)))).tolist()))
 
     return Effect(
         name=name,

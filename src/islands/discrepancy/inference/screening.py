@@ -11,10 +11,10 @@ from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
-from islands.discrepancy.interfaces.effect import Effect, Signal
+from islands.discrepancy.interfaces.effect import Effect, Signal, invalid_effect_error
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.segments import fill_gaps
-from islands.discrepancy.simulators.extended import ExtendedSimulator, invalid_effect_error
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 #: Maximum number of starting points per effect that are calibrated.
 MAX_STARTS = 3

@@ -4,8 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.force import ForceLaw
+from islands.errors import SettingsError
 
 __all__ = ["Effect", "EffectTemplate", "ForceLaw", "Signal", "SimulationContext", "Site"]
 
@@ -112,3 +115,29 @@ class EffectTemplate:
     summary: str
     similar_to: str = ""
     distinguished_by: str = ""
+
+
+def apply_map(effect: Effect, signal: Signal, values: Signal, context: SimulationContext) -> Signal:
+    """Apply the map of an effect to a signal.
+
+    Raises
+    ------
+    SettingsError
+        The map raises an exception or changes the shape of the signal.
+    """
+    assert callable(effect.form)
+    try:
+        out = np.asarray(effect.form(signal, values, context), dtype=np.float64)
+    except Exception as error:
+        raise invalid_effect_error(effect, f"its form fails: {type(error).__name__}: {error}") from error
+    if out.shape != signal.shape:
+        raise invalid_effect_error(effect, f"its form gives {out.shape} for {signal.shape}")
+    return out
+
+
+def invalid_effect_error(effect: Effect, why: str) -> SettingsError:
+    """Return the error for an effect whose definition is invalid."""
+    file = effect.parameters.__code__.co_filename
+    return SettingsError(
+        f"the effect {effect.name} is broken: {why}; correct {file} or remove the effect from the catalogue"
+    )

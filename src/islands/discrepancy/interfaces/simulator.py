@@ -109,6 +109,9 @@ class SimulationRun:
     forces : sequence
     intersample_values : ndarray, shape (2, samples), or None
         Values of x between samples; None for those of the context.
+    near : int or None
+        Index of the run of the same call from which this one differs by a small change. Its output is needed
+        for derivatives: a simulator that fits states may fit those of this run to first order.
     """
 
     values: Signal
@@ -116,6 +119,7 @@ class SimulationRun:
     effect_parameters: Mapping[str, float]
     forces: Forces
     intersample_values: Signal | None = None
+    near: int | None = None
 
 
 @runtime_checkable
@@ -147,11 +151,30 @@ class WrappingSimulator(Protocol):
         """The simulator that is run."""
 
 
-def is_batch_simulator(simulator: Simulator) -> bool:
-    """Return whether a simulator, or the one that it runs, computes several runs at once."""
+@runtime_checkable
+class ShootingSimulator(Protocol):
+    """Simulator that may fit the states of shooting intervals to the record within each simulation."""
+
+    @property
+    def shots(self) -> object | None:
+        """Shooting intervals; None for a free run."""
+
+
+def _unwrap(simulator: Simulator) -> Simulator:
     while isinstance(simulator, WrappingSimulator):
         simulator = simulator.simulator
-    return isinstance(simulator, BatchSimulator)
+    return simulator
+
+
+def is_batch_simulator(simulator: Simulator) -> bool:
+    """Return whether a simulator, or the one that it runs, computes several runs at once."""
+    return isinstance(_unwrap(simulator), BatchSimulator)
+
+
+def fits_states(simulator: Simulator) -> bool:
+    """Return whether a simulator, or the one that it runs, fits states to the record in each simulation."""
+    inner = _unwrap(simulator)
+    return isinstance(inner, ShootingSimulator) and inner.shots is not None
 
 
 def simulate_runs(

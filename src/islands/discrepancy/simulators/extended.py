@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
-from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
+from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site, apply_map
 from islands.discrepancy.interfaces.simulator import (
     Forces,
     SimulationRun,
     Simulator,
+    fits_states,
     is_batch_simulator,
     simulate_runs,
     split_recordings,
 )
-from islands.errors import SettingsError
 
 #: Cached outputs before the output maps: finite differences need the same one several times.
 _CACHE_SIZE = 4
@@ -129,6 +129,11 @@ class ExtendedSimulator:
         return is_batch_simulator(self.simulator)
 
     @property
+    def fits_states(self) -> bool:
+        """Whether states are fitted to the record in each simulation."""
+        return fits_states(self.simulator)
+
+    @property
     def simulator_slice(self) -> slice:
         """Slice of the values that belongs to the simulator."""
         return self._slices[0]
@@ -186,12 +191,14 @@ class ExtendedSimulator:
             return self._apply_output_maps(y, values)
         return self.simulate_batch(values[None])[0]
 
-    def simulate_batch(self, points: Signal) -> Signal:
+    def simulate_batch(self, points: Signal, near: NDArray[np.int64] | None = None) -> Signal:
         """Simulate the whole record for several vectors of values, at once if the simulator can.
 
         Parameters
         ----------
         points : ndarray, shape (points, parameters)
+        near : ndarray of int64, shape (points,), optional
+            Index of the point that each one is a small change of, or its own; see `SimulationRun`.
 
         Returns
         -------
@@ -201,7 +208,7 @@ class ExtendedSimulator:
         if self.parts:
             joined = np.concatenate(
                 [
-                    part.simulate_batch(points[:, places])
+                    part.simulate_batch(points[:, places], near)
                     for part, places in zip(self.parts, self._places, strict=True)
                 ],
                 axis=1,
@@ -209,11 +216,28 @@ class ExtendedSimulator:
             joined[np.isnan(joined).any(axis=1)] = np.nan
             return joined
         keys = [values[self._before_output].tobytes() for values in points]
+        bases: dict[bytes, bytes] = {}
+        if near is not None and self.fits_states:
+            for index, base in enumerate(near):
+                if keys[index] != keys[base]:
+                    bases[keys[index] + keys[base]] = keys[base]
+                    keys[index] += keys[base]
         known = {key: self._cache[key] for key in keys if key in self._cache}
-        missing = {key: values for key, values in zip(keys, points, strict=True) if key not in known}
+        missing = {
+            key: values
+            for key, values in zip(keys, points, strict=True)
+            if key not in known or key in bases.values()
+        }
         if missing:
             inputs: dict[bytes, Signal] = {}
-            runs = [self._make_run(values, _NONE, (), inputs) for values in missing.values()]
+            places = {key: place for place, key in enumerate(missing)}
+            runs = [
+                replace(
+                    self._make_run(values, _NONE, (), inputs),
+                    near=places[bases[key]] if key in bases else None,
+                )
+                for key, values in missing.items()
+            ]
             with np.errstate(over="ignore", invalid="ignore"):
                 found = np.ascontiguousarray(simulate_runs(self.simulator, runs, self.context))
             known |= zip(missing, found, strict=True)
@@ -272,29 +296,3 @@ class ExtendedSimulator:
     def _get_parameter_index(self, effect: Effect) -> int:
         _, _, name = effect.name.partition(":")
         return [parameter.name for parameter in self.simulator.parameters].index(name)
-
-
-def apply_map(effect: Effect, signal: Signal, values: Signal, context: SimulationContext) -> Signal:
-    """Apply the map of an effect to a signal.
-
-    Raises
-    ------
-    SettingsError
-        The map raises an exception or changes the shape of the signal.
-    """
-    assert callable(effect.form)
-    try:
-        out = np.asarray(effect.form(signal, values, context), dtype=np.float64)
-    except Exception as error:
-        raise invalid_effect_error(effect, f"its form fails: {type(error).__name__}: {error}") from error
-    if out.shape != signal.shape:
-        raise invalid_effect_error(effect, f"its form gives {out.shape} for {signal.shape}")
-    return out
-
-
-def invalid_effect_error(effect: Effect, why: str) -> SettingsError:
-    """Return the error for an effect whose definition is invalid."""
-    file = effect.parameters.__code__.co_filename
-    return SettingsError(
-        f"the effect {effect.name} is broken: {why}; correct {file} or remove the effect from the catalogue"
-    )

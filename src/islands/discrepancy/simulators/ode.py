@@ -182,7 +182,8 @@ class OdeSimulator:
         oversampling = runs[0].x.size // shots.measured.size
         lanes = self._make_lanes(program, active, runs, context)
         sizes = {each.name: self.sizes[each.name] for each in self.system.states if not each.fixed}
-        fitted = self._restart(shots, program, lanes, context, oversampling).fit_states(sizes)
+        simulation = self._restart(shots, program, lanes, context, oversampling)
+        fitted = simulation.fit_states(sizes, [run.near for run in runs])
         return np.repeat(fitted, oversampling, axis=1)
 
     def _restart(

@@ -135,39 +135,51 @@ class ShotSimulation:
         """Return the states before they are fitted, shape (lanes, intervals, states)."""
         return np.array([np.column_stack(list(self.starts.values()))] * len(self.simulation.lanes))
 
-    def fit_states(self, sizes: Mapping[str, float]) -> Signal:
+    def fit_states(self, sizes: Mapping[str, float], near: Sequence[int | None]) -> Signal:
         """Fit the states of all intervals in each lane, and return the first output, shape (lanes, samples).
 
         Parameters
         ----------
         sizes : mapping
             Sizes of the states that are fitted.
+        near : sequence of int or None
+            For a lane that is a small change of another one, the index of that lane. If intervals are
+            independent, it has the states of that lane, and its output changes as with fitted states to first
+            order: by what changes of the states cannot compensate (variable projection; Kaufman, 1975).
         """
-        samples, states = self.measured.size, self._list_states()
-        lanes = np.arange(len(states))
-        measured = np.pad(self.measured, (0, -samples % self.interval)).reshape(-1, self.interval)
-        last = samples - self.interval * (len(measured) - 1)
         moves = _STEP * np.array([[sizes[own] * (own == name) for name in self.starts] for own in sizes])
+        bases = np.array([lane if base is None else base for lane, base in enumerate(near)])
+        is_near = self.simulation.is_independent & (bases != np.arange(len(near)))
+        fitted, others = np.flatnonzero(~is_near), np.flatnonzero(is_near)
+        y, states = self._fit(fitted, moves)
+        if not others.size:
+            return self._join(y)
+        responses = self._respond(fitted, states, moves, y)
+        inverse = _invert(responses)
+        base = np.searchsorted(fitted, bases[others])
+        changed = self._simulate(others, states[base])
+        steps, _ = _find_steps(responses[:, base], inverse[base], y[base] - changed)
+        outputs = np.empty((len(near), *y.shape[1:]))
+        outputs[fitted] = y
+        outputs[others] = changed + np.einsum("aril,ria->ril", responses[:, base], steps)
+        return self._join(outputs)
 
-        def simulate(points: Signal, is_asked: NDArray[np.bool_]) -> Signal:
-            """Simulate points of shape (points, lanes, intervals, states); NaN where nothing is asked for."""
-            runs, asked = np.tile(lanes, len(points)), np.tile(is_asked, (len(points), 1))
-            outputs = self.simulation.simulate(runs, points.reshape(-1, *states.shape[1:]), asked)[:, 0]
-            outputs[:, -1, last:] = 0.0
-            return outputs.reshape(len(points), lanes.size, *measured.shape)
-
+    def _fit(self, lanes: NDArray[np.int64], moves: Signal) -> tuple[Signal, Signal]:
+        """Return the outputs, shape (lanes, intervals, interval), with fitted states, and these."""
+        states = self._list_states()[lanes]
+        measured = np.pad(self.measured, (0, -self.measured.size % self.interval)).reshape(-1, self.interval)
         is_active = np.ones(states.shape[:2], dtype=bool)
-        y = simulate(states[None], is_active)[0]
+        y = self._simulate(lanes, states)
         error = _sum_squares(measured - y)
         for _ in range(_ITERATIONS):
-            responses = np.nan_to_num(simulate(states + moves[:, None, None], is_active) - y)
-            inverse = _invert(np.einsum("aril,bril->riab", responses, responses))
+            responses = self._respond(lanes, states, moves, y, is_active)
+            inverse = _invert(responses)
             steps, promised = _find_steps(responses, inverse, measured - y)
             first, before, is_tried = states, error, is_active
             # Where a mass sticks the response is nonlinear, and a full step may increase the error.
             for length in _STEP_LENGTHS:
                 trial = first + length * (steps @ moves)
-                (output,) = simulate(trial[None], is_tried)
+                output = self._simulate(lanes, trial, is_tried)
                 found = _sum_squares(measured - output)
                 is_better = found < error
                 states = np.where(is_better[..., None], trial, states)
@@ -177,9 +189,33 @@ class ShotSimulation:
             _, promised = _find_steps(responses, inverse, measured - y)
             least = _MIN_DECREASE * np.mean(error, axis=1, keepdims=True)
             is_active = is_active & (error < before) & (promised > least)
-        if not self.simulation.is_independent:
-            y = simulate(states[None], np.ones_like(is_active))[0]
-        return y.reshape(lanes.size, -1)[:, :samples]
+        return y if self.simulation.is_independent else self._simulate(lanes, states), states
+
+    def _respond(
+        self,
+        lanes: NDArray[np.int64],
+        states: Signal,
+        moves: Signal,
+        y: Signal,
+        is_asked: NDArray[np.bool_] | None = None,
+    ) -> Signal:
+        """Return the changes of outputs by moves of the states, shape (moves, lanes, intervals, interval)."""
+        moved = (states + moves[:, None, None]).reshape(-1, *states.shape[1:])
+        asked = None if is_asked is None else np.tile(is_asked, (len(moves), 1))
+        outputs = self._simulate(np.tile(lanes, len(moves)), moved, asked)
+        return np.nan_to_num(outputs.reshape(len(moves), *y.shape) - y)
+
+    def _simulate(
+        self, lanes: NDArray[np.int64], states: Signal, is_asked: NDArray[np.bool_] | None = None
+    ) -> Signal:
+        """Return the outputs, shape (lanes, intervals, interval): NaN if not asked for, 0 after the end."""
+        asked = np.ones(states.shape[:2], dtype=bool) if is_asked is None else is_asked
+        outputs = self.simulation.simulate(lanes, states, asked)[:, 0]
+        outputs[:, -1, self.measured.size - self.interval * (states.shape[1] - 1) :] = 0.0
+        return outputs
+
+    def _join(self, y: Signal) -> Signal:
+        return y.reshape(len(y), -1)[:, : self.measured.size]
 
 
 def _sum_squares(residual: Signal) -> Signal:
@@ -203,8 +239,9 @@ def _find_steps(responses: Signal, inverse: Signal, residual: Signal) -> tuple[S
     return steps, np.einsum("ria,ria->ri", slope, steps)
 
 
-def _invert(squares: Signal) -> Signal:
-    """Return the pseudoinverses of scaled matrices, shape (lanes, intervals, states, states)."""
+def _invert(responses: Signal) -> Signal:
+    """Return the pseudoinverses of the products of responses, shape (lanes, intervals, states, states)."""
+    squares = np.einsum("aril,bril->riab", responses, responses)
     scale = np.sqrt(np.maximum(np.diagonal(squares, axis1=-2, axis2=-1), np.finfo(float).tiny))
     both = scale[..., :, None] * scale[..., None, :]
     return np.asarray(np.linalg.pinv(squares / both, rcond=_RANK_TOLERANCE, hermitian=True) / both)

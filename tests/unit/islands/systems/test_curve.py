@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from islands.systems.curve import VALUES, interpolate_curve
+from islands.systems.curve import VALUES, interpolate_curve, write_curve
+from islands.systems.ode.equation_parser import parse_expression
+from islands.systems.ode.ode_expression import evaluate
 
 PLACES = np.linspace(-1.0, 1.0, VALUES + 2)
 
@@ -26,3 +28,11 @@ def test_curve_has_no_kinks(index: int) -> None:
     places = np.linspace(-0.999, 0.999, 20_001)
     slopes = np.diff(interpolate_curve(places, np.eye(VALUES)[index])) / np.diff(places)
     assert np.max(np.abs(np.diff(slopes))) < 0.02
+
+
+@pytest.mark.parametrize("place", [-1.5, -1.0, -0.98, -0.3, 0.0, 0.41, 0.76, 1.0, 3.0])
+def test_expression_has_the_values_of_the_curve(place: float) -> None:
+    values = np.random.default_rng(2).standard_normal(VALUES)
+    given = {"x": place, **{f"n{index}": value for index, value in enumerate(values)}}
+    expected = interpolate_curve(np.array([place]), values)[0]
+    assert evaluate(parse_expression(write_curve("x")), given) == pytest.approx(expected, abs=1e-12)

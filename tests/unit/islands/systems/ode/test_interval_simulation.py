@@ -1,4 +1,4 @@
-"""Intervals are simulations of their own, with the same bits in every order and as machine code."""
+"""Intervals that are simulated side by side have the bits of separate simulations."""
 
 from dataclasses import replace
 
@@ -54,7 +54,7 @@ def take_interval(lane: LaneInput, number: int, states: np.ndarray) -> LaneInput
     return replace(lane, signals=signals, initial_states=dict(zip("xvz", states, strict=True)))
 
 
-def test_each_interval_is_a_simulation_of_its_own(program: OdeProgram) -> None:
+def test_each_interval_has_the_bits_of_a_separate_simulation(program: OdeProgram) -> None:
     lanes = make_lanes()
     rng = np.random.default_rng(3)
     states = rng.standard_normal((11, INTERVALS, 3))
