@@ -181,7 +181,7 @@ class ShotSimulation:
                 trial = first + length * (steps @ moves)
                 output = self._simulate(lanes, trial, is_tried)
                 found = _sum_squares(measured - output)
-                is_better = found < error
+                is_better = is_tried & (found < error)
                 states = np.where(is_better[..., None], trial, states)
                 y = np.where(is_better[..., None], output, y)
                 error = np.where(is_better, found, error)
