@@ -20,6 +20,9 @@ MAX_OVERSAMPLING = 32
 #: Largest accepted RMS change of the output when the step is halved, relative to the RMS of the residual.
 MAX_STEP_ERROR = 0.05
 
+#: Largest ratio of the changes by two successive halvings of a step, if smaller steps improve the output.
+MAX_CHANGE_RATIO = 0.7
+
 #: Least decrease of minus twice the log-likelihood for which another intersample behaviour is selected.
 MIN_IMPROVEMENT = 10.0
 
@@ -61,9 +64,13 @@ def _with_simulator(simulation: ExtendedSimulator, simulator: Simulator) -> Exte
 
 
 def _refine_steps(inner: Simulator, intersample: InterSample, fit: CalibrationResult) -> Simulator:
-    """Halve the step until the change of the output is small compared with the residual."""
+    """Halve the step until the change of the output is small compared with the residual.
+
+    A change that does not decrease is no error of the integration: the simulation is chaotic, or states of
+    shooting intervals are at another minimum. The step then remains as it is.
+    """
     accepted = MAX_STEP_ERROR * float(np.sqrt(fit.mean_square))
-    oversampling = 1
+    oversampling, before = 1, np.inf
     resampled = ResampledSimulator(inner, intersample, oversampling)
     coarse = _with_simulator(fit.simulation, resampled).simulate(fit.values)
     while oversampling < MAX_OVERSAMPLING:
@@ -71,9 +78,13 @@ def _refine_steps(inner: Simulator, intersample: InterSample, fit: CalibrationRe
         fine = _with_simulator(fit.simulation, resampled).simulate(fit.values)
         with np.errstate(over="ignore", invalid="ignore"):
             change = float(np.sqrt(np.mean((fine - coarse) ** 2)))
+        if change > MAX_CHANGE_RATIO * before:
+            oversampling = 1
+            break
         if change < accepted:
             break
         oversampling, coarse = 2 * oversampling, fine
+        before = change if np.isfinite(change) else np.inf
     return (
         inner
         if oversampling == 1 and intersample == InterSample.FOH

@@ -7,14 +7,20 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    calibrate,
+    evaluate_fit,
+)
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.discrepancy.simulators.ode import OdeSimulator
+from islands.discrepancy.simulators.ode_preparation import make_ode_simulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
+from islands.systems.ode.system_document import make_system
 from support.built_in_simulators import make_oscillator, make_piezo
 from support.simulated_records import recorded
 
@@ -139,3 +145,24 @@ def test_discretisations_are_compared_by_behaviour_and_step() -> None:
     assert not same_discretisation(
         ResampledSimulator(core, InterSample.ZOH, 2), ResampledSimulator(core, InterSample.ZOH, 4)
     )
+
+
+def test_a_simulation_that_smaller_steps_do_not_improve_keeps_its_step() -> None:
+    """The error of a chaotic simulation after a long time does not depend on the step."""
+    lorenz = {
+        "name": "lorenz",
+        "input": "u",
+        "equations": "dx/dt = s*(y - x) + u\ndy/dt = x*(28 - z) - y\ndz/dt = x*y - 8/3*z",
+        "output": "x",
+        "parameters": {"s": 10.0},
+        "states": {"x": {"initial": 1.0}, "y": {"initial": 1.0}, "z": {"initial": 20.0}},
+    }
+    record = recorded(
+        np.zeros(4000) + 1e-3 * np.sin(np.arange(4000)), np.random.default_rng(1).standard_normal(4000)
+    )
+    simulator = make_ode_simulator(make_system(lorenz), record)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, 3000))
+    target = Target(record.y, np.arange(4000) < 3000, None, {})
+    selected = select_intersample(evaluate_fit(simulation, target, simulation.nominal), target)
+    steps = selected.oversampling if isinstance(selected, ResampledSimulator) else 1
+    assert steps == 1
