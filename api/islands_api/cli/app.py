@@ -172,7 +172,8 @@ def _islands(
         return
     table = read_option_tables(path).get(name, {})
     if table:
-        command = context.command.get_command(context, name)  # type: ignore[attr-defined]
+        assert isinstance(context.command, TyperGroup)
+        command = context.command.get_command(context, name)
         context.default_map = {name: match_options(command, table, path, name)}
         errors.print(f"options of {path}: {', '.join(table)}", markup=False)
 

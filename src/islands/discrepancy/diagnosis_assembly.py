@@ -16,12 +16,12 @@ from islands.discrepancy.findings import describe_gross_errors, describe_noise, 
 from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.inference.experiment_design import suggest_experiment
 from islands.discrepancy.inference.finding import Finding, describe_effects
-from islands.discrepancy.inference.holdout import HoldoutGain, bound_reduction, compute_rmse, measure_gain
+from islands.discrepancy.inference.holdout import bound_gain, compute_rmse, measure_gain
 from islands.discrepancy.inference.residual_structure import find_residual_structure
 from islands.discrepancy.inference.screening import ScreenedEffect
 from islands.discrepancy.inference.strategies import SearchOutcome
 from islands.discrepancy.inference.verdict import Verdict, choose_reference_fit, classify, explained_fraction
-from islands.discrepancy.interfaces.effect import Effect, Signal
+from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 
 #: Effects are rejected if they increase the error of the hold-out part by more than this percentage, with a
@@ -125,7 +125,7 @@ def make_diagnosis(
         gain = measure_gain(record, before, hypothesis.fit.output, holdout, floor**0.5, rng)
         # Under model error, a gain in the estimation part is no evidence of one in another part.
         is_confirmed = (
-            _bound_reduction(gain, before, hypothesis.fit, target, fitted, rng) >= -MAX_HOLDOUT_LOSS_PERCENT
+            bound_gain(gain, before, hypothesis.fit, target, fitted, rng) >= -MAX_HOLDOUT_LOSS_PERCENT
             if target.effective_samples is None
             else gain.ci95[0] > 0.0
         )
@@ -177,22 +177,3 @@ def make_diagnosis(
 def _is_equivalent(findings: Sequence[Finding]) -> bool:
     """Return whether missing terms explain the record as well as an effect."""
     return any(MISSING_TERM in each.equivalents for each in findings)
-
-
-def _bound_reduction(
-    gain: HoldoutGain,
-    before: Signal,
-    fit: CalibrationResult,
-    target: Target,
-    fitted: int,
-    rng: np.random.Generator,
-) -> float:
-    """Return an upper bound on the reduction of the error of the hold-out part, in percent.
-
-    Slow noise hides in the RMSE that a simulation is worse: that of the innovations counts as well.
-    """
-    if not fit.noise.order:
-        return gain.ci95[1]
-    errors = [fit.noise.whiten(target.y - each, target.segments)[fitted:] for each in (before, fit.output)]
-    is_known = ~np.isnan(errors[0])
-    return min(gain.ci95[1], bound_reduction(errors[0][is_known], errors[1][is_known], rng)[1])

@@ -263,7 +263,8 @@ def _follow(url: str, key: str | None, job: JobView, as_json: bool, watch: bool 
     with Client(url, key) as client:
         try:
             with views.job_progress_bar() as update:
-                for job in client.progress(job):  # noqa: B020, PLR1704 - the current state replaces the old
+                for current in client.progress(job):
+                    job = current
                     update(job)
         except KeyboardInterrupt:
             errors.print(f"the job continues: 'islands jobs watch {job.id}' follows it again", markup=False)

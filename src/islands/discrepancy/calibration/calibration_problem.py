@@ -122,10 +122,6 @@ class CalibrationProblem:
         if point.jacobian is not None:
             return point
         points, steps = self._list_differences(point.values)
-        if not self._free.size:
-            return self._differentiate(point, [], steps)
-        if not self._simulation.fits_states:
-            return self._differentiate(point, list((yield Points(points))), steps)
         *shifted, _ = yield Points(np.vstack([points, point.values]), are_near_last=True)
         return self._differentiate(point, shifted, steps)
 

@@ -110,6 +110,34 @@ def bound_reduction(before: Signal, after: Signal, rng: np.random.Generator) -> 
     return float(low), float(high)
 
 
+def bound_gain(
+    gain: HoldoutGain,
+    before: Signal,
+    after: CalibrationResult,
+    target: Target,
+    fitted: int,
+    rng: np.random.Generator,
+) -> float:
+    """Return an upper bound on the reduction of the error of the hold-out part, in percent.
+
+    Slow noise hides in the RMSE that a simulation is worse: that of the innovations counts as well.
+
+    Parameters
+    ----------
+    before : ndarray, shape (samples,)
+        Output of the simulation without the effects.
+    fitted : int
+        Number of samples used for estimation.
+    """
+    if not after.noise.order:
+        return gain.ci95[1]
+    old, new = (
+        after.noise.whiten(target.y - output, target.segments)[fitted:] for output in (before, after.output)
+    )
+    is_known = ~np.isnan(old)
+    return min(gain.ci95[1], bound_reduction(old[is_known], new[is_known], rng)[1])
+
+
 def compute_rmse(residual: Signal) -> float:
     """Return the RMS of a residual; missing samples, NaN, do not count."""
     return float(np.sqrt(np.mean(residual[~np.isnan(residual)] ** 2)))

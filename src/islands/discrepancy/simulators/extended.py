@@ -223,10 +223,9 @@ class ExtendedSimulator:
                     bases[keys[index] + keys[base]] = keys[base]
                     keys[index] += keys[base]
         known = {key: self._cache[key] for key in keys if key in self._cache}
+        needed = {base for key, base in bases.items() if key not in known}
         missing = {
-            key: values
-            for key, values in zip(keys, points, strict=True)
-            if key not in known or key in bases.values()
+            key: values for key, values in zip(keys, points, strict=True) if key not in known or key in needed
         }
         if missing:
             inputs: dict[bytes, Signal] = {}

@@ -67,7 +67,7 @@ class FmuSimulator(OdeSimulator):
         program = generate_program(self.system, outputs)
         run = SimulationRun(np.array([each.nominal for each in self.parameters]), context.u, {}, ())
         (lane,) = self._make_lanes(program, (), [run], context)
-        dt = context.dt / max(self.system.steps, 1)
+        dt = context.dt / self._steps
         fmu = load_fmu(self.model.description)
         return simulate_fmu(fmu, self.model, program, context.start_time, dt, lane)
 

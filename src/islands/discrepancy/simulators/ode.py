@@ -20,7 +20,7 @@ from islands.discrepancy.simulators.ode_effects import (
     list_values,
 )
 from islands.discrepancy.simulators.record_channels import sample_channels
-from islands.discrepancy.simulators.shooting import Shots, ShotSimulation
+from islands.discrepancy.simulators.shooting import Shots
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.lane_simulation import (
     LaneInput,
@@ -157,6 +157,10 @@ class OdeSimulator:
         return outputs
 
     @property
+    def _steps(self) -> int:
+        return max(self.system.steps, 1)
+
+    @property
     def _has_force_equation(self) -> bool:
         """Whether forces act in an equation, and not on the output."""
         return self.system.force is not None and bool(self.system.force.rate)
@@ -168,7 +172,8 @@ class OdeSimulator:
         lanes = self._make_lanes(program, (), [SimulationRun(nominal, context.u, {}, ())], context)
         if self.shots is None:
             return self._integrate(program, lanes, context)[0]
-        return self._restart(self.shots, program, lanes, context, 1).simulate_starts()[0]
+        dt = context.dt / self._steps
+        return self.shots.make_simulation(program, dt, lanes, self.initial, self._steps).simulate_starts()[0]
 
     def _fit_shots(
         self,
@@ -182,20 +187,10 @@ class OdeSimulator:
         oversampling = runs[0].x.size // shots.measured.size
         lanes = self._make_lanes(program, active, runs, context)
         sizes = {each.name: self.sizes[each.name] for each in self.system.states if not each.fixed}
-        simulation = self._restart(shots, program, lanes, context, oversampling)
+        dt, every = context.dt / self._steps, oversampling * self._steps
+        simulation = shots.make_simulation(program, dt, lanes, self.initial, every)
         fitted = simulation.fit_states(sizes, [run.near for run in runs])
         return np.repeat(fitted, oversampling, axis=1)
-
-    def _restart(
-        self,
-        shots: Shots,
-        program: OdeProgram,
-        lanes: Sequence[LaneInput],
-        context: SimulationContext,
-        oversampling: int,
-    ) -> ShotSimulation:
-        steps = max(self.system.steps, 1)
-        return shots.make_simulation(program, context.dt / steps, lanes, self.initial, oversampling * steps)
 
     def for_samples(self, first: int, last: int) -> "OdeSimulator":
         """Return the simulator of one recording."""
@@ -223,8 +218,8 @@ class OdeSimulator:
     def _integrate(
         self, program: OdeProgram, lanes: Sequence[LaneInput], context: SimulationContext, every: int = 1
     ) -> Signal:
-        steps = max(self.system.steps, 1)
-        return self._simulate_lanes(program, context.start_time, context.dt / steps, lanes, every * steps)
+        dt, every = context.dt / self._steps, every * self._steps
+        return self._simulate_lanes(program, context.start_time, dt, lanes, every)
 
     def _simulate_lanes(
         self,
@@ -244,7 +239,7 @@ class OdeSimulator:
         runs: Sequence[SimulationRun],
         context: SimulationContext,
     ) -> list[LaneInput]:
-        steps, samples = max(self.system.steps, 1), runs[0].x.size
+        steps, samples = self._steps, runs[0].x.size
         common = make_time(context.start_time, samples, context.dt) if Symbol(TIME) in program.signals else {}
         common |= sample_channels(context, self.channels, samples, is_held=not self.is_continuous_time)
         common = {name: signal.refine(steps) for name, signal in common.items()}

@@ -66,7 +66,7 @@ def _pack_equations(model: FmuModel, program: OdeProgram, dt: float, lane: LaneI
             case _:
                 signals.append(expression)
     full = [lane] * LANES
-    found, order = pack_signals(signals, dt, full)
+    found, order = pack_signals(signals, dt, [lane])
     # Internal states of force laws follow the states of the FMU.
     following = itertools.count(len(model.description.states))
     places = [known[name] if name in known else next(following) for name in program.states]

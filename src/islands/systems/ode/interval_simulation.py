@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from islands.systems.ode.kernel_arguments import LANES, LaneRestarts, LaneSignals
 from islands.systems.ode.lane_simulation import (
     LaneInput,
-    SampledSignal,
     Signal,
     integrate_group,
-    make_signal,
+    list_signals,
     stack_signals,
 )
 from islands.systems.ode.ode_program import OdeProgram
@@ -29,17 +28,12 @@ class IntervalSimulation:
 
     Parameters
     ----------
-    program : OdeProgram
-    dt : float
-        Step in seconds, one per sample.
-    lanes : sequence of LaneInput
-        All have the same force laws.
+    program, dt, lanes, every
+        As of `simulate_lanes`; ``every`` is a divisor of ``interval``.
     restarted : sequence of str
         States that are given at each restart, the first ones of the program; others are kept.
     interval : int
         Samples of an interval; the last one may be shorter.
-    every : int
-        The outputs have one sample of ``every`` successive ones, the first; a divisor of ``interval``.
     """
 
     def __init__(
@@ -59,17 +53,9 @@ class IntervalSimulation:
         self.is_independent = len(restarted) == len(program.states) and not has_state
         samples = len(next(iter(lanes[0].signals.values())).start)
         self._count = -(-samples // interval)
-        made: dict[tuple[object, ...], SampledSignal] = {}
-        used: dict[int, SampledSignal] = {}
-        indices: list[list[int]] = []
-        for lane in lanes:
-            found = [make_signal(expression, dt, lane, made) for expression in program.signals]
-            used |= {id(each): each for each in found}
-            place = {key: index for index, key in enumerate(used)}
-            indices.append([place[id(each)] for each in found])
-        self._indices = np.array(indices, dtype=np.int64).reshape(len(lanes), -1)
-        self._signals = np.zeros((self._count * interval, 3, len(used)))
-        self._signals[:samples] = stack_signals(list(used.values()), samples)
+        found, self._indices = list_signals(program.signals, dt, lanes)
+        self._signals = np.zeros((self._count * interval, 3, len(found)))
+        self._signals[:samples] = stack_signals(found, samples)
 
     def simulate(
         self, lanes: NDArray[np.int64], states: Signal, is_asked: NDArray[np.bool_]

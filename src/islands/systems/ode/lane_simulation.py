@@ -130,15 +130,10 @@ def simulate_lanes(
     out = np.empty((-(-samples // every), program.instructions.outputs.size, -(-len(lanes) // LANES) * LANES))
     for first in range(0, len(lanes), LANES):
         group = lanes[first : first + LANES]
-        signals, order = pack_signals(program.signals, dt, fill_group(group))
+        signals, order = pack_signals(program.signals, dt, group)
         integrate_group(program, group, signals, order, _NO_RESTARTS, dt, first, every, out)
     found: NDArray[np.float64] = out.transpose(2, 1, 0)[: len(lanes)]
     return found
-
-
-def fill_group(lanes: Sequence[LaneInput]) -> list[LaneInput]:
-    """Return `LANES` lanes: the given ones, then the first one again."""
-    return [*lanes, *[lanes[0]] * (LANES - len(lanes))]
 
 
 def integrate_group(
@@ -165,7 +160,7 @@ def integrate_group(
         Receives the outputs.
     """
     instructions = program.instructions._replace(signals=program.instructions.signals[order])
-    full = fill_group(group)
+    full = [*group, *[group[0]] * (LANES - len(group))]
     arena, limits = pack_arena(program, full), pack_limits(program.states, full)
     if native := find_native_code(instructions, signals, limits, restarts):
         native.integrate(arena, signals, dt, limits, restarts, len(group), first, every, out)
@@ -196,28 +191,30 @@ def pack_arena(program: OdeProgram, lanes: Sequence[LaneInput]) -> NDArray[np.fl
 def pack_signals(
     expressions: Sequence[OdeExpression], dt: float, lanes: Sequence[LaneInput]
 ) -> tuple[LaneSignals, NDArray[np.int64]]:
-    """Return the signals of all lanes, and the order of shared and own ones among all signals."""
+    """Return the signals of up to `LANES` lanes, and the order of shared and own ones among all signals."""
     samples = len(next(iter(lanes[0].signals.values())).start)
-    made: dict[tuple[object, ...], SampledSignal] = {}
-    shared, own, places = list[SampledSignal](), list[SampledSignal](), list[list[int]]()
-    shared_order, own_order = list[int](), list[int]()
-    for index, expression in enumerate(expressions):
-        found = [make_signal(expression, dt, lane, made) for lane in lanes]
-        different = {id(each): each for each in found}
-        if len(different) == 1:
-            shared.append(found[0])
-            shared_order.append(index)
-        else:
-            place = {key: len(own) + number for number, key in enumerate(different)}
-            own += different.values()
-            places.append([place[id(each)] for each in found])
-            own_order.append(index)
+    found, indices = list_signals(expressions, dt, lanes)
+    is_shared = (indices == indices[0]).all(axis=0)
+    own, places = np.unique(indices[:, ~is_shared], return_inverse=True)
+    places = np.pad(places.reshape(len(lanes), -1), ((0, LANES - len(lanes)), (0, 0)), "edge")
     signals = LaneSignals(
-        stack_signals(shared, samples),
-        stack_signals(own, samples),
-        np.array(places, dtype=np.int64).reshape(1, -1, len(lanes)),
+        stack_signals([found[index] for index in indices[0, is_shared]], samples),
+        stack_signals([found[index] for index in own], samples),
+        np.ascontiguousarray(places.T[None]),
     )
-    return signals, np.array([*shared_order, *own_order], dtype=np.int64)
+    return signals, np.argsort(~is_shared, kind="stable")
+
+
+def list_signals(
+    expressions: Sequence[OdeExpression], dt: float, lanes: Sequence[LaneInput]
+) -> tuple[list[SampledSignal], NDArray[np.int64]]:
+    """Return the signals of all lanes once each, and their indices, shape (lanes, expressions)."""
+    made: dict[tuple[object, ...], SampledSignal] = {}
+    found = [[make_signal(expression, dt, lane, made) for expression in expressions] for lane in lanes]
+    signals = {id(each): each for row in found for each in row}
+    places = {key: index for index, key in enumerate(signals)}
+    indices = [[places[id(each)] for each in row] for row in found]
+    return list(signals.values()), np.array(indices, dtype=np.int64).reshape(len(lanes), -1)
 
 
 def stack_signals(signals: Sequence[SampledSignal], samples: int) -> NDArray[np.float64]:

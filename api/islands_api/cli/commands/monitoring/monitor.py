@@ -110,9 +110,12 @@ def monitor(
     check_folder(out, force=True)
     watched = WatchedFolder(folder, settle)
     known = read_monitor(out / STATE) if (out / STATE).exists() and not force else None
-    if known is None and simulated is None:
+    if simulated is not None:
+        spec = parse_monitored(simulated)
+    elif known is not None:
+        spec = known.simulation
+    else:
         raise SettingsError("a new monitor needs --simulation: extended.json or the folder of a diagnosis")
-    spec = parse_monitored(simulated) if simulated is not None else known.simulation  # type: ignore[union-attr]
     driving = [*options.columns(inputs or []), *(channels or [])]
     columns = _find_columns(spec, known, driving, output_column)
     reader = _Reader(*columns, spec, dt, reading)

@@ -1,7 +1,6 @@
 """Built-in simulators: their outputs, the places of effects, and documents of earlier versions."""
 
 import json
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +9,6 @@ import pytest
 import scipy
 from numpy.typing import NDArray
 
-import islands
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.preparation import make_context
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -210,72 +208,6 @@ def test_parameters_that_can_be_given_are_those_of_the_equations() -> None:
         simulator = made()[name].simulator
         names = {each.name for each in simulator.parameters if not each.initial}
         assert names == SIMULATORS[name].parameters.keys()
-
-
-def test_shooting_fits_the_states_of_every_interval() -> None:
-    """The equations are right, so that only the fitted positions and rates determine the output."""
-    case = made()["rigid-axis"]
-    position = simulate_oscillator(wave(), 2.0, 6.0, 0.0)
-    noisy = position + 1e-3 * np.random.default_rng(2).standard_normal(position.size)
-    record = recorded(wave(), noisy, units=("N", "m"))
-    spec = PhysicalSpec(kind="rigid-axis", parameters={"m": 2.0, "c": 6.0, "F": 0.0, "vs": 1.0})
-    simulator = make_simulator(spec, record)
-    assert [each.name for each in simulator.parameters] == ["m", "c", "F", "vs"]
-    assert simulator.built_in_effects == made()["rigid-axis"].simulator.built_in_effects
-    assert isinstance(case.simulator, OdeSimulator)
-    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
-    found = simulation.simulate(simulation.nominal)
-    # Two states in 50 samples have a fifth of the noise; the smoothed guesses alone have more.
-    assert np.std(found - position) < 0.25e-3
-    jumps = np.abs(np.diff(found) - np.diff(position))
-    assert set(np.flatnonzero(jumps > 1e-4) % 50) <= {49}
-
-
-def make_sticking_axis(seed: int, samples: int = 1500) -> tuple[Dataset, float]:
-    """Return a record of an axis that sticks at times, with 2 % of noise, and the noise."""
-    rng = np.random.default_rng(seed)
-    time = 0.01 * np.arange(samples)
-    phases = np.outer(time, rng.uniform(1.3, 12.6, 12)) + rng.uniform(0, 6.3, 12)
-    u = 10.0 * np.sin(phases).sum(axis=1) * np.minimum(1.0, time)
-    x, v, h, position = 0.0, 0.0, 5e-4, []
-    for k, force in enumerate(np.interp(h * np.arange(20 * samples), time, u).tolist()):
-        if k % 20 == 0:
-            position.append(x)
-        v += h * (force - 6.0 * v - 4.0 * math.tanh(v / 0.01)) / 2.0
-        x += h * v
-    sigma = 0.02 * float(np.std(position))
-    return recorded(u, np.array(position) + sigma * rng.standard_normal(samples), units=("N", "m")), sigma
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_shots_of_an_axis_that_sticks_have_the_error_of_the_noise(seed: int) -> None:
-    """A full Gauss-Newton step increases the error where the axis sticks, and shorter steps decrease it."""
-    record, sigma = make_sticking_axis(seed)
-    truth = {"m": 2.0, "c": 6.0, "F": 4.0, "vs": 0.01}
-    simulator = make_simulator(PhysicalSpec(kind="rigid-axis", parameters=truth), record)
-    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
-    assert np.std(record.y - simulation.simulate(simulation.nominal)) < 1.02 * sigma
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_noise_hardly_changes_the_estimate_of_an_axis(seed: int) -> None:
-    record, _ = make_sticking_axis(seed)
-    simulator = make_simulator("rigid-axis", record)
-    found = {each.name: each.nominal for each in simulator.parameters}
-    assert found["m"] == pytest.approx(2.0, rel=0.2)
-    assert found["c"] == pytest.approx(6.0, rel=0.2)
-
-
-def test_recordings_begin_with_a_shooting_interval() -> None:
-    record = made()["rigid-axis"].record
-    both = islands.join((record[:330], record[330:]))
-    spec = made()["rigid-axis"].spec
-    simulator = make_simulator(spec, both)
-    joined = ExtendedSimulator(simulator, (), make_context(both, simulator, both.samples))
-    output = joined.simulate(joined.nominal)
-    part = make_simulator(spec, both).for_samples(330, 600)  # type: ignore[attr-defined]
-    alone = ExtendedSimulator(part, (), make_context(record[330:], part, 270))
-    assert np.array_equal(output[330:], alone.simulate(alone.nominal))
 
 
 def test_extended_tanks_start_from_estimated_levels_on_other_records() -> None:
