@@ -77,8 +77,17 @@ class Rig:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the input and the output without noise, each of shape (samples,).
 
-        The term is added to the derivative of the state with the index ``place``; None for the output.
+        The term is added to the derivative of the state with the index ``place``; None for the output. Where
+        the output diverges, another input is drawn.
         """
+        while True:
+            u, y = self._simulate_once(term, place, rng, samples)
+            if np.isfinite(y).all():
+                return u, y
+
+    def _simulate_once(
+        self, term: Term, place: int | None, rng: np.random.Generator, samples: int
+    ) -> tuple[np.ndarray, np.ndarray]:
         time = self.dt * np.arange(samples)
         frequencies = rng.uniform(self.slowest, self.fastest, 12)
         phases = rng.uniform(0, 6.3, 12)

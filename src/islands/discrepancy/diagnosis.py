@@ -6,8 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
-from islands.discrepancy.calibration.levenberg_marquardt import calibrate
+from islands.discrepancy.calibration.intersample_selection import (
+    Discretisation,
+    get_discretisation,
+    select_intersample,
+)
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.discrepancy.calibration.noise_model import is_rounding_error
 from islands.discrepancy.calibration.preparation import (
     count_fitted_samples,
     make_context,
@@ -15,6 +20,7 @@ from islands.discrepancy.calibration.preparation import (
     select_effects,
     validate_prior,
 )
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis_assembly import extend_equations, make_diagnosis, make_gross_diagnosis
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.discovery.discovery import find_missing_terms, replaces_effects
@@ -26,8 +32,10 @@ from islands.discrepancy.gross_errors.gross_error_search import explain_divergen
 from islands.discrepancy.gross_errors.record_finding import describe_gaps
 from islands.discrepancy.inference.screening import screen_effects
 from islands.discrepancy.inference.strategies import (
+    SearchOutcome,
     assess_evidence,
     best_single,
+    make_exact_outcome,
     search_with_ar_noise,
     search_with_model_error,
 )
@@ -39,8 +47,8 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.errors import RecordError
 from islands.evolution.progress import ProgressCallback, ignore_progress
 
-#: Maximum number of searches, one after each change of the intersample behaviour or the step size.
-MAX_ROUNDS = 3
+#: Maximum number of intersample behaviours and step sizes with which effects are searched for.
+MAX_SEARCHES = 3
 
 
 def diagnose(
@@ -100,23 +108,12 @@ def diagnose(
     if gross_errors := find_gross_errors(record, simulator, base, fitted, prior_std):
         found = make_gross_diagnosis(record, base, gross_errors, fitted)
         return replace(found, record_findings=(*found.record_findings, *record_findings))
-    simulator = select_intersample(base, target)
+    if is_rounding_error(record.y - base.output, record.y):
+        found = make_diagnosis(record, make_exact_outcome(base, target), base, None, (), fitted, rng, map)
+        return replace(found, record_findings=tuple(record_findings))
     effects = select_effects(simulator, context, prior_std, catalogue)
-    for _ in range(MAX_ROUNDS):
-        base = calibrate(replace(simulation, simulator=simulator), target, base.values)
-        progress(f"screening {len(effects)} effects", 0.02)
-        screened = screen_effects(base, target, effects, parallel_map)
-        selected = select_intersample(best_single(base, screened), target)
-        if same_discretisation(selected, simulator):
-            outcome = search_with_ar_noise(base, screened, target, effects, progress, parallel_map)
-            selected = select_intersample(outcome.hypothesis.fit, outcome.target)
-        if same_discretisation(selected, simulator):
-            break
-        # The missing effect had hidden that another intersample behaviour or a finer step fits better.
-        progress("intersample behaviour changed: repeating the search")
-        simulator = selected
-    else:
-        outcome = search_with_ar_noise(base, screened, target, effects, progress, parallel_map)
+    base, outcome = _search(base, target, effects, progress, parallel_map)
+    simulator = base.simulation.simulator
     progress("analysing the residual", 0.9)
     outcome = assess_evidence(outcome, fitted, effects, rng)
     if outcome.verdict == Verdict.UNKNOWN or (
@@ -144,3 +141,41 @@ def diagnose(
         found = extend_equations(found, terms, target, rng)
     closed_loop = find_closed_loop(found.best, record.y, fitted, record.input_names[0])
     return replace(found, record_findings=(*record_findings, *closed_loop))
+
+
+def _search(
+    base: CalibrationResult,
+    target: Target,
+    effects: Sequence[Effect],
+    progress: ProgressCallback,
+    parallel_map: ParallelMap,
+) -> tuple[CalibrationResult, SearchOutcome]:
+    """Search with the intersample behaviour and the step size that suit the simulation with the effects.
+
+    Returns
+    -------
+    CalibrationResult
+        The simulation without effects, calibrated to unweighted residuals.
+    SearchOutcome
+    """
+    simulation, simulator = base.simulation, select_intersample(base, target)
+    tried: set[Discretisation] = set()
+    found: dict[Discretisation, tuple[CalibrationResult, SearchOutcome]] = {}
+    while True:
+        current = get_discretisation(simulator)
+        tried.add(current)
+        base = calibrate(replace(simulation, simulator=simulator), target, base.values)
+        progress(f"screening {len(effects)} effects", 0.02)
+        screened = screen_effects(base, target, effects, parallel_map)
+        selected = select_intersample(best_single(base, screened), target)
+        if (known := found.get(get_discretisation(selected))) is not None:
+            return known
+        if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
+            outcome = search_with_ar_noise(base, screened, target, effects, progress, parallel_map)
+            found[current] = base, outcome
+            selected = select_intersample(outcome.hypothesis.fit, outcome.target)
+            if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
+                return found[current]
+        # The missing effect had hidden that another intersample behaviour or a finer step fits better.
+        progress("intersample behaviour changed: repeating the search")
+        simulator = selected

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from islands.discrepancy.calibration.noise_model import is_rounding_error
 from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.gross_errors.record_finding import FAMILY, RecordFinding
 from islands.discrepancy.inference.confidence import CONFIDENCE_TEMPERATURE
@@ -55,8 +56,8 @@ def describe_noise(y: Signal, residual: Signal, context: SimulationContext) -> t
         context = replace(context, u=context.u[: y.size][is_known], segments=runs)
         y, residual = y[is_known], residual[is_known]
     findings: list[Finding] = []
-    if float(np.mean(residual**2)) <= (np.finfo(float).eps * float(np.max(np.abs(y)))) ** 2:
-        return ()  # the record is an output of the simulation, and the residual is rounding
+    if is_rounding_error(residual, y):
+        return ()
     for detector in DETECTORS.values():
         if any(each.name in detector.excluded_by for each in findings):
             continue

@@ -5,6 +5,7 @@ like damping.
 """
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -26,6 +27,9 @@ MAX_CHANGE_RATIO = 0.7
 #: Least decrease of minus twice the log-likelihood for which another intersample behaviour is selected.
 MIN_IMPROVEMENT = 10.0
 
+#: Intersample behaviour, and number of steps in a sample.
+Discretisation: TypeAlias = tuple[InterSample, int]
+
 
 def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
     """Return the simulator of a fit with the intersample behaviour and the step size that suit the record."""
@@ -46,12 +50,8 @@ def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
     return tried[best if tried[best][0] < tried[current][0] - MIN_IMPROVEMENT else current][1]
 
 
-def same_discretisation(one: Simulator, other: Simulator) -> bool:
-    """Return whether two simulators have the same intersample behaviour and the same step size."""
-    return _get_discretisation(one) == _get_discretisation(other)
-
-
-def _get_discretisation(simulator: Simulator) -> tuple[InterSample, int]:
+def get_discretisation(simulator: Simulator) -> Discretisation:
+    """Return the discretisation of a simulator."""
     return (
         (simulator.intersample, simulator.oversampling)
         if isinstance(simulator, ResampledSimulator)

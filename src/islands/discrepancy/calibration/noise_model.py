@@ -220,3 +220,14 @@ def estimate_effective_samples(residual: Signal, segments: Sequence[int] = ()) -
     correlation = np.fft.irfft(spectrum)[: n // 4]
     rho = correlation / max(float(correlation[0]), np.finfo(float).tiny)
     return max(10.0, n / (1.0 + 2.0 * float(np.sum(rho[1:] ** 2))))
+
+
+def is_rounding_error(residual: Signal, y: Signal) -> bool:
+    """Return whether a residual is rounding: the measured output is that of the simulation.
+
+    Parameters
+    ----------
+    residual, y : ndarray, shape (samples,)
+        Missing samples are NaN.
+    """
+    return float(np.nanmean(residual**2)) <= float(np.finfo(float).eps * np.nanmax(np.abs(y))) ** 2

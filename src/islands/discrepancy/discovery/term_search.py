@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
+from islands.discrepancy.calibration.intersample_selection import get_discretisation, select_intersample
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
 from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all
@@ -154,7 +154,7 @@ def _improve(found: TermSearchResult, fit: CalibrationResult) -> TermSearchResul
 def _select_discretisation(found: TermSearchResult, target: Target) -> TermSearchResult:
     """Select the intersample behaviour again, which the missing term may have hidden."""
     simulator = select_intersample(found.fit, target)
-    if same_discretisation(simulator, found.fit.simulation.simulator):
+    if get_discretisation(simulator) == get_discretisation(found.fit.simulation.simulator):
         return found
     simulation = replace(found.fit.simulation, simulator=simulator)
     return replace(found, fit=calibrate(simulation, target, found.fit.values))

@@ -145,6 +145,12 @@ def search_with_model_error(
     return _make_outcome(base, screened, target, hypothesis)
 
 
+def make_exact_outcome(base: CalibrationResult, target: Target) -> SearchOutcome:
+    """Return the outcome for a residual that is rounding: there is nothing to be searched for."""
+    hypothesis = Hypothesis(base, base.score, ())
+    return replace(_make_outcome(base, (), target, hypothesis), verdict=Verdict.NOTHING)
+
+
 def assess_evidence(
     outcome: SearchOutcome, fitted: int, effects: Sequence[Effect], rng: np.random.Generator
 ) -> SearchOutcome:

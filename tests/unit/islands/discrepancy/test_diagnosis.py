@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.discrepancy import diagnosis_assembly
+from islands.discrepancy import diagnosis, diagnosis_assembly
+from islands.discrepancy.calibration.intersample_selection import get_discretisation
 from islands.discrepancy.calibration.preparation import HOLDOUT_FRACTION, MIN_SAMPLES
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError, SettingsError
@@ -169,3 +171,19 @@ def test_tolerance_of_a_parameter_that_is_zero_is_rejected(record: Dataset) -> N
 def test_diverging_simulation_is_rejected(record: Dataset) -> None:
     with pytest.raises(RecordError, match="diverges on this input"), np.errstate(all="ignore"):
         diagnose(record, make_piezo(gamma=-5.0))
+
+
+@pytest.mark.ci
+def test_intersample_behaviour_that_is_rejected_ends_the_search(
+    record: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The search before counts: it is not repeated."""
+    held, effects = ResampledSimulator(make_piezo(), InterSample.ZOH, 1), [CATALOGUE["quadratic-drag"]]
+    once = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
+    # Before the search, after the screening, after the search, and after the screening of the held input.
+    selected = iter([make_piezo(), make_piezo(), held, make_piezo()])
+    monkeypatch.setattr(diagnosis, "select_intersample", lambda *_: next(selected))
+    found = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
+    assert next(selected, None) is None
+    assert get_discretisation(found.best.simulation.simulator) == (InterSample.FOH, 1)
+    assert np.array_equal(found.best.values, once.best.values)

@@ -6,7 +6,7 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
+from islands.discrepancy.calibration.intersample_selection import get_discretisation, select_intersample
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
     calibrate,
@@ -137,14 +137,10 @@ def test_simulator_without_integration_is_returned_unchanged() -> None:
     assert select_intersample(fit, target) is core
 
 
-def test_discretisations_are_compared_by_behaviour_and_step() -> None:
+def test_discretisation_is_behaviour_and_step() -> None:
     core = make_piezo()
-    assert same_discretisation(core, core)
-    assert same_discretisation(core, ResampledSimulator(core, InterSample.FOH, 1))
-    assert not same_discretisation(core, ResampledSimulator(core, InterSample.ZOH, 1))
-    assert not same_discretisation(
-        ResampledSimulator(core, InterSample.ZOH, 2), ResampledSimulator(core, InterSample.ZOH, 4)
-    )
+    assert get_discretisation(core) == (InterSample.FOH, 1)
+    assert get_discretisation(ResampledSimulator(core, InterSample.ZOH, 4)) == (InterSample.ZOH, 4)
 
 
 def test_a_simulation_that_smaller_steps_do_not_improve_keeps_its_step() -> None:
