@@ -133,7 +133,8 @@ def test_a_body_that_stalls_or_is_too_slow_is_a_problem_and_frees_everything(imp
         status, kind, _, headers = answer(connection)
         assert time.monotonic() - start < 15.0
         assert (status, kind, headers["connection"]) == (408, "request-timeout", "close")
-        assert connection.recv(1) == b""
+        with suppress(ConnectionResetError):  # by a byte that the service received after it had closed
+            assert connection.recv(1) == b""
     assert not receiving(impatient)
 
 
