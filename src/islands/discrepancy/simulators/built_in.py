@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
+from islands.discrepancy.interfaces.segments import is_resting
 from islands.discrepancy.simulators.ode_preparation import make_ode_simulator
 from islands.discrepancy.simulators.record_channels import make_nominal_context
 from islands.discrepancy.simulators.shooting import smooth
@@ -93,7 +94,17 @@ def estimate_axis(system: OdeSystem, given: Mapping[str, float], record: Dataset
     The estimate uses the inverse dynamics: least squares of the force on smoothed acceleration, rate and
     direction (Olsen and Petersen 2001). Noise of the acceleration makes the mass too small, and a long window
     of the filter smooths the motion, so that the window with the smallest error of a simulation is used.
+
+    Raises
+    ------
+    RecordError
+        The axis rests.
     """
+    if is_resting(record.y):
+        raise RecordError(
+            f"column {record.output_name} is constant: the parameters of {system.name} are estimated from a "
+            "motion; select other rows"
+        )
     shortest = min(record.segments)
     candidates = [_invert_axis(system, given, record, each) for each in _WINDOWS if each <= shortest]
     part = record.longest_segment
