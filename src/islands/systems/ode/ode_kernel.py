@@ -44,10 +44,8 @@ SUBTRACT_PRODUCT = 21
 POWER = 30
 EXPONENTIAL = 31
 LOGARITHM = 32
-SINE = 33
-COSINE = 34
-TANGENT = 35
-ARC_TANGENT = 36
+TANGENT = 33
+ARC_TANGENT = 34
 
 #: Instruction that sums the force laws; the operands are the coordinate and its rate.
 FORCES = 40
@@ -118,10 +116,6 @@ def _apply(operation, arena, target, first, second, lanes):
             y = math.exp(x)
         elif operation == LOGARITHM:
             y = np.log(x)
-        elif operation == SINE:
-            y = math.sin(x)
-        elif operation == COSINE:
-            y = math.cos(x)
         elif operation == TANGENT:
             y = math.tan(x)
         else:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from islands.errors import ModelError
 from islands.kernels.interpreter import ADD, MULTIPLY, SIGN, SUBTRACT
 from islands.systems.ode import ode_kernel
-from islands.systems.ode.composite_functions import generate_power, generate_tanh
+from islands.systems.ode.composite_functions import CompositeFunctions
 from islands.systems.ode.equation_parser import FORCE, TIME
 from islands.systems.ode.kernel_arguments import Instructions
 from islands.systems.ode.ode_expression import (
@@ -48,8 +48,6 @@ _OPERATIONS: Mapping[str, int] = MappingProxyType(
         "sqrt": ode_kernel.SQUARE_ROOT,
         "exp": ode_kernel.EXPONENTIAL,
         "log": ode_kernel.LOGARITHM,
-        "sin": ode_kernel.SINE,
-        "cos": ode_kernel.COSINE,
         "tan": ode_kernel.TANGENT,
         "atan": ode_kernel.ARC_TANGENT,
         "sign": SIGN,
@@ -130,6 +128,7 @@ class _Generator:
         self._named: dict[str, int] = {}
         self._sections: tuple[list[tuple[int, ...]], ...] = ([], [], [], [])
         self._rows = 0
+        self._functions = CompositeFunctions(self._operation, self._number)
 
     def generate(self, outputs: tuple[OdeExpression, ...]) -> OdeProgram:
         system, laws = self.system, self.laws
@@ -211,9 +210,13 @@ class _Generator:
             case Operation(function, _) if function in SIGNAL_FUNCTIONS or function == FMU:
                 return self._signal(expression, _STATES if function == FMU else _SIGNALS)
             case Operation("pow", (base, Number(power))) if power in range(2, MAX_MULTIPLIED_POWER + 1):
-                return generate_power(self._make(base), int(power), self._operation)
+                return self._functions.power(self._make(base), int(power))
             case Operation("tanh", (argument,)):
-                return generate_tanh(self._make(argument), self._operation, self._number)
+                return self._functions.tanh(self._make(argument))
+            case Operation("sin", (argument,)):
+                return self._functions.sine(self._make(argument))
+            case Operation("cos", (argument,)):
+                return self._functions.cosine(self._make(argument))
             case Operation(function, arguments):
                 return self._operation(_OPERATIONS[function], *map(self._make, arguments))
 
