@@ -177,7 +177,10 @@ LAWS: Mapping[str, Mapping[str, tuple[int | None, Term]]] = {
         "softening damper": (1, lambda s, _u, _w, _t: -3.0 * np.tanh(s[1] / 0.8)),
         "growing stiffness": (1, lambda s, _u, _w, t: -1.0 * t * s[0]),
         "input-dependent damping": (1, lambda s, u, _w, _t: -0.05 * u * s[1]),
-        "sine of position": (1, lambda s, _u, _w, _t: -10.0 * np.sin(s[0] / 0.08)),
+        "Stribeck friction": (
+            1,
+            lambda s, _u, _w, _t: -6.0 * np.tanh(s[1] / 0.01) * np.exp(-((s[1] / 0.5) ** 2)),
+        ),
     },
     "bouc-wen-piezo": {
         "product of position and velocity": (None, lambda _s, u, w, _t: 5e-4 * u * w),

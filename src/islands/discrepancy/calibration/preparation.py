@@ -10,7 +10,7 @@ from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.effects.scale import wrong_parameter
 from islands.discrepancy.interfaces.effect import Effect, SimulationContext, Site
-from islands.discrepancy.interfaces.segments import is_resting, split_at_gaps
+from islands.discrepancy.interfaces.segments import fill_gaps, is_resting, split_at_gaps
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -222,4 +222,7 @@ def make_context(record: Dataset, simulator: Simulator, fitted: int) -> Simulati
     if is_resting(nominal[:fitted]):  # it may rest at zero, while the measured output creeps
         peak = max(float(np.max(np.abs(nominal))), peak_amplitude(record.y[~np.isnan(record.y)]))
     scaled = replace(context, output_peak=peak)
-    return replace(scaled, force_coordinate=simulator.make_force_coordinate(scaled, nominal))
+    coordinate = simulator.make_force_coordinate(scaled, nominal)
+    if coordinate.is_output:
+        coordinate = replace(coordinate, measured=fill_gaps(record.y))
+    return replace(scaled, force_coordinate=coordinate)

@@ -6,6 +6,7 @@ To add an effect, define it in the file of its family and add it to `EFFECTS`.
 from collections.abc import Iterable, Mapping
 
 from islands.discrepancy.effects.baseline import INPUT_OFFSET, JUMP, LINEAR_DRIFT, OFFSET, THERMAL_DRIFT
+from islands.discrepancy.effects.cogging import COGGING
 from islands.discrepancy.effects.creep import EXPONENTIAL_CREEP, LOGARITHMIC_CREEP
 from islands.discrepancy.effects.disturbance import CROSS_COUPLING, PERIODIC_DISTURBANCE
 from islands.discrepancy.effects.free_forms import FREE_FORMS
@@ -61,6 +62,7 @@ EFFECTS: tuple[Effect, ...] = (
     QUADRATIC_DRAG,
     EVEN_NONLINEARITY,
     CUBIC_STIFFNESS,
+    COGGING,
     EXPONENTIAL_CREEP,
     LOGARITHMIC_CREEP,
     SENSOR_LAG,

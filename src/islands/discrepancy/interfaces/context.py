@@ -1,7 +1,7 @@
 """Input of a simulation, scales of its record, and parameters."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf
 
 import numpy as np
@@ -36,6 +36,10 @@ class ForceCoordinate:
         Whether strengths of friction and hysteresis are bounded below by zero.
     friction_smoothing : float
         Width of the smoothed sign change of dry friction, relative to the typical rate.
+    is_output : bool
+        Whether the output is the coordinate.
+    measured : ndarray, shape (samples,), or None
+        Coordinate in the record, without gaps. None if it is not measured.
     """
 
     unit: str
@@ -46,6 +50,8 @@ class ForceCoordinate:
     sign: float = -1.0
     is_dissipative: bool = False
     friction_smoothing: float = 0.005
+    is_output: bool = False
+    measured: Signal | None = field(default=None, compare=False)
 
     @property
     def lower_bound(self) -> float:

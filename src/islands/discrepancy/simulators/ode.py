@@ -121,9 +121,14 @@ class OdeSimulator:
             for ends, part in zip(context.bounds, context.split(), strict=True)
         ]
         coordinate, drive = np.concatenate(parts, axis=1)
-        unit = {each.name: each.unit for each in self.system.states}.get(force.coordinate) or "1"
-        given, peak = force.unit or context.input_unit, peak_amplitude(drive)
-        return replace(output_coordinate(context, coordinate), unit=unit, force_unit=given, force=peak)
+        units = {each.name: each.unit for each in self.system.states}
+        return replace(
+            output_coordinate(context, coordinate),
+            unit=units.get(force.coordinate) or "1",
+            force_unit=force.unit or context.input_unit,
+            force=peak_amplitude(drive),
+            is_output=self.system.output == Symbol(force.coordinate),
+        )
 
     def simulate(
         self,

@@ -149,7 +149,7 @@ CASES: Mapping[str, SimulatedCase] = MappingProxyType(
             EXACT,
             {},
             free=True,
-            without=frozenset(("offset", "gain-step", "ageing")),
+            without=frozenset(("offset", "gain-step", "ageing", "cogging")),
         ),
         "cascaded-tanks": SimulatedCase(TANKS, _make_built_in("cascaded-tanks"), EXACT, {}, free=True),
     }

@@ -4,7 +4,7 @@ Each factory takes a random generator and a strength and returns a `Force`: a fu
 coordinate q, rate w and state z that returns the normalised force and the derivative of z by q.
 """
 
-from math import copysign, tanh
+from math import copysign, sin, tanh
 
 import numpy as np
 
@@ -48,6 +48,12 @@ def cube(rng: np.random.Generator, strength: float) -> Force:
     """Cubic (odd) stiffness."""
     c = random_sign(rng) * strength
     return lambda q, _w, _z: (c * q * q * q, 0.0)
+
+
+def cogging(rng: np.random.Generator, strength: float) -> Force:
+    """Force with 4 to 20 periods over the typical range of the coordinate, at a random phase."""
+    periods, phase = float(rng.uniform(4.0, 20.0)), float(rng.uniform(0.0, 2.0 * np.pi))
+    return lambda q, _w, _z: (strength * sin(np.pi * periods * q + phase), 0.0)
 
 
 def parallel(rng: np.random.Generator, strength: float) -> Force:

@@ -151,6 +151,7 @@ OSCILLATOR = Rig(
         Fault("quadratic-drag", 0.002, 0.2, (add_force(force_faults.drag),)),
         Fault("even-nonlinearity", 0.002, 0.2, (add_force(force_faults.square),)),
         Fault("cubic-stiffness", 0.004, 0.3, (add_force(force_faults.cube),)),
+        Fault("cogging", 0.002, 0.2, (add_force(force_faults.cogging),)),
         Fault("input-saturation", 0.04, 0.5, (before_plant(signal_faults.input_saturation),)),
         Fault("output-saturation", 0.03, 0.5, (after_plant(signal_faults.output_saturation),)),
         Fault("dead-zone", 0.05, 2.5, (before_plant(signal_faults.dead_zone),)),
