@@ -18,8 +18,8 @@ BINS = 2048
 LINE_WIDTH = 2.0
 
 #: Number of spatial frequencies that the calibration starts from, by the order of the differences of the
-#: residual. A mass integrates the force twice; second differences are proportional to it, but amplify noise.
-STARTING_FREQUENCIES = {0: 4, 2: 2}
+#: residual. The residual of a spring is proportional to the force, as is the second difference of a mass's.
+STARTING_FREQUENCIES = {0: 2, 1: 1, 2: 2}
 
 
 def _cogging_force(x: float, _rate: float, _z: float, k: Any) -> float:
@@ -59,23 +59,29 @@ def _compute_spatial_spectrum(x: Signal, residual: Signal) -> tuple[Signal, Sign
     return frequencies, spectrum
 
 
+def _take_differences(signal: Signal, order: int) -> Signal:
+    """Return differences of a signal, which is smoothed over some samples since they amplify noise."""
+    window = np.hanning(4 * order + 3)[1:-1]
+    smooth = np.convolve(signal - signal.mean(), window / window.sum(), mode="same")
+    return np.diff(smooth, order, prepend=np.zeros(order))
+
+
 def _cogging_starting_points(context: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
     fitted = round(context.fit_end_time / context.dt)
     coordinate, span = context.force_coordinate, _get_range(context)
     assert coordinate.measured is not None
     found: list[float] = []
     for order, count in STARTING_FREQUENCIES.items():
-        differences = np.diff(residual[:fitted], order, prepend=[residual[0]] * order)
+        differences = _take_differences(residual[:fitted], order)
         frequencies, spectrum = _compute_spatial_spectrum(coordinate.measured[:fitted], differences)
         # At its typical rate, the coordinate passes at most one period in a sample.
         is_resolved = frequencies * coordinate.rate * context.dt <= 1.0
         spectrum[(frequencies < MIN_PERIODS / span) | ~is_resolved] = 0.0
-        for known in found:
-            spectrum[np.abs(frequencies - known) < LINE_WIDTH / span] = 0.0
         for _ in range(count):
+            for known in found:
+                spectrum[np.abs(frequencies - known) < LINE_WIDTH / span] = 0.0
             if spectrum.any():
                 found.append(float(frequencies[np.argmax(spectrum)]))
-                spectrum[np.abs(frequencies - found[-1]) < LINE_WIDTH / span] = 0.0
     force = 0.02 * coordinate.force
     return tuple(point for each in found for point in ((force, 0.0, each), (0.0, force, each)))
 
