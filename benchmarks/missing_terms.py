@@ -23,6 +23,7 @@ from islands.discrepancy.calibration.preparation import make_context, make_targe
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.errors import RecordError
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 
@@ -219,7 +220,10 @@ def run_trial(name: str, law: str, strength: float, seed: int) -> tuple[Diagnosi
     other = rig.make_record(*rig.simulate(term, place, rng, rig.samples), sigma, rng)
     if found.gain is None:
         return found, float("nan")
-    simulated = simulate_spec(json.loads(extended_json(found.best, found.record)), other)
+    try:
+        simulated = simulate_spec(json.loads(extended_json(found.best, found.record)), other)
+    except RecordError:  # the extended simulation diverges on the new record
+        return found, float("inf")
     return found, float(np.std(other.y - simulated)) / sigma
 
 

@@ -61,15 +61,20 @@ def extend_equations(
 ) -> Diagnosis:
     """Return the diagnosis with discovered terms in place of effects, if the hold-out part confirms them.
 
-    Its error has to be smaller with them than without, and not larger than with the effects. The terms have
-    to explain as much as effects would have to.
+    Its error must not be larger with them than with the effects, by the rule for effects; if there are none,
+    it has to be smaller than without the terms. The terms have to explain as much as effects would have to.
     """
     record, fitted = found.record, found.estimation_samples
     fit = fit_initial_states(terms.search.fit, target, fitted)
     holdout = slice(fitted, record.samples)
     floor = min(found.noise_floor, float(np.sqrt(fit.mean_square)))
     gain = measure_gain(record, found.base.output, fit.output, holdout, floor, rng)
-    if gain.ci95[0] <= 0.0 or (found.gain is not None and gain.after.rmse > found.gain.after.rmse):
+    if found.gain is None:
+        is_confirmed = gain.ci95[0] > 0.0
+    else:
+        compared = measure_gain(record, found.best.output, fit.output, holdout, floor, rng)
+        is_confirmed = compared.ci95[1] >= -MAX_HOLDOUT_LOSS_PERCENT
+    if not is_confirmed:
         return found
     residual, output = (record.y - fit.output)[:fitted], fit.output[:fitted]
     context = fit.simulation.context

@@ -1,7 +1,7 @@
 """Result of a diagnosis."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
@@ -77,10 +77,10 @@ class Diagnosis:
     gain: HoldoutGain | None
     residual_structure: Mapping[str, float]
     suggested_experiment: str
-    record: Dataset
+    record: Dataset = field(repr=False)
     estimation_samples: int
-    base: CalibrationResult
-    best: CalibrationResult
+    base: CalibrationResult = field(repr=False)
+    best: CalibrationResult = field(repr=False)
     noise_floor: float
     is_noise_floor_measured: bool
     nominal_rmse: float

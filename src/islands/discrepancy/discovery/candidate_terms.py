@@ -34,12 +34,17 @@ FACTORS = ("a", "a**2", "abs(a)", "sign(a)")
 #: Largest number of signals of which products are candidates: these grow with the cube of the number.
 MAX_MULTIPLIED_SIGNALS = 8
 
-#: Functions with a scale that is fitted: a saturation.
-SATURATION = "tanh({signal}/{scale})"
+#: Functions with a scale that is fitted, and its nominal value relative to the largest value of their signal:
+#: a saturation, and two forms of the Stribeck curve (Armstrong-Helouvry, Dupont and Canudas de Wit, A survey
+#: of models, analysis tools and compensation methods for the control of machines with friction, 1994).
+SCALED_FORMS = {
+    "tanh({signal}/{scale})": 0.3,
+    "sign({signal})*exp(-abs({signal}/{scale}))": 0.1,
+    "sign({signal})*exp(-({signal}/{scale})**2)": 0.1,
+}
 
-#: Nominal scale of a saturation, relative to the largest value of its signal.
-NOMINAL_SCALE = 0.3
-
+#: Further scales from which a fit starts, relative to the nominal one.
+STARTING_SCALES = (0.3, 3.0)
 
 #: Nominal value and bound of a coefficient, relative to that of a term as large as the rest of its equation.
 NOMINAL, LIMIT = 1e-3, 1e4
@@ -142,9 +147,10 @@ def list_candidate_terms(
             size, own_unit = _compute_size(expression, values), find_factor_unit(unit, expression, units)
             terms.append(CandidateTerm(target, text, size, unit=own_unit))
         for signal in signals:
-            text, scale = SATURATION.format(signal=signal, scale="{scale}"), NOMINAL_SCALE * sizes[signal]
             scale_unit = find_expression_unit(parse_expression(signal), units)
-            terms.append(CandidateTerm(target, text, 1.0, scale, unit, scale_unit))
+            for form, scale in SCALED_FORMS.items():
+                text = form.format(signal=signal, scale="{scale}")
+                terms.append(CandidateTerm(target, text, 1.0, scale * sizes[signal], unit, scale_unit))
     return tuple(terms)
 
 

@@ -13,15 +13,16 @@ import numpy as np
 
 from islands.discrepancy.calibration.intersample_selection import get_discretisation, select_intersample
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
-from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.candidate_terms import (
+    STARTING_SCALES,
     CandidateTerm,
     find_free_numbers,
     list_candidate_terms,
 )
-from islands.discrepancy.discovery.equation_simulator import find_equations, with_equations
+from islands.discrepancy.discovery.equation_simulator import find_equations
+from islands.discrepancy.discovery.term_ranking import RankedTerm, add_terms, get_system, rank_terms
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
@@ -29,10 +30,6 @@ from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.systems.ode.ode_expression import render
 from islands.systems.ode.ode_system import OUTPUT, OdeSystem
-
-#: Number of terms whose responses are simulated in one call. The equations of every lane contain all of them:
-#: more terms in a call save nothing.
-TERMS_PER_CALL = 8
 
 #: Maximum number of terms.
 MAX_TERMS = 3
@@ -88,7 +85,7 @@ class TermSearchResult:
 
     def describe(self) -> str:
         """Return the extended equations and the values of their new parameters as one line."""
-        system = _get_system(self.fit)
+        system = get_system(self.fit)
         right_sides = {**dict(system.derivatives), OUTPUT: system.output}
         changed = dict.fromkeys(each.term.target for each in self.terms)
         lines = [
@@ -135,11 +132,11 @@ def search_terms(
         OUTPUT: context.output_peak,
         **{name: sizes[f"d{name}/dt"] for name, _ in system.derivatives},
     }
-    found = TermSearchResult(base, ())
+    found, unweighted = TermSearchResult(base, ()), target
     while len(found.terms) < MAX_TERMS:
         target = whiten_target(target, found.fit)
         found = _improve(found, calibrate(found.fit.simulation, target, found.fit.values))
-        best = _find_best_term(found, target, candidates, target_sizes, parallel_map)
+        best = _find_best_term(found, target, unweighted, candidates, target_sizes, parallel_map)
         if best is None or best.cost > found.cost - MIN_GAIN:
             break
         found = _eliminate_terms(_select_discretisation(best, target), system, target, target_sizes)
@@ -169,7 +166,7 @@ def _eliminate_terms(
         for left_out in found.terms:
             kept = tuple(each for each in found.terms if each is not left_out)
             numbered = [(each.term, each.number) for each in kept]
-            simulation, start = _add_terms(found.fit, system, numbered, target_sizes)
+            simulation, start = add_terms(found.fit, system, numbered, target_sizes)
             smaller.append(TermSearchResult(calibrate(simulation, target, start), kept))
         best = min(smaller, key=lambda each: each.cost)
         if best.cost > found.cost + MIN_GAIN:
@@ -181,20 +178,24 @@ def _eliminate_terms(
 def _find_best_term(
     found: TermSearchResult,
     target: Target,
+    unweighted: Target,
     candidates: Sequence[CandidateTerm],
     target_sizes: Mapping[str, float],
     parallel_map: ParallelMap,
 ) -> TermSearchResult | None:
     """Return the equations with the term that is best after a calibration of all parameters."""
     fit, used = found.fit, {(each.term.target, each.term.text) for each in found.terms}
-    (number,) = find_free_numbers(_get_system(fit), 1)
+    (number,) = find_free_numbers(get_system(fit), 1)
     free = [each for each in candidates if (each.target, each.text) not in used]
     log_n, log_choices = float(np.log(fit.noise.effective_samples)), 2.0 * float(np.log(len(candidates)))
-    terms = _rank_terms(fit, target, free, target_sizes, parallel_map)[:FITTED_TERMS]
-    extended = [_add_terms(fit, _get_system(fit), [(term, number)], target_sizes) for term in terms]
-    tasks = [(simulation, [start]) for simulation, start in extended]
+    ranked = rank_terms(fit, [target, unweighted], free, target_sizes, parallel_map)[:FITTED_TERMS]
+    tasks = []
+    for each in ranked:
+        simulation, start = add_terms(fit, get_system(fit), [(each.term, number)], target_sizes)
+        tasks.append((simulation, _list_starts(simulation, start, each, number)))
     results = []
-    for term, fitted in zip(terms, calibrate_all(StartsCalibrator(target), tasks, parallel_map), strict=True):
+    terms, calibrator = [each.term for each in ranked], StartsCalibrator(target)
+    for term, fitted in zip(terms, calibrate_all(calibrator, tasks, parallel_map), strict=True):
         if not np.isfinite(fitted.score):
             continue
         # Any of the candidates could gain by chance.
@@ -204,66 +205,15 @@ def _find_best_term(
     return min(results, key=lambda each: each.cost, default=None)
 
 
-def _rank_terms(
-    fit: CalibrationResult,
-    target: Target,
-    candidates: Sequence[CandidateTerm],
-    target_sizes: Mapping[str, float],
-    parallel_map: ParallelMap,
-) -> list[CandidateTerm]:
-    """Return the terms in the order of the part of the residual that their linear responses explain."""
-    projection = Projection(fit, target)
-
-    def explain_group(group: Sequence[CandidateTerm]) -> list[float]:
-        # Each lane has the coefficient of one of the terms.
-        numbers = find_free_numbers(_get_system(fit), len(group))
-        numbered = list(zip(group, numbers, strict=True))
-        simulation, start = _add_terms(fit, _get_system(fit), numbered, target_sizes)
-        places = {parameter.name: index for index, parameter in enumerate(simulation.parameters)}
-        points = np.tile(start, (len(group), 1))
-        for point, (term, number) in zip(points, numbered, strict=True):
-            place = places[term.name_parameters(number)[0]]
-            point[place] = simulation.parameters[place].nominal
-        outputs = simulation.simulate_batch(points)
-        return [_explain(output - fit.output, projection) for output in outputs]
-
-    groups = [
-        candidates[first : first + TERMS_PER_CALL] for first in range(0, len(candidates), TERMS_PER_CALL)
-    ]
-    explained = [each for group in parallel_map(explain_group, groups) for each in group]
-    order = np.argsort(-np.array(explained), kind="stable")
-    return [candidates[index] for index in order if explained[index] > 0.0]
-
-
-def _explain(response: Signal, projection: Projection) -> float:
-    """Return the sum of squares of the residual that a response explains."""
-    if not np.isfinite(response).all():
-        return 0.0
-    projected = projection(response)
-    energy = float(projected @ projected)
-    return float(projected @ projection.residual) ** 2 / energy if energy > 0.0 else 0.0
-
-
-def _add_terms(
-    fit: CalibrationResult,
-    system: OdeSystem,
-    terms: Sequence[tuple[CandidateTerm, int]],
-    target_sizes: Mapping[str, float],
-) -> tuple[ExtendedSimulator, Signal]:
-    """Return a simulation of a system with more, numbered terms, and its values.
-
-    Known parameters have the values of ``fit``; coefficients of new terms are zero.
-    """
-    for term, number in terms:
-        system = term.add_to(system, number, target_sizes[term.target])
-    simulation = replace(fit.simulation, simulator=with_equations(fit.simulation.simulator, system))
-    values = {term.name_parameters(number)[0]: 0.0 for term, number in terms}
-    values |= {each.name: v for each, v in zip(fit.simulation.parameters, fit.values, strict=True)}
-    start = [values.get(parameter.name, parameter.nominal) for parameter in simulation.parameters]
-    return simulation, np.array(start)
-
-
-def _get_system(fit: CalibrationResult) -> OdeSystem:
-    equations = find_equations(fit.simulation.simulator)
-    assert equations is not None
-    return equations.system
+def _list_starts(
+    simulation: ExtendedSimulator, start: Signal, ranked: RankedTerm, number: int
+) -> list[Signal]:
+    """Return starting points: coefficients of zero with several scales, and the estimated coefficients."""
+    places = {parameter.name: index for index, parameter in enumerate(simulation.parameters)}
+    coefficient, *scales = (places[name] for name in ranked.term.name_parameters(number))
+    changes = [(scale, factor * start[scale]) for scale in scales for factor in STARTING_SCALES]
+    changes += [(coefficient, value) for value in ranked.coefficients]
+    starts = np.tile(start, (len(changes) + 1, 1))
+    for point, (place, value) in zip(starts[1:], changes, strict=True):
+        point[place] = value
+    return list(starts)

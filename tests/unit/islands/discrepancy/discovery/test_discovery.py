@@ -102,12 +102,25 @@ def test_missing_term_is_found_with_its_coefficient(name: str) -> None:
 
 
 @pytest.mark.ci
-def test_saturation_is_found_with_its_scale() -> None:
-    found = search(lambda x, _v, _u: 20.0 * np.tanh(x / 0.1))
+@pytest.mark.parametrize(
+    ("text", "expected", "law"),
+    [
+        ("tanh(x/{scale})", 0.1, lambda x, _v, _u: 20.0 * np.tanh(x / 0.1)),
+        (
+            "sign(v)*exp(-(v/{scale})**2)",
+            1.0,
+            lambda _x, v, _u: 6.0 * np.tanh(v / 0.01) * np.exp(-(v**2)),
+        ),
+    ],
+)
+def test_saturation_and_stribeck_curve_are_found_with_their_scale(
+    text: str, expected: float, law: Law
+) -> None:
+    found = search(law)
     assert found is not None
-    assert [each.term.text for each in found.terms] == ["tanh(x/{scale})"]
+    assert [each.term.text for each in found.terms] == [text]
     scale = dict(zip((each.name for each in found.fit.simulation.parameters), found.fit.values, strict=True))
-    assert scale["s1"] == pytest.approx(0.1, rel=0.1)
+    assert scale["s1"] == pytest.approx(expected, rel=0.1)
 
 
 def test_no_term_is_added_to_right_equations() -> None:

@@ -1,0 +1,130 @@
+"""Ranking of candidate terms by the part of the residual that they explain."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.calibration.projection import Projection
+from islands.discrepancy.calibration.target import Target
+from islands.discrepancy.discovery.candidate_terms import CandidateTerm, find_free_numbers
+from islands.discrepancy.discovery.equation_simulator import find_equations, with_equations
+from islands.discrepancy.interfaces.context import Signal
+from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.systems.ode.ode_system import OdeSystem
+
+#: Number of terms whose responses are simulated in one call. The equations of every lane contain all of them:
+#: more terms in a call save nothing.
+TERMS_PER_CALL = 8
+
+#: Ratio of the parts of the residual that a response and a linear response explain, from which the former is
+#: another one.
+MIN_NONLINEAR_GAIN = 1.1
+
+
+class RankedTerm(NamedTuple):
+    """A term, and estimates of its coefficient at which it explains more than its linear response."""
+
+    term: CandidateTerm
+    coefficients: tuple[float, ...]
+
+
+def rank_terms(
+    fit: CalibrationResult,
+    targets: Sequence[Target],
+    candidates: Sequence[CandidateTerm],
+    target_sizes: Mapping[str, float],
+    parallel_map: ParallelMap,
+) -> list[RankedTerm]:
+    """Return the terms in the order of the part of the residual that their responses explain.
+
+    Each term is simulated with a small coefficient, and with the one at which that response explains most:
+    the response to a term that changes within few samples, such as friction, is far from linear.
+
+    Parameters
+    ----------
+    fit : CalibrationResult
+        The equations without the terms.
+    targets : sequence of Target
+        Targets with different noise models; the best rank of a term counts. A noise model of a residual that
+        is mainly caused by what the equations lack suppresses this, and without one, slow noise hides it.
+    candidates : sequence of CandidateTerm
+    target_sizes : mapping
+        Largest absolute values of the right-hand sides.
+    parallel_map : ParallelMap
+        Simulates the terms.
+    """
+    projections = [Projection(fit, target) for target in targets]
+
+    def explain_group(group: Sequence[CandidateTerm]) -> list[NDArray[np.float64]]:
+        # Each lane has the coefficient of one of the terms.
+        numbers = find_free_numbers(get_system(fit), len(group))
+        numbered = list(zip(group, numbers, strict=True))
+        simulation, start = add_terms(fit, get_system(fit), numbered, target_sizes)
+        places = {parameter.name: index for index, parameter in enumerate(simulation.parameters)}
+        lanes = np.arange(len(group)), [places[term.name_parameters(number)[0]] for term, number in numbered]
+        points = np.tile(start, (len(group), 1))
+        points[lanes] = [simulation.parameters[place].nominal for place in lanes[1]]
+        small, outputs = points[lanes], simulation.simulate_batch(points)
+        found = []
+        for projection in projections:
+            linear = [_explain(output - fit.output, projection) for output in outputs]
+            points[lanes] = small * [factor for _, factor in linear]
+            large = simulation.simulate_batch(points)
+            explained = [_explain(output - fit.output, projection)[0] for output in large]
+            found.append(np.column_stack([[each for each, _ in linear], explained, points[lanes]]))
+        return found
+
+    groups = [
+        candidates[first : first + TERMS_PER_CALL] for first in range(0, len(candidates), TERMS_PER_CALL)
+    ]
+    # Of shape (targets, terms, 3): parts that the linear and the other response explain, and the coefficient.
+    found = np.concatenate(list(parallel_map(explain_group, groups)), axis=1)
+    explained = found[:, :, :2].max(axis=2)
+    rank = np.argsort(np.argsort(-explained, axis=1, kind="stable"), axis=1).min(axis=0)
+    ranked = []
+    for index in np.argsort(rank, kind="stable"):
+        if explained[:, index].max() > 0.0:
+            chosen = found[:, index]
+            is_other = chosen[:, 1] > MIN_NONLINEAR_GAIN * chosen[:, 0]
+            ranked.append(RankedTerm(candidates[index], tuple(chosen[is_other, 2].tolist())))
+    return ranked
+
+
+def _explain(response: Signal, projection: Projection) -> tuple[float, float]:
+    """Return the sum of squares of the residual that a response explains, and its factor in the residual."""
+    if not np.isfinite(response).all():
+        return 0.0, 0.0
+    projected = projection(response)
+    energy, product = float(projected @ projected), float(projected @ projection.residual)
+    return (product**2 / energy, product / energy) if energy > 0.0 else (0.0, 0.0)
+
+
+def add_terms(
+    fit: CalibrationResult,
+    system: OdeSystem,
+    terms: Sequence[tuple[CandidateTerm, int]],
+    target_sizes: Mapping[str, float],
+) -> tuple[ExtendedSimulator, Signal]:
+    """Return a simulation of a system with more, numbered terms, and its values.
+
+    Known parameters have the values of ``fit``; coefficients of new terms are zero.
+    """
+    for term, number in terms:
+        system = term.add_to(system, number, target_sizes[term.target])
+    simulation = replace(fit.simulation, simulator=with_equations(fit.simulation.simulator, system))
+    values = {term.name_parameters(number)[0]: 0.0 for term, number in terms}
+    values |= {each.name: v for each, v in zip(fit.simulation.parameters, fit.values, strict=True)}
+    start = [values.get(parameter.name, parameter.nominal) for parameter in simulation.parameters]
+    return simulation, np.array(start)
+
+
+def get_system(fit: CalibrationResult) -> OdeSystem:
+    """Return the equations of a fit."""
+    equations = find_equations(fit.simulation.simulator)
+    assert equations is not None
+    return equations.system
