@@ -8,12 +8,12 @@ from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.preparation import estimation_part, make_context
+from islands.discrepancy.calibration.levenberg_marquardt import calibrate
+from islands.discrepancy.calibration.preparation import estimation_part, make_context, make_target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.context import ForceCoordinate, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect
@@ -112,27 +112,15 @@ def simulate_spec(
         record = match_record(ColumnReference(spec.inputs, spec.output), record, "the extended simulation")
     simulator = make_simulator(spec, record, columns)
     alone = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
-    initial = [place for place, parameter in enumerate(alone.parameters) if parameter.initial]
-    if not initial:
+    is_state = np.array([parameter.initial for parameter in alone.parameters], dtype=bool)
+    if not is_state.any():
         return alone.simulate(alone.nominal)
-    # Initial states belong to this record. All other parameters keep their values.
-    scales = alone.scales[initial]
-
-    def simulate(steps: NDArray[np.float64]) -> NDArray[np.float64]:
-        values = alone.nominal
-        values[initial] += scales * steps
-        return alone.simulate(np.clip(values, *alone.bounds))
-
-    is_known = ~np.isnan(record.y)
-    measured = record.y[is_known]
-    size = float(np.std(measured)) or 1.0
-    best = scipy.optimize.least_squares(
-        lambda steps: np.nan_to_num((simulate(steps)[is_known] - measured) / size, nan=1e6),
-        np.zeros(len(initial)),
-        method="lm",
-        diff_step=1e-4,
-    )
-    return simulate(best.x)
+    # Initial states belong to this record. All other parameters keep their values. With friction there are
+    # several minima; the nominal states may be those of another record, which was not at rest.
+    target = make_target(record, record.samples, {})
+    resting = np.clip(np.where(is_state, 0.0, alone.nominal), *alone.bounds)
+    fits = [calibrate(alone, target, start, is_fixed=~is_state) for start in (alone.nominal, resting)]
+    return min(fits, key=lambda fit: np.nan_to_num(fit.mean_square, nan=np.inf)).output
 
 
 def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
