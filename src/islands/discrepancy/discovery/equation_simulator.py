@@ -1,8 +1,15 @@
-"""Access to the equations of a simulator, through the wrappers around them."""
+"""Access to the equations of a simulator, through the wrappers around them, and their extension by terms."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.discovery.candidate_terms import CandidateTerm
+from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import ResampledSimulator
 from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.systems.ode.ode_system import OdeSystem
@@ -21,3 +28,29 @@ def with_equations(simulator: Simulator, system: OdeSystem) -> Simulator:
         return replace(simulator, simulator=with_equations(simulator.simulator, system))
     assert isinstance(simulator, OdeSimulator)
     return replace(simulator, system=system)
+
+
+def add_terms(
+    fit: CalibrationResult,
+    system: OdeSystem,
+    terms: Sequence[tuple[CandidateTerm, int]],
+    target_sizes: Mapping[str, float],
+) -> tuple[ExtendedSimulator, Signal]:
+    """Return a simulation of a system with more, numbered terms, and its values.
+
+    Known parameters have the values of ``fit``; coefficients of new terms are zero.
+    """
+    for term, number in terms:
+        system = term.add_to(system, number, target_sizes[term.target])
+    simulation = replace(fit.simulation, simulator=with_equations(fit.simulation.simulator, system))
+    values = {term.name_parameters(number)[0]: 0.0 for term, number in terms}
+    values |= {each.name: v for each, v in zip(fit.simulation.parameters, fit.values, strict=True)}
+    start = [values.get(parameter.name, parameter.nominal) for parameter in simulation.parameters]
+    return simulation, np.array(start)
+
+
+def get_system(fit: CalibrationResult) -> OdeSystem:
+    """Return the equations of a fit."""
+    equations = find_equations(fit.simulation.simulator)
+    assert equations is not None
+    return equations.system

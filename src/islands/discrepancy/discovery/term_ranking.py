@@ -1,7 +1,6 @@
 """Ranking of candidate terms by the part of the residual that they explain."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,11 +10,9 @@ from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResul
 from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.candidate_terms import CandidateTerm, find_free_numbers
-from islands.discrepancy.discovery.equation_simulator import find_equations, with_equations
+from islands.discrepancy.discovery.equation_simulator import add_terms, get_system
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
-from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.systems.ode.ode_system import OdeSystem
 
 #: Number of terms whose responses are simulated in one call. The equations of every lane contain all of them:
 #: more terms in a call save nothing.
@@ -102,29 +99,3 @@ def _explain(response: Signal, projection: Projection) -> tuple[float, float]:
     projected = projection(response)
     energy, product = float(projected @ projected), float(projected @ projection.residual)
     return (product**2 / energy, product / energy) if energy > 0.0 else (0.0, 0.0)
-
-
-def add_terms(
-    fit: CalibrationResult,
-    system: OdeSystem,
-    terms: Sequence[tuple[CandidateTerm, int]],
-    target_sizes: Mapping[str, float],
-) -> tuple[ExtendedSimulator, Signal]:
-    """Return a simulation of a system with more, numbered terms, and its values.
-
-    Known parameters have the values of ``fit``; coefficients of new terms are zero.
-    """
-    for term, number in terms:
-        system = term.add_to(system, number, target_sizes[term.target])
-    simulation = replace(fit.simulation, simulator=with_equations(fit.simulation.simulator, system))
-    values = {term.name_parameters(number)[0]: 0.0 for term, number in terms}
-    values |= {each.name: v for each, v in zip(fit.simulation.parameters, fit.values, strict=True)}
-    start = [values.get(parameter.name, parameter.nominal) for parameter in simulation.parameters]
-    return simulation, np.array(start)
-
-
-def get_system(fit: CalibrationResult) -> OdeSystem:
-    """Return the equations of a fit."""
-    equations = find_equations(fit.simulation.simulator)
-    assert equations is not None
-    return equations.system

@@ -21,8 +21,8 @@ from islands.discrepancy.discovery.candidate_terms import (
     find_free_numbers,
     list_candidate_terms,
 )
-from islands.discrepancy.discovery.equation_simulator import find_equations
-from islands.discrepancy.discovery.term_ranking import RankedTerm, add_terms, get_system, rank_terms
+from islands.discrepancy.discovery.equation_simulator import add_terms, find_equations, get_system
+from islands.discrepancy.discovery.term_ranking import RankedTerm, rank_terms
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
