@@ -13,11 +13,13 @@ from islands.discrepancy.interfaces.force import ForceLaw, pack_force_laws, sum_
 from islands.discrepancy.interfaces.simulator import Forces, SimulationRun
 from islands.discrepancy.simulators.coordinates import input_coordinate, output_coordinate, peak_amplitude
 from islands.discrepancy.simulators.ode_effects import (
-    add_force_laws,
+    extend_system,
     find_effects,
     find_limits,
+    is_term,
     list_terms,
     list_values,
+    number_symbols,
 )
 from islands.discrepancy.simulators.record_channels import sample_channels
 from islands.discrepancy.simulators.shooting import Shots
@@ -201,22 +203,15 @@ class OdeSimulator:
         """Return the simulator of one recording."""
         return replace(self, shots=self.shots.for_samples(first, last)) if self.shots else self
 
-    def _is_term(self, law: ForceLaw) -> bool:
-        """Whether a force law becomes a term of the equations; otherwise it is called."""
-        return bool(law.equation and (law.state_equation or not law.state_derivative))
-
     def _get_program(
         self, active: tuple[OdeEffect, ...], has_factor: bool, laws: tuple[ForceLaw, ...]
     ) -> OdeProgram:
         key = active, has_factor, laws
         if key not in self._programs:
-            system = self.system.with_factor(self.system.gain, _GAIN) if has_factor else self.system
-            for effect in active:
-                system = system.with_effect(effect)
-            terms = [(number, law) for number, law in enumerate(laws) if self._is_term(law)]
+            terms = [(number_symbols(number), law) for number, law in enumerate(laws) if is_term(law)]
             calls = len(laws) - len(terms)
-            if terms:
-                system = add_force_laws(system, terms, has_others=calls > 0)
+            factor = _GAIN if has_factor else ""
+            system = extend_system(self.system, active, factor, terms, has_others=calls > 0)
             self._programs[key] = generate_program(system, laws=calls)
         return self._programs[key]
 
@@ -267,8 +262,8 @@ class OdeSimulator:
                 signals[self.system.input] = SampledSignal(run.x * gain, *between).refine(steps)
             given = dict(zip(names, run.values.tolist(), strict=True))
             laws = list(enumerate(run.forces)) if self._has_force_equation else []
-            calls = [law for _, law in laws if not self._is_term(law[0])]
-            numbers, states = list_values([each for each in laws if self._is_term(each[1][0])], context)
+            calls = [law for _, law in laws if not is_term(law[0])]
+            numbers, states = list_values([each for each in laws if is_term(each[1][0])], context)
             lanes.append(
                 LaneInput(
                     {**fixed, **given, **{each.name: effects[each.name] for each in active}, **numbers},

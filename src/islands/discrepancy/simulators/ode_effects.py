@@ -24,8 +24,11 @@ from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect
 #: Effects of the catalogue that a term can describe.
 _SUPPORTED = frozenset(each.name for each in CATALOGUE.values() if each.site == Site.CORE) - GAIN_EFFECTS
 
-#: Expression of a force law that is given as a text.
-_parse = cache(parse_expression)
+#: Name of the state of a force law in its expressions.
+LAW_STATE = "z"
+
+#: Expression of a force law or of a map that is given as a text.
+parse_law = cache(parse_expression)
 
 
 def list_terms(system: OdeSystem) -> tuple[OdeEffect, ...]:
@@ -96,19 +99,56 @@ def find_limits(
     return limits, spills
 
 
-def add_force_laws(system: OdeSystem, laws: Sequence[tuple[int, ForceLaw]], has_others: bool) -> OdeSystem:
-    """Return a system with force laws in its equations, each with its number; others remain calls."""
+def is_term(law: ForceLaw) -> bool:
+    """Return whether a force law is an expression, so that it becomes a term of the equations."""
+    return bool(law.equation and (law.state_equation or not law.state_derivative))
+
+
+def extend_system(
+    system: OdeSystem,
+    active: Sequence[OdeEffect],
+    factor: str = "",
+    laws: Sequence[tuple[Mapping[str, OdeExpression], ForceLaw]] = (),
+    has_others: bool = False,
+) -> OdeSystem:
+    """Return a system with the terms of effects and force laws in its equations.
+
+    Parameters
+    ----------
+    active : sequence of OdeEffect
+        Effects with a term, whose values become parameters with their names.
+    factor : str
+        Signal that the gain is multiplied by; empty for none.
+    laws : sequence of (mapping, ForceLaw)
+        Force laws, with what is written for ``n0``, ``n1``, ... and for the state ``z`` of each.
+    has_others : bool
+        Whether there are other laws, which remain calls.
+    """
+    if factor:
+        system = system.with_factor(system.gain, factor)
+    for effect in active:
+        system = system.with_effect(effect)
+    return _add_force_laws(system, laws, has_others) if laws else system
+
+
+def _add_force_laws(
+    system: OdeSystem, laws: Sequence[tuple[Mapping[str, OdeExpression], ForceLaw]], has_others: bool
+) -> OdeSystem:
     assert system.force is not None
     forces: list[OdeExpression] = [Symbol(FORCE)] if has_others else []
     parameters, states = list(system.parameters), []
-    for number, law in laws:
-        names = {"x": Symbol(system.force.coordinate), "v": Symbol(system.force.rate)}
-        names |= {f"n{index}": Symbol(_name_number(number, index)) for index in range(WIDTH)}
-        names["z"] = Symbol(_name_state(number))
-        parameters += [OdeParameter(_name_number(number, index), 0.0) for index in range(WIDTH)]
-        forces.append(substitute(_parse(law.equation), names))
+    for given, law in laws:
+        names = {"x": Symbol(system.force.coordinate), "v": Symbol(system.force.rate), **given}
+        parameters += [
+            OdeParameter(each.name, 0.0)
+            for key, each in given.items()
+            if key != LAW_STATE and isinstance(each, Symbol)
+        ]
+        forces.append(substitute(parse_law(law.equation), names))
         if law.state_equation:
-            states.append((_name_state(number), substitute(_parse(law.state_equation), names)))
+            state = names[LAW_STATE]
+            assert isinstance(state, Symbol)
+            states.append((state.name, substitute(parse_law(law.state_equation), names)))
     total = forces[0]
     for force in forces[1:]:
         total = Operation("add", (total, force))
@@ -137,6 +177,14 @@ def list_values(
         if law.state_equation:
             states[_name_state(number)] = law.get_initial_state(values)
     return numbers, states
+
+
+def number_symbols(number: int) -> dict[str, OdeExpression]:
+    """Return the symbols that a numbered law has in equations, for `extend_system`."""
+    numbers: dict[str, OdeExpression] = {
+        f"n{index}": Symbol(_name_number(number, index)) for index in range(WIDTH)
+    }
+    return {**numbers, LAW_STATE: Symbol(_name_state(number))}
 
 
 # No name in equations has brackets.
