@@ -1,9 +1,15 @@
 """Effects on the baseline: offsets, drifts and jumps."""
 
 from islands.discrepancy.effects.channels import channel, channel_range, channel_unit, has_channel
-from islands.discrepancy.effects.time_variation import candidate_instants, instant_bounds, smooth_step
+from islands.discrepancy.effects.time_variation import (
+    candidate_instants,
+    instant_bounds,
+    smooth_step,
+    write_step,
+)
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.map_equation import MapEquation
 
 
 def _offset_form(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
@@ -26,6 +32,7 @@ OFFSET = Effect(
     parameters=_offset_parameters,
     starting_points=_offset_starting_points,
     form=_offset_form,
+    equation=lambda _: MapEquation("x + n0"),
     source="Doebelin, Measurement Systems, section 3",
     similar_to="jump, even-nonlinearity, input-offset",
     distinguished_by="the mean of the residual",
@@ -87,6 +94,7 @@ LINEAR_DRIFT = Effect(
     parameters=_linear_drift_parameters,
     starting_points=_linear_drift_starting_points,
     form=_linear_drift_form,
+    equation=lambda context: MapEquation(f"x + n0*t/{context.duration}"),
     source="Doebelin, Measurement Systems, section 3",
     similar_to="jump, thermal-drift, exponential-creep",
     distinguished_by="the residual over time",
@@ -116,6 +124,7 @@ JUMP = Effect(
     parameters=_jump_parameters,
     starting_points=_jump_starting_points,
     form=_jump_form,
+    equation=lambda context: MapEquation(f"x + n0*{write_step(context, 'n1')}"),
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
     extra_degrees_of_freedom=1,
     similar_to="linear-drift, offset",
@@ -152,6 +161,7 @@ THERMAL_DRIFT = Effect(
     parameters=_thermal_drift_parameters,
     starting_points=_thermal_drift_starting_points,
     form=_thermal_drift_form,
+    equation=lambda _: MapEquation("x + n0*z0", (("temperature",),)),
     source="Doebelin, Measurement Systems, section 2",
     is_applicable=lambda context: has_channel(context, True),
     similar_to="cross-coupling; linear-drift if the temperature only rises",

@@ -1,10 +1,13 @@
 """Creep: exponential and logarithmic."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from islands.discrepancy.effects.filters import low_pass
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.map_equation import MapEquation
 from islands.discrepancy.interfaces.segments import is_resting
 
 #: Largest step before the first sample, times the fraction that creeps, relative to the largest output.
@@ -20,6 +23,16 @@ def _earlier_step(y: Signal, tau: float, context: SimulationContext) -> Signal |
     if fitted <= 0 or not is_resting(y[:fitted]):
         return 0.0
     return context.output_peak * -np.expm1(-context.dt * np.arange(y.size) / tau)
+
+
+def _write_creep(taus: Sequence[str], context: SimulationContext) -> MapEquation:
+    """Write the map of a creep with several time constants; an earlier step counts if the signal rests."""
+    parts = [
+        f"z{place} - z0 + z1*{context.output_peak}*(1 - exp(-t/{tau}))"
+        for place, tau in enumerate(taus, start=2)
+    ]
+    low_passes = tuple(("low-pass", tau) for tau in taus)
+    return MapEquation(f"x + n0*({' + '.join(parts)})", (("first",), ("rests",), *low_passes))
 
 
 def _limit_kappa(context: SimulationContext, lower: float, upper: float) -> tuple[float, float]:
@@ -54,6 +67,7 @@ EXPONENTIAL_CREEP = Effect(
     parameters=_exponential_creep_parameters,
     starting_points=_exponential_creep_starting_points,
     form=_exponential_creep_form,
+    equation=lambda context: _write_creep(["exp(n1)"], context),
     source="Kuhnen and Janocha, Inverse feedforward controller for complex hysteretic nonlinearities, 1999",
     similar_to="relaxation, logarithmic-creep, linear-drift",
     distinguished_by="the output continues at constant input, with one time constant",
@@ -87,6 +101,7 @@ LOGARITHMIC_CREEP = Effect(
     parameters=_logarithmic_creep_parameters,
     starting_points=_logarithmic_creep_starting_points,
     form=_logarithmic_creep_form,
+    equation=lambda context: _write_creep(list(map(str, TAUS)), context),
     source="Jung and Gweon, Creep characteristics of piezoelectric actuators, 2000",
     similar_to="exponential-creep",
     distinguished_by="the output continues at constant input, by equal steps in each decade of time",

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from islands.discrepancy.effects.channels import channel, channel_range, channel_unit, has_channel
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.map_equation import MapEquation
 
 #: Half width of a line in the spectrum and error of its frequency, relative to the resolution.
 LINE_WIDTH, LINE_ERROR = 2.0, 0.1
@@ -48,6 +49,7 @@ CROSS_COUPLING = Effect(
     parameters=_cross_coupling_parameters,
     starting_points=_cross_coupling_starting_points,
     form=_cross_coupling_form,
+    equation=lambda _: MapEquation("x + n0*z0", (("coupled",),)),
     source="Ljung, System Identification, 2nd ed., section 13",
     is_applicable=lambda context: has_channel(context, False),
     similar_to="thermal-drift",
@@ -120,6 +122,7 @@ PERIODIC_DISTURBANCE = Effect(
     parameters=_periodic_disturbance_parameters,
     starting_points=_periodic_disturbance_starting_points,
     form=_periodic_disturbance_form,
+    equation=lambda _: MapEquation(f"x + n0*cos({2 * np.pi}*n2*t) + n1*sin({2 * np.pi}*n2*t)"),
     source="Stoica and Moses, Spectral Analysis of Signals, section 4",
     linear_parameters=2,
     extra_degrees_of_freedom=2,

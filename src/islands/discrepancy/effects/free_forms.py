@@ -9,20 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from islands.discrepancy.effects.filters import low_pass
+from islands.discrepancy.effects import free_maps
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Map, Signal, SimulationContext, Site
-from islands.systems.curve import PLACES, VALUES, interpolate, interpolate_curve, write_curve
-from islands.systems.hysteresis_operators import play_from
+from islands.discrepancy.interfaces.map_equation import MakeEquation, MapEquation
+from islands.systems.curve import VALUES, interpolate, write_curve
 
 #: Range of the rates of a damping curve, relative to the typical rate.
 RATE_RANGE = 3.0
-
-#: Time constants of a free filter: from the sampling time to this fraction of the estimation part.
-TIME_CONSTANTS, LONGEST = 6, 0.1
-
-#: Half widths of the plays of a free memory, relative to the peak of the signal.
-HALF_WIDTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
 
 #: Starting value and typical change of a coefficient, relative to the signal that the form is added to.
 START, CHANGE = 0.02, 0.01
@@ -44,6 +38,7 @@ def _make_free_form(
     labels: Callable[[SimulationContext], Sequence[str]],
     unit: _Text = lambda _: "",
     size: _Number = lambda _: 1.0,
+    equation: MakeEquation | None = None,
 ) -> Effect:
     """Return an effect with a coefficient for each label, whose typical value is a fraction of ``size``."""
 
@@ -63,6 +58,7 @@ def _make_free_form(
         starting_points=starting_points,
         form=form,
         source=source,
+        equation=equation,
         linear_parameters=0,
         is_free=True,
         special_cases=special_cases,
@@ -71,62 +67,12 @@ def _make_free_form(
     )
 
 
-def _label_places(_context: SimulationContext) -> list[str]:
-    return [f"at {place:g}" for place in PLACES]
-
-
-def _label_times(context: SimulationContext) -> list[str]:
-    return [f"at {time:.3g} s" for time in _times(context)[1:]]
-
-
-def _label_half_widths(_context: SimulationContext) -> list[str]:
-    return [f"play {half_width:g}" for half_width in HALF_WIDTHS]
-
-
-def _label_time_constants(context: SimulationContext) -> list[str]:
-    return [f"tau {tau:.3g} s" for tau in _time_constants(context)]
-
-
-def _times(context: SimulationContext) -> Signal:
-    return np.linspace(0.0, context.fit_end_time, VALUES + 2)
-
-
-def _time_constants(context: SimulationContext) -> Signal:
-    return np.geomspace(context.dt, LONGEST * context.fit_end_time, TIME_CONSTANTS)
-
-
-def _input_curve(u: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return u + interpolate_curve(u / context.input_peak, values)
-
-
-def _output_curve(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return y + interpolate_curve(y / context.output_peak, values)
-
-
 def _stiffness_force(x: float, _rate: float, _z: float, numbers: Any) -> float:
     return interpolate(x / numbers[VALUES], numbers)
 
 
 def _damping_force(_x: float, rate: float, _z: float, numbers: Any) -> float:
     return interpolate(rate / numbers[VALUES], numbers)
-
-
-def _add_low_passes(signal: Signal, values: Signal, context: SimulationContext) -> Signal:
-    parts = [low_pass(signal, tau, context.dt) - signal for tau in _time_constants(context)]
-    return signal + values @ np.array(parts)
-
-
-def _add_plays(signal: Signal, values: Signal, peak: float) -> Signal:
-    return signal + values @ np.array([play_from(signal, part * peak) - signal for part in HALF_WIDTHS])
-
-
-def _interpolate_time(values: Signal, context: SimulationContext) -> Signal:
-    """Return a curve over time that is zero at the start; the last value is held in the hold-out part."""
-    return np.interp(context.time, _times(context), [0.0, *values])
-
-
-def _multiply_over_time(signal: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return signal * (1.0 + _interpolate_time(values, context))
 
 
 _CURVE = "IEC 61298-2, terminal-based linearity"
@@ -151,50 +97,54 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any slow linear dynamics of the input: a sum of low-passes with six time constants",
         "timing",
         Site.INPUT,
-        _add_low_passes,
+        free_maps.add_low_passes,
         _FILTER,
         _LINEAR,
         "delay, output-filter",
         "amplitude and phase that change with the frequency, also at small amplitudes",
-        _label_time_constants,
+        free_maps.label_time_constants,
+        equation=free_maps.write_low_passes,
     ),
     _make_free_form(
         "input-memory",
         "Any hysteresis of the input: a sum of plays with five half widths",
         "memory",
         Site.INPUT,
-        lambda u, values, context: _add_plays(u, values, context.input_peak),
+        lambda u, values, context: free_maps.add_plays(u, values, context.input_peak),
         _MEMORY,
         _HYSTERETIC,
         "backlash, stiction, output-memory",
         "loops that do not become thinner when the input is slower",
-        _label_half_widths,
+        free_maps.label_half_widths,
+        equation=lambda context: free_maps.write_plays(context.input_peak),
     ),
     _make_free_form(
         "input-curve",
         "Any static characteristic of the input: a curve through seven values",
         "shape",
         Site.INPUT,
-        _input_curve,
+        lambda u, values, context: free_maps.add_curve(u, values, context.input_peak),
         _CURVE,
         _STATIC,
         "dead-zone, input-saturation, output-curve",
         "a curve of the residual over the input, the same in both directions",
-        _label_places,
+        free_maps.label_places,
         lambda context: context.input_unit,
         lambda context: context.input_peak,
+        lambda context: free_maps.write_added_curve(context.input_peak),
     ),
     _make_free_form(
         "input-gain-curve",
         "Any change of the gain of the input over time: a curve through eight values",
         "change",
         Site.INPUT,
-        _multiply_over_time,
+        free_maps.multiply_over_time,
         _CHANGE,
         _CHANGING,
         "gain-step, ageing, output-gain-curve",
         "a residual proportional to the input, with a factor that changes over time",
-        _label_times,
+        free_maps.label_times,
+        equation=free_maps.write_time_factor,
     ),
     _make_free_form(
         "damping-curve",
@@ -211,7 +161,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _DAMPING,
         "viscous, coulomb-friction, quadratic-drag",
         "a curve of the residual over the rate, the same at all places",
-        _label_places,
+        free_maps.label_places,
         lambda context: context.force_coordinate.force_unit,
         lambda context: context.force_coordinate.force,
     ),
@@ -229,7 +179,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _STATIC,
         "cubic-stiffness, even-nonlinearity, input-curve",
         "a curve of the residual over the coordinate, the same at all rates",
-        _label_places,
+        free_maps.label_places,
         lambda context: context.force_coordinate.force_unit,
         lambda context: context.force_coordinate.force,
     ),
@@ -238,63 +188,68 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any slow linear dynamics of the output: a sum of low-passes with six time constants",
         "timing",
         Site.OUTPUT,
-        _add_low_passes,
+        free_maps.add_low_passes,
         _FILTER,
         _LINEAR,
         "sensor-lag, exponential-creep, input-filter",
         "amplitude and phase that change with the frequency, also at small amplitudes",
-        _label_time_constants,
+        free_maps.label_time_constants,
+        equation=free_maps.write_low_passes,
     ),
     _make_free_form(
         "output-memory",
         "Any hysteresis of the output: a sum of plays with five half widths",
         "memory",
         Site.OUTPUT,
-        lambda y, values, context: _add_plays(y, values, context.output_peak),
+        lambda y, values, context: free_maps.add_plays(y, values, context.output_peak),
         _MEMORY,
         _HYSTERETIC,
         "second-hysteresis, input-memory",
         "loops that do not become thinner when the input is slower",
-        _label_half_widths,
+        free_maps.label_half_widths,
+        equation=lambda context: free_maps.write_plays(context.output_peak),
     ),
     _make_free_form(
         "output-curve",
         "Any static characteristic of the output: a curve through seven values",
         "shape",
         Site.OUTPUT,
-        _output_curve,
+        lambda y, values, context: free_maps.add_curve(y, values, context.output_peak),
         _CURVE,
         _STATIC,
         "output-saturation, absolute-value-sensor, input-curve",
         "a curve of the residual over the output, the same in both directions",
-        _label_places,
+        free_maps.label_places,
         lambda context: context.output_unit,
         lambda context: context.output_peak,
+        lambda context: free_maps.write_added_curve(context.output_peak),
     ),
     _make_free_form(
         "output-gain-curve",
         "Any change of the gain of the output over time: a curve through eight values",
         "change",
         Site.OUTPUT,
-        _multiply_over_time,
+        free_maps.multiply_over_time,
         _CHANGE,
         _CHANGING,
         "gain-step, ageing, input-gain-curve",
         "a residual proportional to the output, with a factor that changes over time",
-        _label_times,
+        free_maps.label_times,
+        equation=free_maps.write_time_factor,
     ),
     _make_free_form(
         "baseline-curve",
         "Any drift of the output: a curve over time through eight values",
         "baseline",
         Site.OUTPUT,
-        lambda y, values, context: y + _interpolate_time(values, context),
+        lambda y, values, context: y + free_maps.interpolate_time(values, context),
         _CHANGE,
         _DRIFTING,
         "linear-drift, jump, thermal-drift",
         "a slow residual that depends on the time alone",
-        _label_times,
+        free_maps.label_times,
         lambda context: context.output_unit,
         lambda context: context.output_peak,
+        lambda context: MapEquation(f"x + {free_maps.write_time_curve(context)}"),
     ),
 )

@@ -6,6 +6,7 @@ import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.map_equation import MapEquation
 from islands.systems.hysteresis_operators import play_from, slider
 
 
@@ -39,6 +40,7 @@ STICTION = Effect(
     parameters=_stiction_parameters,
     starting_points=_stiction_starting_points,
     form=_stiction_form,
+    equation=lambda _: MapEquation("z0", (("slider", "n0"),)),
     source="Choudhury, Thornhill and Shah, Modelling valve stiction, 2005",
     linear_parameters=0,
     similar_to="backlash, dead-zone, coulomb-friction",
@@ -68,6 +70,7 @@ BACKLASH = Effect(
     parameters=_backlash_parameters,
     starting_points=_backlash_starting_points,
     form=_backlash_form,
+    equation=lambda _: MapEquation("z0", (("play", "n0"),)),
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     confounded_with=(STICTION, 2.0),
     similar_to="stiction, coulomb-friction, exponential-creep",

@@ -5,14 +5,9 @@ from typing import Any
 import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import (
-    Effect,
-    EffectTemplate,
-    ForceLaw,
-    Signal,
-    SimulationContext,
-    Site,
-)
+from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.force import ForceLaw
+from islands.discrepancy.interfaces.map_equation import MapEquation
 
 
 def _cubic_stiffness_force(x: float, _rate: float, _z: float, k: Any) -> float:
@@ -126,11 +121,17 @@ DEAD_ZONE = Effect(
     parameters=_dead_zone_parameters,
     starting_points=_dead_zone_starting_points,
     form=_dead_zone_form,
+    equation=lambda _: MapEquation("sign(x)*max(abs(x) - n0, 0)"),
     is_applicable=_approaches_zero,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     similar_to="backlash, input-saturation",
     distinguished_by="flat around zero in both directions; a negative `d` is a step at zero",
 )
+
+
+def _write_limit(peak: float) -> str:
+    level = f"{peak}*(1 - max(n0, 0))"
+    return f"min(max(x, -({level})), {level})"
 
 
 def _input_saturation_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
@@ -156,6 +157,7 @@ INPUT_SATURATION = Effect(
     parameters=_saturation_parameters,
     starting_points=_input_saturation_starting_points,
     form=_input_saturation_form,
+    equation=lambda context: MapEquation(_write_limit(context.input_peak)),
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     linear_parameters=0,
     similar_to="cubic-stiffness, output-saturation",
@@ -182,6 +184,7 @@ OUTPUT_SATURATION = Effect(
     parameters=_saturation_parameters,
     starting_points=_output_saturation_starting_points,
     form=_output_saturation_form,
+    equation=lambda context: MapEquation(f"where(n0, {_write_limit(context.output_peak)}, x)"),
     source="Doebelin, Measurement Systems, section 3",
     linear_parameters=0,
     similar_to="input-saturation, state-clip",
@@ -211,6 +214,7 @@ ABSOLUTE_VALUE_SENSOR = Effect(
     parameters=_absolute_value_sensor_parameters,
     starting_points=_absolute_value_sensor_starting_points,
     form=_absolute_value_sensor_form,
+    equation=lambda _: MapEquation("x + n0*abs(x)"),
     source="Doebelin, Measurement Systems, section 3",
     similar_to="even-nonlinearity",
     distinguished_by="a kink at output zero",

@@ -2,6 +2,7 @@
 
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.map_equation import MapEquation
 
 
 def _input_gain_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
@@ -26,6 +27,7 @@ INPUT_GAIN = Effect(
     parameters=_input_gain_parameters,
     starting_points=_input_gain_starting_points,
     form=_input_gain_form,
+    equation=lambda _: MapEquation("(1 + n0)*x"),
     source="Doebelin, Measurement Systems, section 3",
     is_gain=True,
     similar_to="sensor-gain, wrong-parameter",
@@ -55,6 +57,7 @@ SENSOR_GAIN = Effect(
     parameters=_sensor_gain_parameters,
     starting_points=_sensor_gain_starting_points,
     form=_sensor_gain_form,
+    equation=lambda _: MapEquation("(1 + n0)*x"),
     source="Doebelin, Measurement Systems, section 3",
     is_gain=True,
     similar_to="input-gain, wrong-parameter",

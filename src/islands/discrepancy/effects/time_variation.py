@@ -7,6 +7,7 @@ import scipy
 
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.map_equation import MapEquation
 
 #: Names of the effects that change the gain.
 GAIN_EFFECTS = frozenset(("gain-step", "ageing"))
@@ -34,6 +35,11 @@ def smooth_step(context: SimulationContext, instant: float) -> Signal:
     """Return a step from 0 to 1 at an instant, smoothed over a few samples so that it has a derivative."""
     out: Signal = scipy.special.expit((context.time - instant) / (2 * context.dt))
     return out
+
+
+def write_step(context: SimulationContext, instant: str) -> str:
+    """Write `smooth_step` as an expression of the time, given that of the instant."""
+    return f"(1/(1 + exp(({instant} - t)/{2 * context.dt})))"
 
 
 def gain_over_time(effect_parameters: Mapping[str, float], context: SimulationContext) -> Signal | float:
@@ -71,6 +77,7 @@ GAIN_STEP = Effect(
     starting_points=_gain_step_starting_points,
     form=None,
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
+    equation=lambda context: MapEquation(f"x*(1 + n0*{write_step(context, 'n1')})"),
     extra_degrees_of_freedom=1,
     similar_to="ageing",
     distinguished_by="the slope of output over input changes at one instant",
@@ -94,6 +101,7 @@ AGEING = Effect(
     starting_points=_ageing_starting_points,
     form=None,
     source="Doebelin, Measurement Systems, section 3",
+    equation=lambda context: MapEquation(f"x*(1 + n0*t/{context.duration})"),
     similar_to="gain-step, linear-drift",
     distinguished_by="a residual proportional to time and output",
 )

@@ -6,6 +6,7 @@ import scipy
 from islands.discrepancy.effects.filters import interpolate_at, low_pass
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.map_equation import MapEquation
 
 
 def _delay_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
@@ -32,6 +33,7 @@ DELAY = Effect(
     parameters=_delay_parameters,
     starting_points=_delay_starting_points,
     form=_delay_form,
+    equation=lambda _: MapEquation("z0", (("interpolate", "0", "n0"),)),
     source="Ljung, System Identification, 2nd ed., section 16",
     similar_to="sensor-lag, resonance, viscous",
     distinguished_by="the phase grows with the frequency at constant amplitude; hysteresis is delayed too",
@@ -60,6 +62,7 @@ CLOCK_SKEW = Effect(
     parameters=_clock_skew_parameters,
     starting_points=_clock_skew_starting_points,
     form=_clock_skew_form,
+    equation=lambda _: MapEquation("z0", (("interpolate", "n0", "0"),)),
     source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
     similar_to="delay",
     distinguished_by="a delay that grows along the record",
@@ -88,6 +91,7 @@ SENSOR_LAG = Effect(
     parameters=_sensor_lag_parameters,
     starting_points=_sensor_lag_starting_points,
     form=_sensor_lag_form,
+    equation=lambda _: MapEquation("z0", (("low-pass", "n0"),)),
     source="Doebelin, Measurement Systems, section 3",
     similar_to="delay, resonance, viscous",
     distinguished_by="the amplitude falls with the frequency",
@@ -137,6 +141,7 @@ RESONANCE = Effect(
     parameters=_resonance_parameters,
     starting_points=_resonance_starting_points,
     form=_resonance_form,
+    equation=lambda _: MapEquation("z0", (("resonance", "n0", "n1"),)),
     source="Ljung, System Identification, 2nd ed., section 4",
     similar_to="delay, sensor-lag",
     distinguished_by="ringing after fast changes",

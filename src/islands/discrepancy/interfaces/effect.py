@@ -8,6 +8,7 @@ import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.force import ForceLaw
+from islands.discrepancy.interfaces.map_equation import MakeEquation
 from islands.errors import SettingsError
 
 __all__ = ["Effect", "EffectTemplate", "ForceLaw", "Signal", "SimulationContext", "Site"]
@@ -50,6 +51,9 @@ class Effect:
         receives the parameters by name.
     source : str
         Publication that describes the form.
+    equation : callable or None
+        ``context -> MapEquation``: the same map as an equation, from which programs in other languages are
+        written. An effect on the gain has one as well, which maps the gain. None if there is no program.
     is_applicable : callable
         ``context -> bool``: whether the record can show the effect.
     linear_parameters : int
@@ -82,6 +86,7 @@ class Effect:
     starting_points: Callable[[SimulationContext, Signal], Sequence[tuple[float, ...]]]
     form: Map | ForceLaw | None
     source: str
+    equation: MakeEquation | None = None
     is_applicable: Callable[[SimulationContext], bool] = lambda _: True
     linear_parameters: int = 1
     is_gain: bool = False
