@@ -117,8 +117,10 @@ def describe_extension(
             return ModelSpec(kind="model", model=json.loads(model_json(model)), name=simulator.name)
         case FmuSimulator():
             return FmuSpec.from_system(simulator.model, simulator.system.with_values(named))
-        case OdeSimulator() if not simulator.system.is_built_in:
-            return OdeSpec.from_system(simulator.system.with_values(named))
+        case OdeSimulator(system=system):
+            if system.is_built_in:
+                return PhysicalSpec(kind=simulator.name, parameters=named, steps=system.steps)
+            return OdeSpec.from_system(system.with_values(named))
         case RecordedOutput():
             return ColumnSpec(kind="column", column=simulator.column)
         case LinearSimulator():
@@ -136,7 +138,7 @@ def describe_extension(
         case PythonFunctionSimulator():
             path, _, function = simulator.source.rpartition(":")
             return ProgramSpec(kind="python", path=path, function=function, parameters=named)
-    return PhysicalSpec(kind=simulator.name, parameters=named)
+    raise AssertionError(simulator)
 
 
 def _make_extended_spec(

@@ -173,12 +173,11 @@ def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapp
 
 def make_built_in(spec: PhysicalSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
     """Make a built-in simulator; parameters that are not given have their nominal value or are estimated."""
-    system = read_built_in(spec.kind).with_values(spec.parameters)
-    estimator = SIMULATORS[spec.kind].estimator
-    if not estimator:
-        return make_ode_simulator(system, record)
-    system, states = resolve_name(estimator)(system, spec.parameters, estimation_part(record))
-    return make_ode_simulator(system, record, states)
+    system, states = read_built_in(spec.kind).with_values(spec.parameters), {}
+    if estimator := SIMULATORS[spec.kind].estimator:
+        system, states = resolve_name(estimator)(system, spec.parameters, estimation_part(record))
+    # An estimate may need several steps.
+    return make_ode_simulator(replace(system, steps=spec.steps or system.steps), record, states)
 
 
 def make_ode(spec: OdeSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:

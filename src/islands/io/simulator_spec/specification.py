@@ -23,6 +23,7 @@ from islands.io.simulator_spec.spec_base import (
     SpecModel,
     read_object,
 )
+from islands.systems.ode.system_document import MAX_STEPS
 
 #: Name of the file of an extended simulation in the folder of a diagnosis.
 EXTENDED_FILE = "extended.json"
@@ -31,10 +32,14 @@ EXTENDED_SCHEMA: Literal["islands.extended/1"] = "islands.extended/1"
 
 
 class PhysicalSpec(SimulatorSpec):
-    """A physical system; parameters that are not given have their nominal value or are estimated."""
+    """A physical system; parameters that are not given have their nominal value or are estimated.
+
+    It is integrated with ``steps`` per sample, or with as few as the record requires if that is 0.
+    """
 
     kind: "PhysicalKind"
     parameters: dict[str, FiniteFloat] = Field(default_factory=dict, max_length=32)
+    steps: Annotated[int, Field(ge=0, le=MAX_STEPS)] = 0
 
     @classmethod
     def from_text(cls, kind: str, text: str) -> "LocalSpec":

@@ -14,12 +14,19 @@ from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE, catalogue_order
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.io.export.extension import as_json
 from islands.io.simulator_spec.document import describe_extension, extended_document, extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
-from islands.io.simulator_spec.specification import LocalExtendedSpec, ModelSpec, innermost, parse_spec
+from islands.io.simulator_spec.specification import (
+    LocalExtendedSpec,
+    ModelSpec,
+    PhysicalSpec,
+    innermost,
+    parse_spec,
+)
 from support.simulated_records import SpecAndRecord, made, names
 
 NAMES = names()
@@ -130,6 +137,23 @@ def test_a_document_is_unchanged_after_reading_and_writing(case: SpecAndRecord) 
     assert isinstance(simulator, SavedExtension)
     values = np.array([parameter.nominal for parameter in simulator.parameters])
     assert as_json(describe_extension(simulator, values, spec.inputs, spec.output)) == text
+
+
+def test_a_built_in_system_keeps_the_steps_per_sample_of_its_diagnosis() -> None:
+    """The damper needs four steps; with the calibrated values one step would not diverge."""
+    case = made()["second-order"]
+    damped = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 500.0, "k": 200.0})
+    simulator = make_simulator(damped, case.record)
+    assert isinstance(simulator, OdeSimulator)
+    assert simulator.system.steps == 4
+    values = np.array([0.5, 4.0, 200.0, 0.0, 0.0])
+    written = describe_extension(simulator, values, case.record.input_names, case.record.output_name)
+    again = make_simulator(PhysicalSpec.model_validate_json(written.model_dump_json()), case.record)
+    assert isinstance(again, OdeSimulator)
+    assert again.system.steps == 4
+    context = make_context(case.record, simulator, case.record.samples)
+    ours, theirs = (ExtendedSimulator(each, (), context).simulate(values) for each in (simulator, again))
+    assert np.array_equal(ours, theirs)
 
 
 def test_a_file_of_an_extension_is_parsed_as_a_model(case: SpecAndRecord, tmp_path) -> None:
