@@ -39,7 +39,7 @@ def make_ode_simulator(
     """
     _check_units(system, record)
     estimated = estimated or {}
-    system = _fill_units(system, record)
+    system = fill_units(system, record.input_units[0], record.output_unit)
     channels = {name: find_channel(name, record, "the equations read") for name in system.channels}
     first = float(np.nan_to_num(record.y[0]))
     initial = {each.name: _find_initial(each, system, first) for each in system.states}
@@ -56,6 +56,8 @@ def make_ode_simulator(
     rough = rough.for_samples(*max(record.bounds, key=lambda bounds: bounds[1] - bounds[0]))
     context = make_nominal_context(record)
     expressions = tuple(Symbol(name) for name in initial) + tuple(right for _, right in system.derivatives)
+    # Equations without states have an output only.
+    expressions = expressions or (system.output,)
     for steps in (system.steps,) if system.steps else _STEPS:
         rough = replace(rough, system=replace(system, steps=steps))
         sizes = [peak_amplitude(signal) for signal in rough.simulate_nominal(context, expressions)]
@@ -66,7 +68,7 @@ def make_ode_simulator(
             f"the simulation {system.name} diverges on this input: check its equations, the values and units "
             "of its parameters, and the sampling time"
         )
-    return replace(rough, sizes=dict(zip(sized, sizes, strict=True)), shots=shots)
+    return replace(rough, sizes=dict(zip(sized, sizes, strict=bool(sized))), shots=shots)
 
 
 def _find_initial(state: OdeState, system: OdeSystem, measured: float) -> float:
@@ -88,9 +90,9 @@ def _check_units(system: OdeSystem, record: Dataset) -> None:
             )
 
 
-def _fill_units(system: OdeSystem, record: Dataset) -> OdeSystem:
-    """Return a system in which ``{input}`` and ``{output}`` in units are the units of the record."""
-    given = {"{input}": record.input_units[0] or "1", "{output}": record.output_unit or "1"}
+def fill_units(system: OdeSystem, input_unit: str, output_unit: str) -> OdeSystem:
+    """Return a system in which ``{input}`` and ``{output}`` in units are those of a record."""
+    given = {"{input}": input_unit or "1", "{output}": output_unit or "1"}
 
     def fill(unit: str) -> str:
         for name, own in given.items():

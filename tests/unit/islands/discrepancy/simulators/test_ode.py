@@ -21,7 +21,7 @@ from islands.io.simulator_spec.document import describe_extension
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import parse_spec
 from support.repository import DOCS
-from support.simulated_records import EQUATIONS, wave
+from support.simulated_records import EQUATIONS, recorded, wave
 
 Array = NDArray[np.float64]
 
@@ -219,6 +219,44 @@ def test_a_stiff_simulation_takes_as_many_steps_as_it_needs(tmp_path: Path) -> N
     spec = describe_extension(simulation.simulator, simulation.nominal, ("drive",), "y")
     again = extend(make_simulator(spec, record), record)
     assert np.array_equal(again.simulate(again.nominal), output)
+
+
+#: A sensor without dynamics.
+STATIC = """
+name = "sensor"
+input = "u"
+output = "k*u"
+equations = ""
+[parameters]
+k = { value = 2.0, unit = "um/V" }
+"""
+
+
+def make_static(tmp_path: Path) -> tuple[str, Dataset]:
+    """Return a static gain, and a record of a sensor with another gain and a cubic term."""
+    (tmp_path / "sensor.toml").write_text(STATIC)
+    u = wave(400)
+    noise = 0.05 * np.random.default_rng(0).normal(size=u.size)
+    return f"ode:{tmp_path}/sensor.toml", recorded(u, 2.2 * u + 1e-3 * u**3 + noise)
+
+
+def test_equations_without_states_are_simulated(tmp_path: Path) -> None:
+    path, record = make_static(tmp_path)
+    simulation = extend(make_simulator(path, record), record)
+    assert [each.name for each in simulation.parameters] == ["k"]
+    assert np.array_equal(simulation.simulate(np.array([3.0])), 3.0 * record.u[:, 0])
+    spec = describe_extension(simulation.simulator, np.array([3.0]), record.input_names, "y_um")
+    again = extend(make_simulator(spec, record), record)
+    assert np.array_equal(again.simulate(again.nominal), 3.0 * record.u[:, 0])
+
+
+@pytest.mark.ci
+def test_a_missing_term_of_equations_without_states_is_discovered(tmp_path: Path) -> None:
+    path, record = make_static(tmp_path)
+    diagnosis = islands.diagnose(record, path)
+    assert diagnosis.verdict == Verdict.DISCOVERED
+    assert diagnosis.discovery.equations.startswith("output = k*u + a1*u**3")
+    assert diagnosis.effects[0].parameters["a1"].value == pytest.approx(1e-3, rel=0.01)
 
 
 def test_a_diverging_simulation_is_refused(tmp_path: Path) -> None:
