@@ -161,6 +161,7 @@ def _make_extended_spec(
         hold=intersample.value,
         times=oversampling,
         effects=tuple(effects),
+        start=_find_start(inner, values),
         scales=ScalesSpec(
             dt=scales.dt,
             input_peak=scales.input_peak,
@@ -168,6 +169,51 @@ def _make_extended_spec(
             fitted_s=scales.fit_end_time,
             duration_s=scales.duration,
             frame=_make_frame_spec(scales.force_coordinate),
+        ),
+    )
+
+
+def _find_start(simulator: Simulator, values: Signal) -> dict[str, float]:
+    """Return the states at the first sample of equations by name."""
+    prefix = "initial "
+    return {
+        parameter.name.removeprefix(prefix): float(value)
+        for parameter, value in zip(simulator.parameters, values, strict=False)
+        if parameter.initial and parameter.name.startswith(prefix)
+    }
+
+
+def read_scales(given: ScalesSpec, u: Signal, dt: float, units: tuple[str, str]) -> SimulationContext:
+    """Return the context with the scales of a document, for another input.
+
+    Parameters
+    ----------
+    u : ndarray, shape (samples,)
+    dt : float
+    units : tuple of str
+        Units of input and output; empty ones are 1.
+    """
+    frame = given.frame
+    return SimulationContext(
+        u=u,
+        dt=dt,
+        channels={},
+        units={},
+        input_peak=given.input_peak,
+        output_peak=given.output_peak,
+        input_unit=units[0] or "1",
+        output_unit=units[1] or "1",
+        fit_end_time=given.fitted_s,
+        reference_duration=given.duration_s,
+        force_coordinate=ForceCoordinate(
+            frame.unit,
+            frame.peak,
+            frame.rate,
+            frame.force_unit,
+            frame.force,
+            sign=frame.sense,
+            is_dissipative=frame.dissipates,
+            friction_smoothing=frame.sharp,
         ),
     )
 

@@ -15,7 +15,6 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.preparation import estimation_part, make_context, make_target
 from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.interfaces.context import ForceCoordinate, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.segments import fill_gaps
 from islands.discrepancy.interfaces.simulator import Simulator
@@ -31,6 +30,7 @@ from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, RecordError, SettingsError, lookup
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
+from islands.io.simulator_spec.document import read_scales
 from islands.io.simulator_spec.ode_spec import OdeSpec, read_built_in
 from islands.io.simulator_spec.spec_base import ParameterRange, SimulatorEntry
 from islands.io.simulator_spec.specification import (
@@ -132,28 +132,10 @@ def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapp
     if (document.hold, document.times) != ("first-order", 1):
         inner = ResampledSimulator(simulator, InterSample(document.hold), document.times)
     known = {**CATALOGUE, **{effect.name: effect for effect in simulator.state_effects}}
-    given, frame = document.scales, document.scales.frame
-    scales = SimulationContext(
-        u=np.ascontiguousarray(record.u[:, 0]),
-        dt=record.dt,
-        channels={},
+    units = record.input_units[0], record.output_unit
+    scales = replace(
+        read_scales(document.scales, np.ascontiguousarray(record.u[:, 0]), record.dt, units),
         units=dict(zip(record.input_names[1:], record.input_units[1:], strict=True)),
-        input_peak=given.input_peak,
-        output_peak=given.output_peak,
-        input_unit=record.input_units[0] or "1",
-        output_unit=record.output_unit or "1",
-        fit_end_time=given.fitted_s,
-        reference_duration=given.duration_s,
-        force_coordinate=ForceCoordinate(
-            frame.unit,
-            frame.peak,
-            frame.rate,
-            frame.force_unit,
-            frame.force,
-            sign=frame.sense,
-            is_dissipative=frame.dissipates,
-            friction_smoothing=frame.sharp,
-        ),
     )
     added: list[Effect] = []
     values: list[float] = []

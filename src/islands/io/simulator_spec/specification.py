@@ -23,7 +23,7 @@ from islands.io.simulator_spec.spec_base import (
     SpecModel,
     read_object,
 )
-from islands.systems.ode.system_document import MAX_STEPS
+from islands.systems.ode.system_document import MAX_STATES, MAX_STEPS
 
 #: Name of the file of an extended simulation in the folder of a diagnosis.
 EXTENDED_FILE = "extended.json"
@@ -34,7 +34,7 @@ EXTENDED_SCHEMA: Literal["islands.extended/1"] = "islands.extended/1"
 class PhysicalSpec(SimulatorSpec):
     """A physical system; parameters that are not given have their nominal value or are estimated.
 
-    It is integrated with ``steps`` per sample, or with as few as the record requires if that is 0.
+    With 0 ``steps`` per sample, the record determines them.
     """
 
     kind: "PhysicalKind"
@@ -108,7 +108,7 @@ class ColumnSpec(SimulatorSpec):
 
 
 class ExtendedSpec(SpecModel):
-    """A simulator with effects, as a diagnosis writes it."""
+    """A simulator with effects, as a diagnosis writes it, and the states at its first sample (``start``)."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, serialize_by_alias=True)
 
@@ -120,6 +120,7 @@ class ExtendedSpec(SpecModel):
     hold: Literal["first-order", "zero-order", "band-limited"] = "first-order"
     times: Annotated[int, Field(ge=1, le=64)] = 1
     effects: tuple[EffectSpec, ...]
+    start: dict[str, FiniteFloat] = Field(default_factory=dict, max_length=MAX_STATES)
     scales: ScalesSpec
 
 
