@@ -7,7 +7,7 @@ import typer
 
 from islands.io.export import EXPORTS, FILE_EXPORTS, export, write_export
 from islands.io.export.closed_form import closed_form
-from islands.io.export.extension import EXTENDED_EXPORTS
+from islands.io.export.extension import export_extended
 from islands.io.result_text.text_layout import term_table
 from islands_api.cli import options
 from islands_api.cli.runs.coupled_run import read_coupled
@@ -32,16 +32,16 @@ def show(
 
     Equations: plain text, LaTeX, MathML. Programs: Python, C, MATLAB. Blocks: FMU of
     FMI 3.0 and 2.0, Simulink S-function, MATLAB System, Modelica. An extended
-    simulation with a closed form is exported like a model, a model of several outputs
-    as one program or block.
+    simulation of differential equations is a program in C or MATLAB; one with a closed
+    form is exported like a model, a model of several outputs as one program or block.
     """
     coupled, extended = read_coupled(model), options.extended(model)
     if kind is None and out is None and coupled is None and extended is None:
         typer.echo("\n".join(term_table(options.model(model))))
         return
     kind = kind or "plain"
-    if extended is not None and kind in EXTENDED_EXPORTS:
-        text = EXTENDED_EXPORTS[kind](extended)
+    if extended is not None and kind not in FILE_EXPORTS:
+        text = export_extended(extended, kind)
     else:
         chosen = coupled or (closed_form(extended) if extended is not None else options.model(model))
         if out is not None:

@@ -12,12 +12,12 @@ Signal = NDArray[np.float64]
 
 
 #: Largest range of a signal that rests, relative to its largest absolute value: rounding.
-_MAX_RANGE_AT_REST = 1e-9
+MAX_RANGE_AT_REST = 1e-9
 
 
 def is_resting(signal: Signal) -> bool:
     """Return whether a signal is constant up to rounding."""
-    return bool(np.ptp(signal) <= _MAX_RANGE_AT_REST * np.max(np.abs(signal)))
+    return bool(np.ptp(signal) <= MAX_RANGE_AT_REST * np.max(np.abs(signal)))
 
 
 def find_bounds(segments: Sequence[int], samples: int) -> tuple[tuple[int, int], ...]:

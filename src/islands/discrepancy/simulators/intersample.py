@@ -22,7 +22,7 @@ from islands.discrepancy.interfaces.simulator import (
 )
 
 #: Samples on each side of a value that the band-limited interpolation reads.
-_REACH = 10
+REACH = 10
 
 
 class SimulatorWrapper:
@@ -164,22 +164,22 @@ def resample_input(x: Signal, intersample: InterSample, oversampling: int) -> tu
             fine = np.interp(at, np.arange(x.size), x)
         case InterSample.BAND_LIMITED:
             # Both ends are extended by reflection: with zeros beyond the ends, the filter would ring.
-            weights = _design_low_pass(2 * oversampling)
-            longer = np.pad(x, (_REACH, _REACH + 1), "reflect", reflect_type="odd")
-            near = sliding_window_view(longer, 2 * _REACH + 1)
+            weights = design_low_pass(2 * oversampling)
+            longer = np.pad(x, (REACH, REACH + 1), "reflect", reflect_type="odd")
+            near = sliding_window_view(longer, 2 * REACH + 1)
             fine = (np.ascontiguousarray(near) @ weights).reshape(-1)[: 2 * oversampling * x.size + 1]
     return fine[:-1:2].copy(), np.stack([fine[1::2], fine[2::2]])
 
 
 @lru_cache(maxsize=8)
-def _design_low_pass(factor: int) -> NDArray[np.float64]:
+def design_low_pass(factor: int) -> NDArray[np.float64]:
     """Return the weights of the samples around each value of a signal with ``factor`` times as many.
 
     Returns
     -------
-    ndarray, shape (2*_REACH + 1, factor)
-        Weights of the samples from `_REACH` before to `_REACH` after one, for each value that follows it.
+    ndarray, shape (2*REACH + 1, factor)
+        Weights of the samples from `REACH` before to `REACH` after one, for each value that follows it.
     """
-    response = factor * scipy.signal.firwin(2 * _REACH * factor + 1, 1.0 / factor, window=("kaiser", 8.0))
+    response = factor * scipy.signal.firwin(2 * REACH * factor + 1, 1.0 / factor, window=("kaiser", 8.0))
     phases: NDArray[np.float64] = np.append(response, np.zeros(factor - 1)).reshape(-1, factor)[::-1]
     return np.ascontiguousarray(phases)

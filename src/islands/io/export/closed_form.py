@@ -1,7 +1,8 @@
 """Closed form of an extended simulation: one difference equation, which is exported as a model.
 
 It exists for models and linear simulations with effects that are static maps of the input or lines through
-the output. Physical systems are integrated, and other effects have a state or depend on the whole record.
+the output. Differential equations are integrated, see `islands.io.export.equations`; other effects have a
+state or depend on the whole record.
 """
 
 import json
@@ -12,12 +13,14 @@ from types import MappingProxyType
 from islands.data.channel_names import AT_ONCE
 from islands.errors import ModelError
 from islands.io.models import model_from_json
+from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.spec_base import EffectSpec, ScalesSpec
 from islands.io.simulator_spec.specification import (
     ExtendedSpec,
     LinearSpec,
     LocalSpec,
     ModelSpec,
+    PhysicalSpec,
     SimulationSpec,
 )
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
@@ -76,6 +79,11 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
             found = _make_linear_model(core, spec.inputs[0])
         case ExtendedSpec():
             found = closed_form(spec.core)
+        case PhysicalSpec() | OdeSpec():
+            raise ModelError(
+                f"the simulation {spec.kind} has no closed form as a difference equation: take the format "
+                "plain, python, json, c or matlab"
+            )
         case _:
             raise _refuse(f"the simulation {spec.kind}")
     if (spec.hold, spec.times) != ("first-order", 1):

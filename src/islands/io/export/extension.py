@@ -1,12 +1,17 @@
-"""Export of extended simulations: plain text, JSON, Python program."""
+"""Export of extended simulations: plain text, JSON, programs in Python, C and MATLAB."""
 
 import json
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from islands.discrepancy.effects import get_summary
+from islands.io.export import export
+from islands.io.export.closed_form import closed_form
+from islands.io.export.equations.c_equations import c_equations
+from islands.io.export.equations.equation_collection import collect_equations
+from islands.io.export.equations.matlab_equations import matlab_equations
 from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import LocalExtendedSpec
+from islands.io.simulator_spec.specification import LocalExtendedSpec, PhysicalSpec, innermost
 
 
 def as_text(spec: LocalExtendedSpec) -> str:
@@ -65,7 +70,40 @@ if __name__ == "__main__":
 '''
 
 
+def as_c(spec: LocalExtendedSpec) -> str:
+    """Return C99 source; see `export_extended`."""
+    return c_equations(collect_equations(spec)) if _has_equations(spec) else export(closed_form(spec), "c")
+
+
+def as_matlab(spec: LocalExtendedSpec) -> str:
+    """Return a MATLAB function; see `export_extended`."""
+    if _has_equations(spec):
+        return matlab_equations(collect_equations(spec))
+    return export(closed_form(spec), "matlab")
+
+
+def _has_equations(spec: LocalExtendedSpec) -> bool:
+    """Return whether the simulator is a system of differential equations."""
+    return isinstance(innermost(spec), OdeSpec | PhysicalSpec)
+
+
 #: Export formats of an extended simulation by name.
 EXTENDED_EXPORTS: Mapping[str, Callable[[LocalExtendedSpec], str]] = MappingProxyType(
-    {"plain": as_text, "python": as_program, "json": as_json}
+    {"plain": as_text, "python": as_program, "c": as_c, "matlab": as_matlab, "json": as_json}
 )
+
+
+def export_extended(spec: LocalExtendedSpec, kind: str) -> str:
+    """Return an extended simulation as text.
+
+    Differential equations are exported as programs that integrate them. A model or a linear simulation whose
+    effects have a closed form is exported as a model, in every text format of models.
+
+    Raises
+    ------
+    SettingsError
+        The format is unknown or is not text.
+    ModelError
+        The simulation cannot be written in this format. The message names what prevents it.
+    """
+    return EXTENDED_EXPORTS[kind](spec) if kind in EXTENDED_EXPORTS else export(closed_form(spec), kind)

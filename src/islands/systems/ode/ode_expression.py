@@ -109,31 +109,54 @@ _SIGNED = 3
 _ATOM = 5
 
 
-def render(expression: OdeExpression) -> str:
+@dataclass(frozen=True, slots=True)
+class Notation:
+    """How the parts of an expression are written; by default as the parser reads them.
+
+    Attributes
+    ----------
+    symbol, number : callable
+        Text of a name and of a number.
+    operators : frozenset of str
+        Functions that are written as operators between their operands.
+    call : callable
+        ``(function, texts of the arguments) -> text`` of any other function.
+    """
+
+    symbol: Callable[[str], str] = str
+    number: Callable[[float], str] = lambda value: repr(float(value)).removesuffix(".0")
+    operators: frozenset[str] = frozenset(_INFIX)
+    call: Callable[[str, tuple[str, ...]], str] = lambda name, arguments: f"{name}({', '.join(arguments)})"
+
+
+_PLAIN = Notation()
+
+
+def render(expression: OdeExpression, notation: Notation = _PLAIN) -> str:
     """Write an expression as text; the parser converts it back to the expression that it has read."""
-    return _render(expression)[0]
+    return _render(expression, notation)[0]
 
 
-def _render(expression: OdeExpression) -> tuple[str, int]:
+def _render(expression: OdeExpression, notation: Notation) -> tuple[str, int]:
     match expression:
         case Number(value):
-            text = repr(float(value)).removesuffix(".0")
+            text = notation.number(value)
             return text, _SIGNED if text.startswith("-") else _ATOM
         case Symbol(name):
-            return name, _ATOM
+            return notation.symbol(name), _ATOM
         case Operation("neg", (Number(value),)):
-            return _render(Number(-value))
+            return _render(Number(-value), notation)
         case Operation("neg", (operand,)):
-            return f"-{_bracket(operand, _SIGNED)}", _SIGNED
-        case Operation(function, arguments) if function in _INFIX:
+            return f"-{_bracket(operand, _SIGNED, notation)}", _SIGNED
+        case Operation(function, (first, second)) if function in notation.operators:
             operator, own, left, right = _INFIX[function]
-            return f"{_bracket(arguments[0], left)}{operator}{_bracket(arguments[1], right)}", own
+            return f"{_bracket(first, left, notation)}{operator}{_bracket(second, right, notation)}", own
         case Operation(function, arguments):
-            return f"{function}({', '.join(map(render, arguments))})", _ATOM
+            return notation.call(function, tuple(render(each, notation) for each in arguments)), _ATOM
 
 
-def _bracket(expression: OdeExpression, least: int) -> str:
-    text, precedence = _render(expression)
+def _bracket(expression: OdeExpression, least: int, notation: Notation) -> str:
+    text, precedence = _render(expression, notation)
     return text if precedence >= least else f"({text})"
 
 

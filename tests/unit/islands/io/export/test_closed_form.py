@@ -111,6 +111,6 @@ def test_effects_add_up_over_nested_simulations(record):
     ],
 )
 def test_other_simulations_are_refused_with_the_formats_that_are_possible(core, effects, further, message):
-    with pytest.raises(ModelError, match="plain, python or json") as caught:
+    with pytest.raises(ModelError, match="take the format plain, python") as caught:
         closed_form(extended(core, effects, **further))
     assert message in str(caught.value)

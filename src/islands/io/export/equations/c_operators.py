@@ -1,0 +1,145 @@
+"""Operators of maps as C functions; see `islands.discrepancy.interfaces.map_equation.OPERATORS`.
+
+Each function writes its result for the signal ``x`` to ``z``, or returns a number.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+_LOW_PASS = """\
+/* First-order low-pass with a time constant; exact for a cubic through four neighbouring samples. */
+static void low_pass(const double *x, double *z, size_t samples, double tau)
+{
+    static const double lagrange[4][4] = {
+        {0.0, -1.0/3.0, 1.0/2.0, -1.0/6.0},
+        {1.0, -1.0/2.0, -1.0, 1.0/2.0},
+        {0.0, 1.0, 1.0/2.0, -1.0/2.0},
+        {0.0, -1.0/6.0, 0.0, 1.0/6.0}};
+    const double step = tau > 0.0 ? DT/tau : 0.0;
+    double moments[4], weights[4] = {0.0, 0.0, 0.0, 0.0}, state = 0.0;
+    if (!(tau > 0.0)) {
+        for (size_t k = 0; k < samples; ++k) z[k] = x[k];
+        return;
+    }
+    for (int n = 0; n < 4; ++n) {
+        if (step < 1.0) { /* series of the integrals of step*exp(-step*(1 - s))*s^n over s from 0 to 1 */
+            double power = 1.0, sum = 0.0;
+            for (int m = 0; m < 20; ++m) {
+                sum += power/(n + m + 1);
+                power *= step/(m + 1);
+            }
+            moments[n] = step*exp(-step)*sum;
+        } else {
+            moments[n] = n == 0 ? 1.0 - exp(-step) : 1.0 - n/step*moments[n - 1];
+        }
+    }
+    for (int i = 0; i < 4; ++i) {
+        for (int n = 0; n < 4; ++n) weights[i] += lagrange[i][n]*moments[n];
+    }
+    for (size_t k = 0; k < samples; ++k) {
+        const double before = k > 0 ? x[k - 1] - x[0] : 0.0, here = x[k] - x[0];
+        const double next = x[k + 1 < samples ? k + 1 : samples - 1] - x[0];
+        const double after = x[k + 2 < samples ? k + 2 : samples - 1] - x[0];
+        z[k] = x[0] + state;
+        state = exp(-step)*state + weights[0]*before + weights[1]*here + weights[2]*next + weights[3]*after;
+    }
+}
+"""
+
+_RESONANCE = """\
+/* Second-order mode in series, by the bilinear transform, prewarped at its frequency. */
+static void resonance(const double *x, double *z, size_t samples, double period, double zeta)
+{
+    const double w = period > 0.0 ? 2.0*acos(-1.0)/period : HUGE_VAL;
+    double x1 = 0.0, x2 = 0.0, z1 = 0.0, z2 = 0.0;
+    for (size_t k = 0; k < samples; ++k) {
+        if (w*DT > 2.6) { /* faster than the record can show */
+            z[k] = x[k];
+        } else {
+            const double q = w/tan(w*DT/2.0), scale = q*q + 2.0*zeta*w*q + w*w, b = w*w/scale;
+            const double a1 = 2.0*(w*w - q*q)/scale, a2 = (q*q - 2.0*zeta*w*q + w*w)/scale;
+            const double x0 = x[k] - x[0], z0 = b*x0 + 2.0*b*x1 + b*x2 - a1*z1 - a2*z2;
+            x2 = x1;
+            x1 = x0;
+            z2 = z1;
+            z1 = z0;
+            z[k] = z0 + x[0];
+        }
+    }
+}
+"""
+
+_PLAY = """\
+/* Play with a half width. */
+static void play(const double *x, double *z, size_t samples, double width)
+{
+    double at = x[0];
+    for (size_t k = 0; k < samples; ++k) {
+        if (!(width > 0.0)) at = x[k];
+        else if (x[k] - width > at) at = x[k] - width;
+        else if (x[k] + width < at) at = x[k] + width;
+        z[k] = at;
+    }
+}
+"""
+
+_SLIDER = """\
+/* Stick-slip slider: z is constant until x differs from it by the breakaway, and then jumps to x. */
+static void slider(const double *x, double *z, size_t samples, double breakaway)
+{
+    double at = x[0];
+    for (size_t k = 0; k < samples; ++k) {
+        if (!(breakaway > 0.0)) at = x[k];
+        else at += breakaway*trunc((x[k] - at)/breakaway);
+        z[k] = at;
+    }
+}
+"""
+
+_INTERPOLATE = """\
+/* Signal at the time t*(1 + e) - tau, by Lagrange's polynomial through six samples; its ends are held. */
+static void interpolate_at(const double *x, double *z, size_t samples, double e, double tau)
+{
+    const long last = (long)samples - 1;
+    for (long k = 0; k <= last; ++k) {
+        const double at = fmin(fmax((double)k*(1.0 + e) - tau/DT, 0.0), (double)last);
+        const long lower = (long)at < last - 1 ? (long)at : last - 1, first = lower > 0 ? lower : 0;
+        const double f = at - (double)first;
+        double sum = 0.0;
+        for (long here = -2; here <= 3; ++here) {
+            const long place = first + here < 0 ? 0 : first + here > last ? last : first + here;
+            double weight = x[place];
+            for (long other = -2; other <= 3; ++other) {
+                if (other != here) weight *= (f - (double)other)/(double)(here - other);
+            }
+            sum += weight;
+        }
+        z[k] = sum;
+    }
+}
+"""
+
+_RESTS = """\
+/* Whether a signal is constant over the estimation part of the record that was diagnosed. */
+static double rests(const double *x, size_t samples)
+{
+    double least = x[0], most = x[0];
+    for (size_t k = 0; k < samples && k < FITTED; ++k) {
+        least = fmin(least, x[k]);
+        most = fmax(most, x[k]);
+    }
+    return most - least <= MAX_RANGE_AT_REST*fmax(fabs(least), fabs(most)) ? 1.0 : 0.0;
+}
+"""
+
+#: Definition of each operator that is a function.
+C_OPERATORS: Mapping[str, str] = MappingProxyType(
+    {
+        "low-pass": _LOW_PASS,
+        "resonance": _RESONANCE,
+        "play": _PLAY,
+        "slider": _SLIDER,
+        "interpolate": _INTERPOLATE,
+        "rests": _RESTS,
+    }
+)

@@ -1,0 +1,126 @@
+"""Equations of an extended simulation: those of its system with the terms, maps and forces of its effects.
+
+They are derived from what the effects declare: the terms that a system lists, the expressions of force laws,
+and the equations of maps.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from islands.systems.ode.ode_expression import OdeExpression
+from islands.systems.ode.ode_system import OdeSystem
+
+
+@dataclass(frozen=True, slots=True)
+class NamedValue:
+    """A parameter or a state at the first sample."""
+
+    value: float
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class SignalMap:
+    """Map of the input or of the output; see `MapEquation`.
+
+    Attributes
+    ----------
+    effect, summary : str
+    equation : expression
+        Of ``x``, ``t``, names of values, and the results ``z0``, ``z1``, ... of the operators.
+    operators : tuple of (str, tuple of expression)
+        Name and arguments of each operator. The argument of ``temperature`` and ``coupled`` is the name of
+        the channel.
+    """
+
+    effect: str
+    summary: str
+    equation: OdeExpression
+    operators: tuple[tuple[str, tuple[OdeExpression, ...]], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class OutputForce:
+    """Force that is added to the output, on the input as its coordinate.
+
+    Attributes
+    ----------
+    effect : str
+    force : expression
+        Of the coordinate ``x``, its rate ``v``, names of values and of the state.
+    state : str
+        Name of its state; empty if it has none.
+    slope : expression or None
+        Derivative of the state.
+    """
+
+    effect: str
+    force: OdeExpression
+    state: str = ""
+    slope: OdeExpression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StateLimit:
+    """Limits of a state; None for none. ``caught`` of what the upper one cuts off goes to ``receiver``."""
+
+    lower: OdeExpression | None
+    upper: OdeExpression | None
+    receiver: str = ""
+    caught: OdeExpression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ExtendedEquations:
+    """All that a program of an extended simulation computes.
+
+    Attributes
+    ----------
+    system : OdeSystem
+        Equations with the terms of effects; their parameters are in ``values``.
+    columns : mapping
+        Columns of the record by the names that the program gives to them: the input and the channels.
+    output : str
+        Column of the output.
+    values : mapping
+        Parameters by name, also those of effects.
+    start : mapping
+        States at the first sample by name, also those of force laws.
+    limits : mapping
+        By name of the state.
+    input_maps, output_maps : tuple of SignalMap
+        In the order in which they act.
+    forces : tuple of OutputForce
+    gain : expression or None
+        Factor of the gain over the time ``t``; None for one.
+    gain_signal : str
+        Signal in the equations that is this factor; empty if the input is multiplied.
+    hold : str
+        Input between samples: ``first-order``, ``zero-order`` or ``band-limited``.
+    times, steps : int
+        Parts of a sample into which the input is interpolated, and integration steps of each.
+    dt : float
+        Sampling time in seconds.
+    fitted : int
+        Samples of the estimation part of the record that was diagnosed.
+    effects : tuple of str
+        Effects with their equations in words.
+    """
+
+    system: OdeSystem
+    columns: Mapping[str, str]
+    output: str
+    values: Mapping[str, NamedValue]
+    start: Mapping[str, NamedValue]
+    hold: str
+    times: int
+    steps: int
+    dt: float
+    fitted: int
+    limits: Mapping[str, StateLimit] = field(default_factory=dict)
+    input_maps: tuple[SignalMap, ...] = ()
+    output_maps: tuple[SignalMap, ...] = ()
+    forces: tuple[OutputForce, ...] = ()
+    gain: OdeExpression | None = None
+    gain_signal: str = ""
+    effects: tuple[str, ...] = ()

@@ -1,0 +1,108 @@
+"""Operators of maps as MATLAB functions; see `islands.discrepancy.interfaces.map_equation.OPERATORS`.
+
+Each function returns its result for the signal ``x``, a column.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+_LOW_PASS = """\
+function z = low_pass(x, tau, c)
+% First-order low-pass with a time constant; exact for a cubic through four neighbouring samples.
+  z = x;
+  if ~(tau > 0), return; end
+  lagrange = [0 -1/3 1/2 -1/6; 1 -1/2 -1 1/2; 0 1 1/2 -1/2; 0 -1/6 0 1/6];
+  step = c.dt/tau;
+  moments = zeros(4, 1);
+  for n = 0:3
+    if step < 1 % series of the integrals of step*exp(-step*(1 - s))*s^n over s from 0 to 1
+      m = 0:19;
+      moments(n + 1) = step*exp(-step)*sum(step.^m./(factorial(m).*(n + m + 1)));
+    elseif n == 0
+      moments(1) = 1 - exp(-step);
+    else
+      moments(n + 1) = 1 - n/step*moments(n);
+    end
+  end
+  weights = lagrange*moments;
+  last = numel(x);
+  state = 0;
+  for k = 1:last
+    near = x([max(k - 1, 1), k, min(k + 1, last), min(k + 2, last)]) - x(1);
+    z(k) = x(1) + state;
+    state = exp(-step)*state + near(:).'*weights;
+  end
+end
+"""
+
+_RESONANCE = """\
+function z = resonance(x, period, zeta, c)
+% Second-order mode in series, by the bilinear transform, prewarped at its frequency.
+  z = x;
+  if ~(period > 0) || 2*pi/period*c.dt > 2.6, return; end % faster than the record can show
+  w = 2*pi/period;
+  q = w/tan(w*c.dt/2);
+  scale = q*q + 2*zeta*w*q + w*w;
+  b = w*w/scale;
+  z = x(1) + filter([b, 2*b, b], [1, 2*(w*w - q*q)/scale, (q*q - 2*zeta*w*q + w*w)/scale], x - x(1));
+end
+"""
+
+_PLAY = """\
+function z = play(x, width)
+% Play with a half width.
+  z = x;
+  if ~(width > 0), return; end
+  for k = 2:numel(x)
+    z(k) = min(max(z(k-1), x(k) - width), x(k) + width);
+  end
+end
+"""
+
+_SLIDER = """\
+function z = slider(x, breakaway)
+% Stick-slip slider: z is constant until x differs from it by the breakaway, and then jumps to x.
+  z = x;
+  if ~(breakaway > 0), return; end
+  for k = 2:numel(x)
+    z(k) = z(k-1) + breakaway*fix((x(k) - z(k-1))/breakaway);
+  end
+end
+"""
+
+_INTERPOLATE = """\
+function z = interpolate_at(x, e, tau, c)
+% Signal at the time t*(1 + e) - tau, by Lagrange's polynomial through six samples; its ends are held.
+  last = numel(x) - 1;
+  at = min(max((0:last).'*(1 + e) - tau/c.dt, 0), last);
+  first = min(floor(at), max(last - 1, 0));
+  z = zeros(size(x));
+  for here = -2:3
+    weight = x(min(max(first + here, 0), last) + 1);
+    for other = [-2:here-1, here+1:3]
+      weight = weight.*(at - first - other)/(here - other);
+    end
+    z = z + weight;
+  end
+end
+"""
+
+_RESTS = """\
+function yes = rests(x, c)
+% Whether a signal is constant over the estimation part of the record that was diagnosed.
+  x = x(1:min(c.fitted, numel(x)));
+  yes = double(max(x) - min(x) <= c.max_range_at_rest*max(abs(x)));
+end
+"""
+
+#: Definition of each operator that is a function.
+MATLAB_OPERATORS: Mapping[str, str] = MappingProxyType(
+    {
+        "low-pass": _LOW_PASS,
+        "resonance": _RESONANCE,
+        "play": _PLAY,
+        "slider": _SLIDER,
+        "interpolate": _INTERPOLATE,
+        "rests": _RESTS,
+    }
+)
