@@ -3,6 +3,7 @@
 import numpy as np
 
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
+from islands.errors import RecordError
 
 #: Units by which a channel is recognised as a temperature.
 TEMPERATURES = ("K", "degC", "C", "°C", "mK", "degF")
@@ -18,19 +19,27 @@ def channel(context: SimulationContext, thermal: bool) -> Signal:
 
     The first value is that of the first recording.
     """
-    name = _name(context, thermal) or ""
+    name = _find(context, thermal)
     signal = context.channels[name]
     return signal - (context.whole or context).channels[name][0] if thermal else signal
 
 
 def channel_unit(context: SimulationContext, thermal: bool) -> str:
     """Return the unit of the channel; "1" if it has none."""
-    return context.units[_name(context, thermal) or ""] or "1"
+    return context.units[_find(context, thermal)] or "1"
 
 
 def channel_range(context: SimulationContext, thermal: bool) -> float:
     """Return the difference between the largest and the smallest value of the channel."""
     return float(np.ptp(channel(context, thermal)))
+
+
+def _find(context: SimulationContext, thermal: bool) -> str:
+    name = _name(context, thermal)
+    if name is None:
+        what = f"in {', '.join(TEMPERATURES)}" if thermal else "that is not a temperature"
+        raise RecordError(f"an effect of the simulation needs a channel {what} that varies: give its column")
+    return name
 
 
 def _name(context: SimulationContext, thermal: bool) -> str | None:

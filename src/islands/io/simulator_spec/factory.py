@@ -135,6 +135,7 @@ def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapp
     units = record.input_units[0], record.output_unit
     scales = replace(
         read_scales(document.scales, np.ascontiguousarray(record.u[:, 0]), record.dt, units),
+        channels=dict(zip(record.input_names[1:], np.ascontiguousarray(record.u.T[1:]), strict=True)),
         units=dict(zip(record.input_names[1:], record.input_units[1:], strict=True)),
     )
     added: list[Effect] = []

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
 from islands.discrepancy.calibration.target import Target
@@ -126,6 +127,25 @@ def test_the_initial_state_of_an_effect_is_fitted() -> None:
     values = fit.values.copy()
     values[fit.simulation.get_slice(effect)] = (0.2, 0.05, 0.0, 8.0)
     assert_same_output(case, replace(fit, values=values, output=fit.simulation.simulate(values)))
+
+
+def test_effects_of_channels_find_the_columns_of_the_record() -> None:
+    case = made()["bouc-wen-piezo"]
+    time = np.arange(case.record.samples)
+    record = Dataset(
+        *(np.column_stack([case.record.u[:, 0], np.sin(0.01 * time), np.cos(0.02 * time)]), case.record.y),
+        case.record.dt,
+        input_names=("u_V", "T_K", "w_V"),
+        input_units=("V", "K", "V"),
+        output_name="y_um",
+        output_unit="um",
+    )
+    fit = extend(replace(case, record=record), [CATALOGUE["thermal-drift"], CATALOGUE["cross-coupling"]])
+    document = json.loads(extended_json(fit, record))
+    assert np.array_equal(simulate_spec(document, record), fit.output)
+    resting = replace(record, u=np.where([True, False, True], record.u, 20.0))
+    with pytest.raises(RecordError, match="an effect of the simulation needs a channel in K, degC"):
+        simulate_spec(document, resting)
 
 
 @pytest.mark.ci
