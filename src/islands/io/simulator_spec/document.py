@@ -174,9 +174,14 @@ def _make_extended_spec(
 
 
 def _find_start(simulator: Simulator, values: Signal) -> dict[str, float]:
-    """Return the states at the first sample of equations by name."""
+    """Return the states of equations at the first sample by name; empty for other simulators."""
+    core = simulator
+    while isinstance(core, SavedExtension | ResampledSimulator):
+        core = core.simulator
+    if not isinstance(core, OdeSimulator) or isinstance(core, FmuSimulator):
+        return {}
     prefix = "initial "
-    return {
+    return dict(core.initial) | {
         parameter.name.removeprefix(prefix): float(value)
         for parameter, value in zip(simulator.parameters, values, strict=False)
         if parameter.initial and parameter.name.startswith(prefix)

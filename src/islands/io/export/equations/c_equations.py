@@ -194,6 +194,8 @@ class _CWriter:
 
     def _before(self) -> str:
         given, lines = self.given, []
+        if given.hold == "band-limited":
+            lines.append("if (samples > 0 && samples <= REACH + 1) return -1; /* too short for the filter */")
         maps = [*given.input_maps, *given.output_maps]
         rows = max((len(each.operators) for each in maps), default=0)
         if maps:

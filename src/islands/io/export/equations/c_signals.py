@@ -252,6 +252,6 @@ def _write_band_limit(times: int) -> str:
     lines = "\n".join(
         line
         for row in rows.splitlines()
-        for line in textwrap.wrap(row, 108, initial_indent=" " * 8, subsequent_indent=" " * 9)
+        for line in textwrap.wrap(row.strip(), 108, initial_indent=" " * 8, subsequent_indent=" " * 9)
     )
     return _BAND_LIMITED.format(reach=REACH, phases=2 * times, weights=f"{lines}\n    ")

@@ -96,7 +96,7 @@ void advance_states(const struct parameters *p, struct states *s, const struct s
 }}
 
 {operators}{maps}{forces}/*
- * Simulate a record; write its output y. Return 0, or -1 if there is no memory.
+ * Simulate a record; write its output y. Return 0, or -1 if that is not possible, for example without memory.
  */
 int simulate(const struct parameters *p, const struct states *initial, const struct record *record, double *y)
 {{

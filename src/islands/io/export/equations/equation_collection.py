@@ -222,8 +222,12 @@ class _Collection:
         core = self.levels[-1]
         context = read_scales(core.scales, np.zeros(2), core.scales.dt / core.times, ("", ""))
         assert effect.equation is not None
-        previous = Number(1.0) if self.gain is None else self.gain
-        self.gain = substitute(parse_law(effect.equation(context).equation), {**symbols, "x": previous})
+        written = parse_law(effect.equation(context).equation)
+        match written:
+            case Operation("mul", (Symbol("x"), factor)) if self.gain is None:
+                self.gain = substitute(factor, symbols)
+            case _:
+                self.gain = substitute(written, {**symbols, "x": self.gain or Number(1.0)})
 
     def _add_term(self, given: EffectSpec) -> None:
         listed = {each.name: each for each in list_terms(self.system)}

@@ -55,6 +55,7 @@ class _MatlabWriter:
             columns=", ".join(arguments),
             first=arguments[0],
             count=len(arguments) + 1,
+            last=len(arguments) + 2,
             heading="\n".join(f"% {line}".rstrip() for line in code.describe()),
             record=_indent(
                 [f"r.{name} = double({given}(:));" for name, given in zip(columns, arguments, strict=True)]

@@ -32,7 +32,7 @@ function y = extended_simulation({columns}, initial, p)
     return
   end
   if nargin < {count}, initial = initial_states(); end
-  if nargin < {count} + 1, p = parameters(); end
+  if nargin < {last}, p = parameters(); end
   c = constants();
   shape = size({first});
   {record}
