@@ -184,7 +184,8 @@ def test_only_unchanged_equations_are_described_by_their_name() -> None:
     oscillator = make_oscillator(0.5, 4.0, 200.0)
     values = np.array([each.nominal for each in oscillator.parameters])
     spec = describe_extension(oscillator, values, ("u_N",), "y_m")
-    assert spec == PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})
+    values_by_name = {"m": 0.5, "c": 4.0, "k": 200.0}
+    assert spec == PhysicalSpec(kind="second-order", parameters=values_by_name, steps=1)
     changed = oscillator.system.with_term("v", "-3*x**2*v")
     record = recorded(wave(), wave(), units=("N", "m"))
     extended = make_ode_simulator(changed, record, {"x": 0.0, "v": 0.0})
