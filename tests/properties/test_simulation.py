@@ -338,24 +338,30 @@ def mask_after_warm_up(drawn, warm_up):
 
 
 @given(st.data())
-def test_linked_model_has_the_free_run_of_the_model(data):
+def test_linked_model_has_the_free_runs_of_the_model(data):
     chosen = MODELS[data.draw(st.sampled_from(list(MODELS)))]
-    linked = LinkedModel(chosen.regressors)
+    linked, warm_up = LinkedModel(chosen.regressors), chosen.maximum_lag
     for _ in range(2):
-        length = chosen.maximum_lag + data.draw(st.integers(1, 200))
-        drawn = record(chosen, (length,), data.draw(st.integers(0, 2**32 - 1)))
+        length = warm_up + data.draw(st.integers(1, 200))
+        seeds = data.draw(st.lists(st.integers(0, 2**32 - 1), min_size=1, max_size=11))
+        drawn = [record(chosen, (length,), seed) for seed in seeds]
         # Large parameters cause divergence.
-        factor = data.draw(st.sampled_from([1.0, -0.3, 0.0, 40.0]))
-        theta = factor * np.array(chosen.theta)
-        expected = free_run(chosen.with_parameters(theta), mask_after_warm_up(drawn, chosen.maximum_lag)).y
-        found = linked.free_run(theta, drawn.u, drawn.y[: chosen.maximum_lag])
-        assert equal_bits(found, expected)
+        factors = data.draw(
+            st.lists(st.sampled_from([1.0, -0.3, 0.0, 40.0]), min_size=len(seeds), max_size=len(seeds))
+        )
+        theta = np.outer(factors, chosen.theta)
+        found = linked.free_runs(
+            theta, [each.u.T for each in drawn], np.array([each.y[:warm_up] for each in drawn])
+        )
+        for run, parameters, each in zip(found, theta, drawn, strict=True):
+            expected = free_run(chosen.with_parameters(parameters), mask_after_warm_up(each, warm_up)).y
+            assert equal_bits(run, expected)
 
 
 def test_linked_model_diverges_where_the_model_diverges():
     chosen, data = MODELS["linear"], record(MODELS["linear"], (300,))
     theta = 3.0 * np.array(chosen.theta)
-    found = LinkedModel(chosen.regressors).free_run(theta, data.u, data.y[:2])
+    (found,) = LinkedModel(chosen.regressors).free_runs(theta[None], [data.u.T], data.y[None, :2])
     assert np.isnan(found[-1])
     assert np.isfinite(found[2])
     assert equal_bits(found, free_run(chosen.with_parameters(theta), mask_after_warm_up(data, 2)).y)
@@ -365,7 +371,7 @@ def test_unpickled_linked_model_is_linked_again():
     chosen, data = MODELS["shared subexpressions"], record(MODELS["shared subexpressions"], (90,))
     linked = LinkedModel(chosen.regressors)
     runs = [
-        each.free_run(np.array(chosen.theta), data.u, data.y[:2])
+        each.free_runs(np.array([chosen.theta]), [data.u.T], data.y[None, :2])
         for each in (linked, pickle.loads(pickle.dumps(linked)))
     ]
     assert equal_bits(*runs)
@@ -376,7 +382,7 @@ def test_unpickled_linked_model_is_linked_again():
 def test_linked_model_needs_more_samples_than_its_warm_up():
     linked = LinkedModel(MODELS["deepest lag on u"].regressors)
     with pytest.raises(RecordError, match="the input has 11 samples and the warm-up takes 11"):
-        linked.free_run(np.ones(3), np.zeros((11, 1)), np.zeros(11))
+        linked.free_runs(np.ones((1, 3)), [np.zeros((1, 11))], np.zeros((1, 11)))
 
 
 # True model.

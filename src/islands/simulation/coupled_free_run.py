@@ -103,6 +103,7 @@ class CoupledSimulator:
         outputs, warm_up = len(self._ends), self._warm_up
         predicted = np.full((len(self._y), outputs), np.nan)
         failures = []
+        theta = np.repeat(theta[:, None], LANES, axis=1)
         for lanes, block in self._blocks:
             signals = block.copy()
             simulate_coupled(self._program, theta, self._ends, warm_up, signals)

@@ -1,4 +1,4 @@
-"""Force elements, and their sum along a given motion."""
+"""Force elements, and their forces along a given motion."""
 
 from functools import cache
 from typing import NamedTuple
@@ -63,18 +63,17 @@ def call_law(_typingctx, address, x, rate, z, numbers):
 
 
 @kernel
-def integrate_along(x, rate, dt, elements, total):
-    """Sum the forces of the elements along a given motion; write ``total`` (samples,).
+def integrate_along(x, rate, dt, elements, found):
+    """Write the force of each element along a given motion into ``found`` (elements, samples).
 
     The states are integrated by RK4 with a linearly interpolated coordinate.
     """
-    total[:] = 0.0
     for e in range(elements.forces.size):
         numbers = elements.numbers.ctypes.data + 8 * WIDTH * e
         force, derivative, sign = elements.forces[e], elements.state_derivatives[e], elements.signs[e]
         z = elements.initial_states[e]
         for k in range(x.size):
-            total[k] += sign * call_law(force, x[k], rate[k], z, numbers)
+            found[e, k] = sign * call_law(force, x[k], rate[k], z, numbers)
             if derivative != 0 and k + 1 < x.size:
                 half, v = 0.5 * (x[k] + x[k + 1]), (x[k + 1] - x[k]) / dt
                 first = call_law(derivative, x[k], v, z, numbers)

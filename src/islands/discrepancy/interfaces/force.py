@@ -90,14 +90,7 @@ def add_output_forces(
     x: Signal, context: SimulationContext, forces: Sequence[tuple[ForceLaw, Signal]]
 ) -> Signal:
     """Return the sum of the forces on the coordinate ``x``, for a simulator without inertia."""
-    total = np.zeros(x.size)
-    if not forces:
-        return total
-    x = np.ascontiguousarray(x)
-    integrate_along(
-        x, np.gradient(x, context.dt), context.dt, pack_force_laws(forces, context, balance=False), total
-    )
-    return total
+    return sum_output_forces([x], context, [forces])[0]
 
 
 def sum_output_forces(
@@ -112,14 +105,30 @@ def sum_output_forces(
     forces : sequence of sequence
         Forces of each simulation.
     """
-    known: dict[tuple[int, ForceLaw, bytes], Signal] = {}
+    distinct: dict[int, dict[tuple[ForceLaw, bytes], tuple[ForceLaw, Signal]]] = {id(x): {} for x in inputs}
+    for x, given in zip(inputs, forces, strict=True):
+        distinct[id(x)] |= {(law, values.tobytes()): (law, values) for law, values in given}
+    signals: dict[tuple[int, ForceLaw, bytes], Signal] = {}
+    for x in {id(x): x for x in inputs}.values():
+        laws = distinct[id(x)]
+        signals |= zip(
+            ((id(x), *key) for key in laws), _integrate_forces(x, context, list(laws.values())), strict=True
+        )
     sums = []
     for x, given in zip(inputs, forces, strict=True):
         total = np.zeros(x.size)
         for law, values in given:
-            key = id(x), law, values.tobytes()
-            if key not in known:
-                known[key] = add_output_forces(x, context, [(law, values)])
-            total += known[key]
+            total += signals[id(x), law, values.tobytes()]
         sums.append(total)
     return sums
+
+
+def _integrate_forces(
+    x: Signal, context: SimulationContext, forces: Sequence[tuple[ForceLaw, Signal]]
+) -> Signal:
+    """Return each force on the coordinate ``x``, shape (forces, samples)."""
+    found = np.zeros((len(forces), x.size))
+    if forces:
+        x, elements = np.ascontiguousarray(x), pack_force_laws(forces, context, balance=False)
+        integrate_along(x, np.gradient(x, context.dt), context.dt, elements, found)
+    return found

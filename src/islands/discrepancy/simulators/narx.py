@@ -1,6 +1,6 @@
 """Identified model in free run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from islands.discrepancy.effects.model_form import SLOPE, MissingTerm, missing_terms, model_form
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.force import add_output_forces
-from islands.discrepancy.interfaces.simulator import Forces
+from islands.discrepancy.interfaces.force import sum_output_forces
+from islands.discrepancy.interfaces.simulator import Forces, SimulationRun
 from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.errors import ModelError
 from islands.model.model import Model, make_model
@@ -123,25 +123,43 @@ class NarxSimulator:
         forces: Forces,
     ) -> Signal:
         """Simulate the output; see `Simulator.simulate`."""
-        theta = self._theta.copy()
-        theta[self._calibrated] = values[:-1]
-        warm_up = self._linked.warm_up
-        start = self.start[:warm_up] + (values[-1] - self.start[:warm_up].mean())
-        if SLOPE in effect_parameters:
-            theta = np.append(theta, [effect_parameters.get(term.name, 0.0) for term in self._missing])
-            simulated = self._run_extended(theta, x, start, effect_parameters[SLOPE])
-        else:
-            simulated = self._linked.free_run(theta, x[:, None], start)
-        simulated[:warm_up] = start
-        return simulated + add_output_forces(x, context, forces) if forces else simulated
+        output: Signal = self.simulate_batch([SimulationRun(values, x, effect_parameters, forces)], context)[
+            0
+        ]
+        return output
 
-    def _run_extended(self, theta: Signal, x: Signal, start: Signal, slope: float) -> Signal:
+    def simulate_batch(
+        self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
+    ) -> Signal:
+        """Simulate several runs; see `BatchSimulator.simulate_batch`."""
+        theta = np.tile(self._theta, (len(runs), 1))
+        theta[:, self._calibrated] = [run.values[:-1] for run in runs]
+        warm_up = self._linked.warm_up
+        measured = self.start[:warm_up]
+        levels = np.array([[run.values[-1]] for run in runs])
+        start = measured + (levels - measured.mean())
+        if SLOPE in runs[0].effect_parameters:
+            simulated = self._run_extended(theta, runs, start)
+        else:
+            simulated = self._linked.free_runs(theta, [run.x[None] for run in runs], start)
+        simulated[:, :warm_up] = start
+        if any(run.forces for run in runs):
+            simulated += sum_output_forces([run.x for run in runs], context, [run.forces for run in runs])
+        return simulated[:, ::every]
+
+    def _run_extended(self, theta: Signal, runs: Sequence[SimulationRun], start: Signal) -> Signal:
         """Run the model with the missing terms; signals are constant before the first sample."""
-        before = self._extended.warm_up - start.size
-        channels = np.empty((x.size + before, 2))
-        channels[:before, 0], channels[before:, 0], channels[:, 1] = x[0], x, slope
-        initial = np.concatenate([np.full(before, start[0] if start.size else 0.0), start])
-        return self._extended.free_run(theta, channels, initial)[before:]
+        missing = [[run.effect_parameters.get(term.name, 0.0) for term in self._missing] for run in runs]
+        before = self._extended.warm_up - start.shape[1]
+        channels = []
+        for run in runs:
+            channel = np.empty((2, run.x.size + before))
+            channel[0, :before], channel[0, before:] = run.x[0], run.x
+            channel[1] = run.effect_parameters[SLOPE]
+            channels.append(channel)
+        first = start[:, :1] if start.shape[1] else np.zeros((len(runs), 1))
+        initial = np.hstack([np.repeat(first, before, axis=1), start])
+        return self._extended.free_runs(np.hstack([theta, missing]), channels, initial)[:, before:]
 
 
 def _is_linear_in_output(item: Regressor) -> bool:

@@ -1,7 +1,7 @@
-"""Kernel for equations that read each other's outputs.
+"""Kernel for equations that read each other's outputs, and for equations with other parameters in each lane.
 
 All equations are one program. Every step evaluates all of them before the next step begins, so that each one
-reads the simulated past of the others. A row holds the same step of several intervals, as in
+reads the simulated past of the others. A row holds the same step of several runs, as in
 `islands.kernels.simulation.simulate`; a row has one vector, because a coupled model is simulated a few times
 and not millions of times.
 """
@@ -10,24 +10,24 @@ import numpy as np
 
 from islands.kernels.interpreter import TEMPORARY, execute, multiply_factors
 from islands.kernels.jit_cache import kernel
-from islands.kernels.simd import VECTOR, add, address, broadcast, multiply, padded_size, write
+from islands.kernels.simd import VECTOR, add, address, broadcast, multiply, padded_size, read, write
 
 #: Vectors per row.
 _COUNT = 1
 
-#: Intervals that are simulated together.
+#: Runs that are simulated together.
 LANES = VECTOR * _COUNT
 
 
 @kernel
 def simulate_coupled(
     program,  # terms of all equations, those of the first output first; channels are outputs, then inputs
-    theta,  # float64 [term]
+    theta,  # float64 [term, lane]
     ends,  # int64 [output]: the term after the last one of the equation
     warm_up,  # rows before the first predicted one, at least the largest lag
     signals,  # float64 [channel, row * lane]: the outputs after the warm-up are overwritten
 ):
-    """Simulate all outputs of a block of intervals in place; the caller checks the bound."""
+    """Simulate all outputs of a block of runs in place; the caller checks the bound."""
     flat = signals.shape[1]
     temporaries = padded_size(max(1, program.temporaries) * LANES)
     for index in range(program.constants.size):
@@ -55,7 +55,7 @@ def simulate_coupled(
                 a, b = places[factors[term, 0]], places[factors[term, 1]]
                 c, d = places[factors[term, 2]], places[factors[term, 3]]
                 product = multiply_factors(a, b, c, d, degree[term], _COUNT)
-                y = add(y, multiply(broadcast(theta[term], _COUNT), product))
+                y = add(y, multiply(read(address(theta, term * LANES), _COUNT), product))
                 term += 1
             write(address(signals, output * flat + row * LANES), y)
         for index in range(places.size):
