@@ -78,10 +78,10 @@ class LinkedModel:
         """Simulate at most as many runs as a row of the kernel has lanes."""
         runs, (inputs, samples) = len(theta), u[0].shape
         # Lanes that are left over repeat the runs, and are ignored.
-        lanes = np.resize(np.arange(runs), LANES)
+        lanes = [lane % runs for lane in range(LANES)]
         signals = np.empty((1 + inputs, samples, LANES))
         signals[0, : self.warm_up] = start[lanes].T
-        signals[1:] = np.array([u[run] for run in lanes]).transpose(1, 2, 0)
+        signals[1:] = np.array([u[lane] for lane in lanes]).transpose(1, 2, 0)
         ends = np.array([theta.shape[1]], dtype=np.int64)
         rows = signals.reshape(1 + inputs, -1)
         simulate_coupled(self._program, np.ascontiguousarray(theta[lanes].T), ends, self.warm_up, rows)
