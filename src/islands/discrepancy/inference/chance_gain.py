@@ -15,7 +15,11 @@ from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResul
 from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
-from islands.discrepancy.inference.noise_surrogates import Randomisation, draw_surrogates
+from islands.discrepancy.inference.noise_surrogates import (
+    LOSS_OF_RANDOM_WALKS,
+    Randomisation,
+    draw_surrogates,
+)
 from islands.discrepancy.inference.screening import DEPENDENCE, simulate_starting_points
 from islands.discrepancy.interfaces.effect import Effect, Signal
 
@@ -129,10 +133,11 @@ class ForwardSelection:
 def draw_noise(fit: CalibrationResult, target: Target) -> list[Signal]:
     """Draw surrogates of the residual of a fit, whitened: arrays of shape (surrogates, selected samples)."""
     part, rng = target.estimation_part, np.random.default_rng(SEED)
+    min_loss = LOSS_OF_RANDOM_WALKS if target.effective_samples is None else 0.0
     residual = (target.y - fit.output)[part]
     kinds = []
     for randomisation in Randomisation:
-        drawn = draw_surrogates(residual, target.fitted_segments, randomisation, SURROGATES, rng)
+        drawn = draw_surrogates(residual, target.fitted_segments, randomisation, SURROGATES, rng, min_loss)
         kinds.append(np.stack([target.select(_insert(each, part)) for each in drawn]))
     return kinds
 

@@ -9,11 +9,15 @@ from islands.discrepancy.calibration.noise_model import fit_integrated_noise, fi
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.segments import find_bounds
 
-#: Loss of minus twice the log-likelihood, per sample, up to which a residual is a random walk. Calibration
-#: absorbs most of the slowest part of such noise, so that other models fit the rest better, by 4 to 28. Their
-#: surrogates lack that part, and noise exceeds their thresholds too often. A short record cannot exclude a
-#: random walk, whose thresholds would hide all slow causes in it.
+#: Loss of minus twice the log-likelihood, per sample, up to which a residual is taken for a random walk.
+#: Calibration absorbs most of the slowest part of such noise, so that other models fit the rest better. Their
+#: surrogates lack that part, and noise exceeds their thresholds too often.
 MAX_UNIT_ROOT_LOSS = 1.0 / 150.0
+
+#: Loss that the residual of a random walk reaches, in a record of any length: 4 to 28. A short record cannot
+#: exclude a random walk. This is for residuals that are noise: thresholds of random walks would hide all
+#: causes of a slow model error.
+LOSS_OF_RANDOM_WALKS = 30.0
 
 
 class Randomisation(Enum):
@@ -34,6 +38,7 @@ def draw_surrogates(
     randomisation: Randomisation,
     count: int,
     rng: np.random.Generator,
+    min_loss: float = 0.0,
 ) -> Iterator[Signal]:
     """Draw surrogates of a residual.
 
@@ -47,6 +52,8 @@ def draw_surrogates(
         Residual without gaps.
     segments : sequence of int
         Lengths of the recordings in samples.
+    min_loss : float
+        Least value of the loss up to which the residual is taken for a random walk.
 
     Yields
     ------
@@ -55,7 +62,7 @@ def draw_surrogates(
     noise = fit_noise(residual, segments=segments)
     integrated = fit_integrated_noise(residual, segments)
     loss = integrated.minus_twice_log_likelihood - noise.minus_twice_log_likelihood
-    if loss < MAX_UNIT_ROOT_LOSS * residual.size:
+    if loss < max(MAX_UNIT_ROOT_LOSS * residual.size, min_loss):
         noise = integrated
     innovations = noise.whiten(residual, segments)
     stable = noise.limit_poles(residual.size)

@@ -65,6 +65,14 @@ def test_noise_does_not_reach_its_own_threshold(kind: str) -> None:
             assert gain < max(chance, 6.0 + bic_penalty(effect, base)), (effect.name, seed)
 
 
+# In records of these seeds, the drift exceeds the threshold of an autoregression.
+@pytest.mark.parametrize("seed", [1, 11])
+def test_drift_does_not_exceed_the_threshold_of_a_short_random_walk(seed: int) -> None:
+    noise = NOISES["brown"](np.random.default_rng(seed), wave(500))
+    gain, chance = measure_gain(noise, CATALOGUE["linear-drift"])
+    assert gain < chance
+
+
 def test_effect_exceeds_the_threshold_of_its_noise() -> None:
     noise = NOISES["pink"](np.random.default_rng(1), wave(800)) + 0.1 * wave(800) ** 2
     gain, chance = measure_gain(noise, CATALOGUE["even-nonlinearity"])
