@@ -132,11 +132,19 @@ def replaces_effects(
     margin = max(EQUIVALENCE_MARGIN, MIN_RELATIVE_GAIN * (base.score - found.cost))
     if any(effect.is_free for effect in hypothesis.effects):
         margin = 0.0  # A formula is preferred to a curve that explains as much.
-    elif len(found.terms) < len(hypothesis.effects):
-        margin = EQUIVALENCE_MARGIN  # Several names are no other form of fewer terms.
+    elif sum(len(term.parameters) for term in found.terms) < _count_values(hypothesis):
+        margin = EQUIVALENCE_MARGIN  # Effects with more values are no idealisation of the terms.
     if terms.discovery.worse_by < margin:
         return False
     return cross_validate_gain(base, False, found.fit, target, fitted, rng) > 0.0
+
+
+def _count_values(hypothesis: Hypothesis) -> int:
+    """Count the values of effects, without initial states."""
+    context = hypothesis.fit.simulation.context
+    return sum(
+        not parameter.initial for effect in hypothesis.effects for parameter in effect.parameters(context)
+    )
 
 
 def describe_terms(
