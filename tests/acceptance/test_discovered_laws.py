@@ -5,9 +5,9 @@ laws, and measures how often each is found.
 """
 
 import pytest
+from missing_terms import LAWS, MAX_ERROR, run_trial
 
 from islands.discrepancy.inference.verdict import Verdict
-from missing_terms import LAWS, MAX_ERROR, run_trial
 
 #: First seed; no seed from here on was used for tuning.
 SEED = 910_000
