@@ -3,7 +3,7 @@
 An interpreted instruction waits for the result of the one before in memory. Machine code needs a quarter of
 the time, but some milliseconds of compilation, so that only programs that run often are compiled. It executes
 the same operations in the same order without contraction, so that every bit is that of the interpreter.
-Programs that call functions of the C library or force laws remain interpreted.
+Programs that call force laws, or functions of the C library other than the exponential, remain interpreted.
 """
 
 import ctypes
@@ -115,9 +115,10 @@ def find_native_code(
 
 
 def _is_supported(instructions: Instructions) -> bool:
-    """Return whether a program is short, and calls no function of the C library and no force laws."""
+    """Return whether a program is short, and calls no force laws and only functions that machine code can."""
     operations = instructions.code[:, 0]
-    return operations.size <= MAX_INSTRUCTIONS and not (operations >= ode_kernel.POWER).any()
+    calls = operations[operations >= ode_kernel.POWER]
+    return operations.size <= MAX_INSTRUCTIONS and bool((calls == ode_kernel.EXPONENTIAL).all())
 
 
 @lru_cache(maxsize=_KEPT)

@@ -14,6 +14,9 @@ _ROW = ir.VectorType(_DOUBLE, LANES)
 _UNDEFINED = ir.Constant(_ROW, ir.Undefined)
 _PLACE = ir.IntType(32)
 
+#: Name under which Numba gives the exponential of the C library to its kernels, such as the interpreter.
+EXPONENTIAL = "numba_exp"
+
 
 class RowOperations:
     """Operations on rows at the position of a builder; the instructions are those of `ode_kernel`.
@@ -91,6 +94,8 @@ class RowOperations:
         if operation in (ode_kernel.LESS, ode_kernel.LESS_EQUAL):
             comparison = "<" if operation == ode_kernel.LESS else "<="
             return self._select(comparison, a, b, self.constant(1.0), self.constant(0.0))
+        if operation == ode_kernel.EXPONENTIAL:
+            return self._call_lanes(EXPONENTIAL, a)
         assert operation == ode_kernel.SELECT
         return self._select(">", a, self.constant(0.0), b, c)
 
@@ -104,3 +109,16 @@ class RowOperations:
         if function is None:
             function = ir.Function(module, ir.FunctionType(_ROW, [_ROW]), full)
         return self._build.call(function, [row])
+
+    def _call_lanes(self, name: str, row: Any) -> Any:
+        """Call a function of the C library for each lane."""
+        build, module, result = self._build, self._build.module, _UNDEFINED
+        function = module.globals.get(name)
+        if function is None:
+            function = ir.Function(module, ir.FunctionType(_DOUBLE, [_DOUBLE]), name)
+            for attribute in ("nounwind", "readnone"):
+                function.attributes.add(attribute)
+        for lane in range(LANES):
+            value = build.call(function, [build.extract_element(row, _PLACE(lane))])
+            result = build.insert_element(result, value, _PLACE(lane))
+        return result

@@ -30,7 +30,7 @@ ARITHMETIC = {
         dx/dt = v
         dv/dt = F - c*v - k*x - b*x**3 + 0.1*abs(v)*x - rate(T)*0.01 + sign(v)*0.2 - t/50
         dy/dt = -y + min(x, T) - max(v, -y)/(2 + x**2) + sqrt(abs(x)) + where(x - v, y, 0.3)
-        dp/dt = -p**5 + (x < v)*a + (y <= 0)*b - tanh(v/0.1)
+        dp/dt = -p**5 + (x < v)*a + (y <= 0)*b - tanh(v/0.1) + sign(v)*exp(-abs(v/c))
     """,
     "output": "x + 0.1*y + p*F",
     "parameters": {"a": 0.4, "b": 2.0, "c": 1.2, "k": 80.0},
