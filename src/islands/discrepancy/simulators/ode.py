@@ -21,7 +21,7 @@ from islands.discrepancy.simulators.ode_effects import (
     list_values,
     number_symbols,
 )
-from islands.discrepancy.simulators.record_channels import sample_channels
+from islands.discrepancy.simulators.record_channels import refine_input, sample_channels
 from islands.discrepancy.simulators.shooting import Shots
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.lane_simulation import (
@@ -253,7 +253,7 @@ class OdeSimulator:
             signals = dict(common)
             if isinstance(gain, float) or self.system.gain:
                 if id(run.x) not in made:
-                    made[id(run.x)] = SampledSignal(run.x, *self._get_between(run, context)).refine(steps)
+                    made[id(run.x)] = refine_input(run.x, self._get_between(run, context), steps)
                 signals[self.system.input] = made[id(run.x)]
                 if not isinstance(gain, float):
                     signals[_GAIN] = interpolate_linearly(gain).refine(steps)

@@ -1,12 +1,13 @@
-"""Columns of a record that a simulator reads in addition to its input."""
+"""Columns of a record that a simulator reads: its input with smaller steps, and channels."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.context import SimulationContext
+from islands.discrepancy.interfaces.context import Signal, SimulationContext
 from islands.errors import RecordError
 from islands.systems.ode.lane_simulation import SampledSignal, interpolate_linearly
 
@@ -53,6 +54,25 @@ def sample_channels(
         values = np.interp(steps, np.arange(signal.size), signal)
         found[name] = SampledSignal(values, values, values) if is_held else interpolate_linearly(values)
     return found
+
+
+def refine_input(x: Signal, between: Signal, parts: int) -> SampledSignal:
+    """Return an input with each step divided; successive simulations have it in common.
+
+    Parameters
+    ----------
+    x : ndarray, shape (samples,)
+        Input at the start of each step.
+    between : ndarray, shape (2, samples)
+        Input in the middle and at the end of each step.
+    parts : int
+    """
+    return _refine_bytes(x.tobytes(), between.tobytes(), parts)
+
+
+@lru_cache(maxsize=4)
+def _refine_bytes(x: bytes, between: bytes, parts: int) -> SampledSignal:
+    return SampledSignal(np.frombuffer(x), *np.frombuffer(between).reshape(2, -1)).refine(parts)
 
 
 def make_nominal_context(record: Dataset) -> SimulationContext:

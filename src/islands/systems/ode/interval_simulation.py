@@ -5,6 +5,7 @@ side.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from islands.systems.ode.kernel_arguments import LANES, LaneRestarts, LaneSignals
 from islands.systems.ode.lane_simulation import (
     LaneInput,
+    SampledSignal,
     Signal,
     integrate_group,
     list_signals,
@@ -54,8 +56,7 @@ class IntervalSimulation:
         samples = len(next(iter(lanes[0].signals.values())).start)
         self._count = -(-samples // interval)
         found, self._indices = list_signals(program.signals, dt, lanes)
-        self._signals = np.zeros((self._count * interval, 3, len(found)))
-        self._signals[:samples] = stack_signals(found, samples)
+        self._signals = _stack(tuple(found), samples, self._count * interval)
 
     def simulate(
         self, lanes: NDArray[np.int64], states: Signal, is_asked: NDArray[np.bool_]
@@ -138,3 +139,11 @@ class IntervalSimulation:
             parts.append(np.append(places, places[-1:].repeat(lacking)).reshape(-1, best))
         runs = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
         return runs, np.concatenate(parts)
+
+
+@lru_cache(maxsize=4)
+def _stack(signals: tuple[SampledSignal, ...], samples: int, size: int) -> Signal:
+    """Return signals that calls have in common as one array, shape (size, 3, signals), zero after the end."""
+    stacked = np.zeros((size, 3, len(signals)))
+    stacked[:samples] = stack_signals(signals, samples)
+    return stacked
