@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.systems.ode.kernel_arguments import LANES, LaneRestarts, LaneSignals
+from islands.systems.ode.kernel_arguments import LANES, MANY_LANES, LaneRestarts, LaneSignals
 from islands.systems.ode.lane_simulation import (
     LaneInput,
     SampledSignal,
@@ -21,8 +21,11 @@ from islands.systems.ode.lane_simulation import (
 )
 from islands.systems.ode.ode_program import OdeProgram
 
-#: Time of a call of the kernel, in intervals.
+#: Time of a call of the kernel, in intervals of `LANES` lanes.
 _CALL_TIME = 1.0
+
+#: Time of an interval by number of lanes.
+_TIMES = {LANES: 1.0, MANY_LANES: 1.3}
 
 
 class IntervalSimulation:
@@ -79,7 +82,7 @@ class IntervalSimulation:
         """
         outputs = self._program.instructions.outputs.size
         found = np.full((len(lanes), outputs, self._count, self._interval // self._every), np.nan)
-        runs, intervals = self._plan_columns(is_asked)
+        runs, intervals, width = self._plan_columns(is_asked)
         if not runs.size:
             return found
         rows = intervals.shape[1]
@@ -87,11 +90,11 @@ class IntervalSimulation:
         restarts = np.arange(0, size, self._interval)
         shared = np.empty((size, 3, 0))
         order = np.arange(len(self._program.signals))
-        out = np.empty((size // self._every, outputs, LANES))
-        for first in range(0, len(runs), LANES):
-            run, places = runs[first : first + LANES], intervals[first : first + LANES]
-            full = np.pad(run, (0, LANES - len(run)), "edge")
-            begins = np.pad(places, ((0, LANES - len(run)), (0, 0)), "edge")
+        out = np.empty((size // self._every, outputs, width))
+        for first in range(0, len(runs), width):
+            run, places = runs[first : first + width], intervals[first : first + width]
+            full = np.pad(run, (0, width - len(run)), "edge")
+            begins = np.pad(places, ((0, width - len(run)), (0, 0)), "edge")
             given = states[full[:, None], begins].transpose(1, 2, 0)
             offsets = begins * (self._interval * 3 * self._signals.shape[2])
             signals = LaneSignals(
@@ -114,7 +117,7 @@ class IntervalSimulation:
             found[run[:, None], :, places] = parts.transpose(3, 0, 2, 1)
         return found
 
-    def _plan_columns(self, is_asked: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _plan_columns(self, is_asked: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
         """Return the run of each lane of the kernel, and the intervals that it simulates one after another.
 
         Returns
@@ -122,23 +125,27 @@ class IntervalSimulation:
         ndarray of int64, shape (columns,)
         ndarray of int64, shape (columns, rows)
             The last interval is repeated where fewer are asked for.
+        int
+            Number of lanes of the kernel.
         """
         if not self.is_independent:
             runs = np.flatnonzero(is_asked.any(axis=1))
-            return runs, np.tile(np.arange(self._count), (runs.size, 1))
+            return runs, np.tile(np.arange(self._count), (runs.size, 1)), LANES
         counts = np.count_nonzero(is_asked, axis=1)
         if not counts.any():
-            return np.empty(0, dtype=np.int64), np.empty((0, 1), dtype=np.int64)
+            return np.empty(0, dtype=np.int64), np.empty((0, 1), dtype=np.int64), LANES
         rows = np.arange(1, counts.max() + 1)
         columns = np.sum(-(-counts // rows[:, None]), axis=1)
-        best = int(rows[np.argmin(-(-columns // LANES) * (rows + _CALL_TIME))])
+        times = {lanes: -(-columns // lanes) * (rows * time + _CALL_TIME) for lanes, time in _TIMES.items()}
+        width = min(times, key=lambda lanes: times[lanes].min())
+        best = int(rows[np.argmin(times[width])])
         parts = []
         for asked in is_asked:
             places = np.flatnonzero(asked)
             lacking = -places.size % best
             parts.append(np.append(places, places[-1:].repeat(lacking)).reshape(-1, best))
         runs = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-        return runs, np.concatenate(parts)
+        return runs, np.concatenate(parts), width
 
 
 @lru_cache(maxsize=4)

@@ -14,6 +14,9 @@ VECTORS = 2
 #: Lanes: sets of parameters and initial states that are simulated at once.
 LANES = VECTORS * VECTOR
 
+#: Lanes of machine code if there are many: four vectors in registers take little more time than two.
+MANY_LANES = 2 * LANES
+
 
 class Instructions(NamedTuple):
     """Instructions over rows of one arena.
@@ -55,7 +58,7 @@ class LaneSignals(NamedTuple):
         Signals that are equal in all lanes.
     own : ndarray, shape (samples, 3, different)
         Signals of single lanes.
-    places : ndarray of int64, shape (restarts or 1, signals, 16)
+    places : ndarray of int64, shape (restarts or 1, signals, lanes)
         Index in ``own``, as one row, of the first value of each further signal in each lane. If there are
         several, each restart has its own.
     """

@@ -147,12 +147,12 @@ def integrate_group(
     every: int,
     out: NDArray[np.float64],
 ) -> None:
-    """Simulate up to `LANES` lanes, as machine code if the program runs often.
+    """Simulate up to `LANES` or `MANY_LANES` lanes, as machine code if the program runs often.
 
     Parameters
     ----------
     signals, order
-        As of `pack_signals`.
+        As of `pack_signals`; the number of lanes is that of the places.
     restarts : LaneRestarts
     first : int
         Place of the first lane in ``out``.
@@ -160,19 +160,31 @@ def integrate_group(
         Receives the outputs.
     """
     instructions = program.instructions._replace(signals=program.instructions.signals[order])
-    full = [*group, *[group[0]] * (LANES - len(group))]
-    arena, limits = pack_arena(program, full), pack_limits(program.states, full)
+    full = [*group, *[group[0]] * (signals.places.shape[2] - len(group))]
+    limits = pack_limits(program.states, full)
     if native := find_native_code(instructions, signals, limits, restarts):
+        arena = pack_arena(program, full)
         native.integrate(arena, signals, dt, limits, restarts, len(group), first, every, out)
         return
-    laws = pack_elements(full)
-    integrate(instructions, arena, signals, dt, limits, restarts, laws, len(group), first, every, out)
+    count = restarts.states.shape[1] // len(full)
+    for begin in range(0, len(group), LANES):  # the lanes of the interpreter
+        part, lanes = slice(begin, begin + LANES), full[begin : begin + LANES]
+        places = np.ascontiguousarray(signals.places[:, :, part])
+        given = restarts.states.reshape(len(restarts.states), count, len(full))[..., part]
+        integrate(
+            *(instructions, pack_arena(program, lanes), signals._replace(places=places), dt),
+            *(
+                pack_limits(program.states, lanes),
+                restarts._replace(states=given.reshape(len(given), count * LANES)),
+            ),
+            *(pack_elements(lanes), len(group[part]), first + begin, every, out),
+        )
 
 
 def pack_arena(program: OdeProgram, lanes: Sequence[LaneInput]) -> NDArray[np.float64]:
     """Return the rows of a program with its constants, and the parameters and states of all lanes."""
-    arena: NDArray[np.float64] = padded_size(LANES * program.instructions.rows)
-    rows = arena.reshape(-1, LANES)
+    arena: NDArray[np.float64] = padded_size(len(lanes) * program.instructions.rows)
+    rows = arena.reshape(-1, len(lanes))
     count, states = len(program.constants), program.instructions.states
     rows[:count] = program.constants[:, None]
     for lane, each in enumerate(lanes):

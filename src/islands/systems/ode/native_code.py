@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from islands.systems.ode import ode_kernel
 from islands.systems.ode.kernel_arguments import (
-    LANES,
     Instructions,
     LaneLimits,
     LaneRestarts,
@@ -49,6 +48,7 @@ class NativeCode:
     """
 
     def __init__(self, program: ProgramCode) -> None:
+        self._lanes = program.lanes
         self._states = slice(program.states, program.states + len(program.slopes))
         machine = _make_machine()
         module = binding.parse_assembly(str(NativeGenerator(program).generate()))
@@ -83,7 +83,7 @@ class NativeCode:
         sizes = samples, every, interval, signals.own.shape[2], out.shape[2]
         self._function(*sizes, dt, *(each.ctypes.data for each in arrays))
         if not restarts.samples.size:
-            is_finite = np.isfinite(arena.reshape(-1, LANES)[self._states, :lanes]).all(axis=0)
+            is_finite = np.isfinite(arena.reshape(-1, self._lanes)[self._states, :lanes]).all(axis=0)
             out[:, :, first : first + lanes][:, :, ~is_finite] = np.nan
 
 
@@ -103,8 +103,9 @@ def find_native_code(
         shared=signals.shared.shape[2],
         receivers=tuple(limits.receivers.tolist()) if limits.lower.size else None,
         is_spilling=limits.caught.size > 0,
-        restarted=restarts.states.shape[1] // LANES,
+        restarted=restarts.states.shape[1] // signals.places.shape[2],
         is_moving=signals.places.shape[0] > 1,
+        lanes=signals.places.shape[2],
     )
     with _lock:
         executed = _counts.pop(program, 0)

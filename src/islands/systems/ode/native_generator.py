@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from llvmlite import binding, ir
 
-from islands.systems.ode.kernel_arguments import LANES
 from islands.systems.ode.row_operations import RowOperations
 
 #: Name of the function.
@@ -36,6 +35,8 @@ class ProgramCode(NamedTuple):
         Number of states that are set to given values at regular intervals.
     is_moving : bool
         Whether each restart has its own places of signals.
+    lanes : int
+        Number of lanes.
     """
 
     code: bytes
@@ -49,6 +50,7 @@ class ProgramCode(NamedTuple):
     is_spilling: bool
     restarted: int
     is_moving: bool
+    lanes: int
 
 
 class NativeGenerator:
@@ -74,7 +76,7 @@ class NativeGenerator:
         self._lower, self._upper, self._caught = limits
         self._blocks = [function.append_basic_block(name) for name in ("entry", "loop", "advance", "end")]
         self._build = ir.IRBuilder(self._blocks[0])
-        self._row = RowOperations(self._build)
+        self._lanes, self._row = program.lanes, RowOperations(self._build, program.lanes)
         self._rows: dict[int, Any] = {}
 
     def generate(self) -> ir.Module:
@@ -82,12 +84,12 @@ class NativeGenerator:
         program, build = self._program, self._build
         entry, loop, advance, end = self._blocks
         for row in set(range(program.states)) - set(program.signals):
-            self._rows[row] = self._row.load(self._arena, LANES * row)
+            self._rows[row] = self._row.load(self._arena, self._lanes * row)
         self._execute(0, program.ends[0])
         count = len(program.slopes)
-        starts = [self._row.load(self._arena, LANES * (program.states + i)) for i in range(count)]
+        starts = [self._row.load(self._arena, self._lanes * (program.states + i)) for i in range(count)]
         limits = [
-            [self._row.load(each, LANES * i) for i in range(count)] if used else []
+            [self._row.load(each, self._lanes * i) for i in range(count)] if used else []
             for each, used in (
                 (self._lower, program.receivers is not None),
                 (self._upper, program.receivers is not None),
@@ -138,17 +140,18 @@ class NativeGenerator:
 
         build.position_at_end(end)
         for index, value in enumerate(before):
-            self._row.store(value, self._arena, LANES * (program.states + index))
+            self._row.store(value, self._arena, self._lanes * (program.states + index))
         build.ret_void()
         return self._module
 
     def _restart(self, states: list[Any], sample: Any) -> list[Any]:
         """Return the states of a sample; the first one of an interval has given states."""
-        build, size = self._build, _INTEGER(LANES * len(states))
+        build, size = self._build, _INTEGER(self._lanes * len(states))
         is_first = build.icmp_unsigned("==", build.urem(sample, self._interval), _INTEGER(0))
         place = build.mul(build.udiv(sample, self._interval), size)
         given = [
-            self._row.load(self._restarts, build.add(place, _INTEGER(LANES * i))) for i in range(len(states))
+            self._row.load(self._restarts, build.add(place, _INTEGER(self._lanes * i)))
+            for i in range(len(states))
         ]
         return [build.select(is_first, *pair) for pair in zip(given, states, strict=True)]
 
@@ -171,11 +174,11 @@ class NativeGenerator:
         """Return the place of each own signal in each lane."""
         build, own = self._build, len(self._program.signals) - self._program.shared
         integers = build.bitcast(self._places, _INTEGER.as_pointer())
-        first = build.mul(restart, _INTEGER(LANES * own))
+        first = build.mul(restart, _INTEGER(self._lanes * own))
         return [
             [
-                build.load(build.gep(integers, [build.add(first, _INTEGER(LANES * index + lane))]))
-                for lane in range(LANES)
+                build.load(build.gep(integers, [build.add(first, _INTEGER(self._lanes * index + lane))]))
+                for lane in range(self._lanes)
             ]
             for index in range(own)
         ]

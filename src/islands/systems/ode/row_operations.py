@@ -7,11 +7,8 @@ from llvmlite import ir
 
 from islands.kernels.interpreter import ADD, MULTIPLY, SIGN, SUBTRACT
 from islands.systems.ode import ode_kernel
-from islands.systems.ode.kernel_arguments import LANES
 
 _DOUBLE = ir.DoubleType()
-_ROW = ir.VectorType(_DOUBLE, LANES)
-_UNDEFINED = ir.Constant(_ROW, ir.Undefined)
 _PLACE = ir.IntType(32)
 
 #: Name under which Numba gives the exponential of the C library to its kernels, such as the interpreter.
@@ -24,20 +21,24 @@ class RowOperations:
     Parameters
     ----------
     build : IRBuilder
+    lanes : int
+        Number of lanes.
     """
 
-    def __init__(self, build: ir.IRBuilder) -> None:
-        self._build = build
+    def __init__(self, build: ir.IRBuilder, lanes: int) -> None:
+        self._build, self._lanes = build, lanes
+        self._type = ir.VectorType(_DOUBLE, lanes)
+        self._undefined = ir.Constant(self._type, ir.Undefined)
 
     def constant(self, number: float) -> ir.Constant:
         """Return a row with a number in all lanes."""
-        return ir.Constant(_ROW, [number] * LANES)
+        return ir.Constant(self._type, [number] * self._lanes)
 
     def fill(self, number: Any) -> Any:
         """Return a row with a computed number in all lanes."""
-        first = self._build.insert_element(_UNDEFINED, number, _PLACE(0))
-        same = ir.Constant(ir.VectorType(_PLACE, LANES), [0] * LANES)
-        return self._build.shuffle_vector(first, _UNDEFINED, same)
+        first = self._build.insert_element(self._undefined, number, _PLACE(0))
+        same = ir.Constant(ir.VectorType(_PLACE, self._lanes), [0] * self._lanes)
+        return self._build.shuffle_vector(first, self._undefined, same)
 
     def load(self, array: Any, place: Any) -> Any:
         """Read a row from a place of an array."""
@@ -51,11 +52,11 @@ class RowOperations:
 
     def _point(self, array: Any, place: Any) -> Any:
         place = ir.IntType(64)(place) if isinstance(place, int) else place
-        return self._build.bitcast(self._build.gep(array, [place]), _ROW.as_pointer())
+        return self._build.bitcast(self._build.gep(array, [place]), self._type.as_pointer())
 
     def gather(self, array: Any, places: Sequence[Any]) -> Any:
         """Read the value of each lane from its own place."""
-        row = _UNDEFINED
+        row = self._undefined
         for lane, place in enumerate(places):
             value = self._build.load(self._build.gep(array, [place]))
             row = self._build.insert_element(row, value, _PLACE(lane))
@@ -104,21 +105,21 @@ class RowOperations:
 
     def _call(self, name: str, row: Any) -> Any:
         """Call LLVM's function of this name for all lanes."""
-        full, module = f"llvm.{name}.v{LANES}f64", self._build.module
+        full, module = f"llvm.{name}.v{self._lanes}f64", self._build.module
         function = module.globals.get(full)
         if function is None:
-            function = ir.Function(module, ir.FunctionType(_ROW, [_ROW]), full)
+            function = ir.Function(module, ir.FunctionType(self._type, [self._type]), full)
         return self._build.call(function, [row])
 
     def _call_lanes(self, name: str, row: Any) -> Any:
         """Call a function of the C library for each lane."""
-        build, module, result = self._build, self._build.module, _UNDEFINED
+        build, module, result = self._build, self._build.module, self._undefined
         function = module.globals.get(name)
         if function is None:
             function = ir.Function(module, ir.FunctionType(_DOUBLE, [_DOUBLE]), name)
             for attribute in ("nounwind", "readnone"):
                 function.attributes.add(attribute)
-        for lane in range(LANES):
+        for lane in range(self._lanes):
             value = build.call(function, [build.extract_element(row, _PLACE(lane))])
             result = build.insert_element(result, value, _PLACE(lane))
         return result

@@ -103,7 +103,9 @@ def test_restarted_runs_have_the_bits_of_the_interpreter(
 
     program = generate_program(make_system(ARITHMETIC), (Symbol("x"),))
     interpreted, native = simulate_natively(program, make_lanes(), monkeypatch, simulate)
-    assert native.tobytes() == interpreted.tobytes()
+    # The sign of a NaN depends on the order of the operands of a sum, which a compiler may exchange.
+    assert np.nan_to_num(native, nan=7.0).tobytes() == np.nan_to_num(interpreted, nan=7.0).tobytes()
+    assert np.array_equal(np.isnan(native), np.isnan(interpreted))
     assert np.array_equal(native[4, :, 0], starts[4, :, 0])
     assert not np.isfinite(native[2, -1]).all()
 
