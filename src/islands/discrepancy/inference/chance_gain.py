@@ -16,9 +16,9 @@ from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.noise_surrogates import (
-    LOSS_OF_RANDOM_WALKS,
     Randomisation,
     draw_surrogates,
+    list_noise_models,
 )
 from islands.discrepancy.inference.screening import DEPENDENCE, simulate_starting_points
 from islands.discrepancy.interfaces.effect import Effect, Signal
@@ -131,14 +131,19 @@ class ForwardSelection:
 
 
 def draw_noise(fit: CalibrationResult, target: Target) -> list[Signal]:
-    """Draw surrogates of the residual of a fit, whitened: arrays of shape (surrogates, selected samples)."""
+    """Draw surrogates of the residual of a fit, whitened: arrays of shape (surrogates, selected samples).
+
+    They are of every noise model that the residual does not exclude. Without a noise model they are of the
+    most likely one: thresholds of random walks would hide all causes of a slow model error.
+    """
     part, rng = target.estimation_part, np.random.default_rng(SEED)
-    min_loss = LOSS_OF_RANDOM_WALKS if target.effective_samples is None else 0.0
-    residual = (target.y - fit.output)[part]
+    residual, segments = (target.y - fit.output)[part], target.fitted_segments
+    models = list_noise_models(residual, segments)
     kinds = []
-    for randomisation in Randomisation:
-        drawn = draw_surrogates(residual, target.fitted_segments, randomisation, SURROGATES, rng, min_loss)
-        kinds.append(np.stack([target.select(_insert(each, part)) for each in drawn]))
+    for model in models if target.effective_samples is None else models[:1]:
+        for randomisation in Randomisation:
+            drawn = draw_surrogates(residual, model, segments, randomisation, SURROGATES, rng)
+            kinds.append(np.stack([target.select(_insert(each, part)) for each in drawn]))
     return kinds
 
 

@@ -5,7 +5,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import scipy
 
-from islands.discrepancy.inference.noise_surrogates import Randomisation, draw_surrogates
+from islands.discrepancy.inference.noise_surrogates import (
+    Randomisation,
+    draw_surrogates,
+    list_noise_models,
+)
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.segments import count_runs, find_bounds, take_backward_differences
 from islands.systems.hysteresis_operators import play_from
@@ -104,7 +108,8 @@ def explain_residual(
     if explained <= MIN_FRACTION * float(np.mean(residual**2)):
         return explained, left
     runs = count_runs(is_known, segments)
-    drawn = draw_surrogates(residual, runs, Randomisation.PHASES, SURROGATES, rng.spawn(1)[0])
+    noise = list_noise_models(residual, runs)[0]
+    drawn = draw_surrogates(residual, noise, runs, Randomisation.PHASES, SURROGATES, rng.spawn(1)[0])
     surrogates = np.column_stack(list(drawn))
     by_chance = _predict_mean_square(designs, surrogates) / np.mean(surrogates**2, axis=0)
     is_by_chance = explained <= float(np.max(by_chance)) * float(np.mean(residual**2))

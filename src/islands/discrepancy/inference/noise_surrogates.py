@@ -5,7 +5,7 @@ from enum import Enum, auto
 
 import numpy as np
 
-from islands.discrepancy.calibration.noise_model import fit_integrated_noise, fit_noise
+from islands.discrepancy.calibration.noise_model import NoiseModel, fit_integrated_noise, fit_noise
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.segments import find_bounds
 
@@ -15,8 +15,7 @@ from islands.discrepancy.interfaces.segments import find_bounds
 MAX_UNIT_ROOT_LOSS = 1.0 / 150.0
 
 #: Loss that the residual of a random walk reaches, in a record of any length: 4 to 28. A short record cannot
-#: exclude a random walk. This is for residuals that are noise: thresholds of random walks would hide all
-#: causes of a slow model error.
+#: exclude a random walk.
 LOSS_OF_RANDOM_WALKS = 30.0
 
 
@@ -32,13 +31,31 @@ class Randomisation(Enum):
     PHASES = auto()
 
 
+def list_noise_models(residual: Signal, segments: Sequence[int]) -> list[NoiseModel]:
+    """Return the noise models that a residual does not exclude, the most likely one first.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (samples,)
+        Residual without gaps.
+    segments : sequence of int
+        Lengths of the recordings in samples.
+    """
+    noise = fit_noise(residual, segments=segments)
+    integrated = fit_integrated_noise(residual, segments)
+    loss = integrated.minus_twice_log_likelihood - noise.minus_twice_log_likelihood
+    if loss < MAX_UNIT_ROOT_LOSS * residual.size:
+        return [integrated]
+    return [noise, integrated] if loss < LOSS_OF_RANDOM_WALKS else [noise]
+
+
 def draw_surrogates(
     residual: Signal,
+    noise: NoiseModel,
     segments: Sequence[int],
     randomisation: Randomisation,
     count: int,
     rng: np.random.Generator,
-    min_loss: float = 0.0,
 ) -> Iterator[Signal]:
     """Draw surrogates of a residual.
 
@@ -50,20 +67,15 @@ def draw_surrogates(
     ----------
     residual : ndarray, shape (samples,)
         Residual without gaps.
+    noise : NoiseModel
+        One of `list_noise_models`.
     segments : sequence of int
         Lengths of the recordings in samples.
-    min_loss : float
-        Least value of the loss up to which the residual is taken for a random walk.
 
     Yields
     ------
     ndarray, shape (samples,)
     """
-    noise = fit_noise(residual, segments=segments)
-    integrated = fit_integrated_noise(residual, segments)
-    loss = integrated.minus_twice_log_likelihood - noise.minus_twice_log_likelihood
-    if loss < max(MAX_UNIT_ROOT_LOSS * residual.size, min_loss):
-        noise = integrated
     innovations = noise.whiten(residual, segments)
     stable = noise.limit_poles(residual.size)
     bounds = find_bounds(segments, residual.size)

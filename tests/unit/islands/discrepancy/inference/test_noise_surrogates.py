@@ -3,14 +3,19 @@
 import numpy as np
 import pytest
 
-from islands.discrepancy.inference.noise_surrogates import Randomisation, draw_surrogates
+from islands.discrepancy.inference.noise_surrogates import (
+    Randomisation,
+    draw_surrogates,
+    list_noise_models,
+)
 
 COUNT = 40
 
 
 def draw(residual: np.ndarray, randomisation: Randomisation, segments: tuple[int, ...] = ()) -> np.ndarray:
     rng = np.random.default_rng(0)
-    return np.array(list(draw_surrogates(residual, segments, randomisation, COUNT, rng)))
+    noise = list_noise_models(residual, segments)[0]
+    return np.array(list(draw_surrogates(residual, noise, segments, randomisation, COUNT, rng)))
 
 
 def test_random_signs_keep_the_size_of_every_sample_of_white_noise() -> None:
@@ -63,3 +68,12 @@ def test_thresholds_hold_for_a_random_walk_whose_slow_part_is_absorbed(randomisa
 
 def remove(absorbed: np.ndarray, signals: np.ndarray) -> np.ndarray:
     return signals - absorbed @ (absorbed.T @ signals)
+
+
+def test_only_long_records_exclude_a_random_walk() -> None:
+    """Calibration absorbs slow functions, and an autoregression fits what they leave of a random walk."""
+    walk = np.cumsum(np.random.default_rng(1).standard_normal(500))
+    left = walk - np.polynomial.Polynomial.fit(np.arange(500), walk, 4)(np.arange(500))
+    assert 1.0 in [model.difference_order for model in list_noise_models(left, ())]
+    white = np.random.default_rng(1).standard_normal(500)
+    assert [model.order for model in list_noise_models(white, ())] == [0]
