@@ -71,7 +71,7 @@ def remove(absorbed: np.ndarray, signals: np.ndarray) -> np.ndarray:
 
 
 def test_only_long_records_exclude_a_random_walk() -> None:
-    """Calibration absorbs slow functions, and an autoregression fits what they leave of a random walk."""
+    """Calibration absorbs slow functions, and an autoregression fits the rest of a random walk better."""
     walk = np.cumsum(np.random.default_rng(1).standard_normal(500))
     left = walk - np.polynomial.Polynomial.fit(np.arange(500), walk, 4)(np.arange(500))
     assert 1.0 in [model.difference_order for model in list_noise_models(left, ())]
