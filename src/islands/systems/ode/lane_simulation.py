@@ -160,25 +160,22 @@ def integrate_group(
         Receives the outputs.
     """
     instructions = program.instructions._replace(signals=program.instructions.signals[order])
-    full = [*group, *[group[0]] * (signals.places.shape[2] - len(group))]
+    width = signals.places.shape[2]
+    full = [*group, *[group[0]] * (width - len(group))]
     limits = pack_limits(program.states, full)
     if native := find_native_code(instructions, signals, limits, restarts):
         arena = pack_arena(program, full)
         native.integrate(arena, signals, dt, limits, restarts, len(group), first, every, out)
-        return
-    count = restarts.states.shape[1] // len(full)
-    for begin in range(0, len(group), LANES):  # the lanes of the interpreter
-        part, lanes = slice(begin, begin + LANES), full[begin : begin + LANES]
-        places = np.ascontiguousarray(signals.places[:, :, part])
-        given = restarts.states.reshape(len(restarts.states), count, len(full))[..., part]
-        integrate(
-            *(instructions, pack_arena(program, lanes), signals._replace(places=places), dt),
-            *(
-                pack_limits(program.states, lanes),
-                restarts._replace(states=given.reshape(len(given), count * LANES)),
-            ),
-            *(pack_elements(lanes), len(group[part]), first + begin, every, out),
-        )
+    elif width == LANES:
+        arena, laws = pack_arena(program, full), pack_elements(full)
+        integrate(instructions, arena, signals, dt, limits, restarts, laws, len(group), first, every, out)
+    else:
+        for begin in range(0, len(group), LANES):
+            part = slice(begin, begin + LANES)
+            own = signals._replace(places=np.ascontiguousarray(signals.places[:, :, part]))
+            states = restarts.states.reshape(len(restarts.states), -1, width)[..., part]
+            given = restarts._replace(states=states.reshape(len(states), -1))
+            integrate_group(program, group[part], own, order, given, dt, first + begin, every, out)
 
 
 def pack_arena(program: OdeProgram, lanes: Sequence[LaneInput]) -> NDArray[np.float64]:

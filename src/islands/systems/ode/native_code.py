@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from islands.systems.ode import ode_kernel
 from islands.systems.ode.kernel_arguments import (
+    LANES,
     Instructions,
     LaneLimits,
     LaneRestarts,
@@ -28,6 +29,9 @@ from islands.systems.ode.native_generator import FUNCTION, NativeGenerator, Prog
 #: Interpreted instructions, once per step, after which a program is compiled: they take as long as the
 #: compilation.
 COMPILED_FROM = 1_500_000
+
+#: Factor of this number for code of `MANY_LANES`, which replaces machine code and saves less.
+MANY_LANES_FACTOR = 20
 
 #: Largest number of instructions of a compiled program; the time of a compilation grows with it.
 MAX_INSTRUCTIONS = 300
@@ -112,7 +116,8 @@ def find_native_code(
         _counts[program] = executed + signals.shared.shape[0] * len(instructions.code)
         while len(_counts) > _COUNTED:
             _counts.popitem(last=False)
-        return _compile(program) if executed >= COMPILED_FROM else None
+        least = COMPILED_FROM * (1 if program.lanes == LANES else MANY_LANES_FACTOR)
+        return _compile(program) if executed >= least else None
 
 
 def _is_supported(instructions: Instructions) -> bool:
