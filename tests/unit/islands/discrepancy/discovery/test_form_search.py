@@ -87,7 +87,7 @@ def test_equation_replaces_two_names_that_fit_worse() -> None:
 
 
 @pytest.mark.ci
-def test_name_is_not_claimed_if_a_curve_of_another_kind_fits_better() -> None:
-    """The best name is `second-hysteresis`; a stiffness curve fits better and leaves it no confidence."""
+def test_an_equation_with_fewer_values_replaces_a_name_that_fits_worse() -> None:
+    """The best name is `second-hysteresis`, with four values; the equation has two and the better score."""
     found = run_trial(Trial(("tanh-spring",), 7_715_008, "white", (1.0, 4.0), core="second-order"))
-    assert (found.verdict, found.named) == ("unknown", ())
+    assert (found.verdict, found.named) == ("discovered", ("missing-term",))
