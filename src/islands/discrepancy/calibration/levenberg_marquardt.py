@@ -114,17 +114,12 @@ def minimise(
     """
     problem = _make_problem(simulation, target, is_fixed)
     is_batch = simulation.is_batch and target.y.size >= MIN_BATCHED_SAMPLES
-    # The shooting intervals of one simulation fill the lanes of the kernel: others are not free.
-    is_speculative = is_batch and not simulation.fits_states
     # Residuals at the level of rounding cannot be fitted: the record may be an output of the simulation.
     error = np.finfo(float).eps * float(np.nanmax(np.abs(target.y)))
     rounding = np.count_nonzero(target.estimation_part) * error**2
     return simulate_together(
         simulation,
-        [
-            _minimise(problem, start, max_iterations, min_decrease, rounding, is_batch, is_speculative)
-            for start in starts
-        ],
+        [_minimise(problem, start, max_iterations, min_decrease, rounding, is_batch) for start in starts],
     )
 
 
@@ -135,7 +130,6 @@ def _minimise(
     min_decrease: float,
     min_squares: float,
     is_batch: bool,
-    is_speculative: bool,
 ) -> Simulated[FittedPoint]:
     """Minimise the cost from one start.
 
@@ -144,9 +138,7 @@ def _minimise(
     min_squares : float
         The iteration ends at a smaller sum of squares.
     is_batch : bool
-        Whether to simulate the derivatives in the same call as a point that may not be accepted.
-    is_speculative : bool
-        Whether to simulate all steps in one call after the first one was not accepted.
+        Whether to simulate what may not be needed in the same call as what is.
     """
     point = yield from problem.evaluate(start, with_jacobian=is_batch)
     damping, is_rejected = FIRST_DAMPING, False
@@ -158,14 +150,14 @@ def _minimise(
         steps, predicted = problem.find_steps(point, dampings)
         if predicted.max() < 0.1 * min_decrease:
             break
-        if is_rejected and is_speculative:
+        if is_rejected and is_batch:
             trials = yield from problem.evaluate_all(steps)
         else:
             # The derivatives at the next point are simulated in the same call, unless it is the last one.
             with_jacobian = is_batch and bool(predicted[0] > min_decrease)
             trials = [(yield from problem.evaluate(steps[0], with_jacobian))]
             if not trials[0].cost < point.cost:
-                trials += yield from _try_further(problem, steps[1:], point.cost, is_speculative)
+                trials += yield from _try_further(problem, steps[1:], point.cost, is_batch)
         place = next((index for index, trial in enumerate(trials) if trial.cost < point.cost), None)
         if place is None:
             break
@@ -178,10 +170,10 @@ def _minimise(
 
 
 def _try_further(
-    problem: CalibrationProblem, steps: Signal, cost: float, is_speculative: bool
+    problem: CalibrationProblem, steps: Signal, cost: float, is_batch: bool
 ) -> Simulated[list[FittedPoint]]:
     """Evaluate several steps: all at once, or one by one until one of them decreases the cost."""
-    if is_speculative:
+    if is_batch:
         return (yield from problem.evaluate_all(steps))
     trials: list[FittedPoint] = []
     for values in steps:
