@@ -37,7 +37,7 @@ from islands.discrepancy.effects.nonlinearity import (
 )
 from islands.discrepancy.effects.scale import INPUT_GAIN, SENSOR_GAIN, WRONG_PARAMETER
 from islands.discrepancy.effects.time_variation import AGEING, GAIN_STEP
-from islands.discrepancy.effects.timing import CLOCK_SKEW, DELAY, RESONANCE, SENSOR_LAG
+from islands.discrepancy.effects.timing import CLOCK_SKEW, DELAY, RATE_LIMIT, RESONANCE, SENSOR_LAG
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
 
 #: All effects and free forms, in the order in which maps act on a signal. The order also breaks ties between
@@ -48,6 +48,7 @@ EFFECTS: tuple[Effect, ...] = (
     INPUT_GAIN,
     DEAD_ZONE,
     INPUT_SATURATION,
+    RATE_LIMIT,
     BACKLASH,
     STICTION,
     RELAXATION,

@@ -1,4 +1,4 @@
-"""Effects on time: delay, clock skew, lag and resonance of the sensor."""
+"""Effects on time: delay, clock skew, rate limit, lag and resonance of the sensor."""
 
 import numpy as np
 import scipy
@@ -7,6 +7,7 @@ from islands.discrepancy.effects.filters import interpolate_at, low_pass
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 from islands.discrepancy.interfaces.map_equation import MapEquation
+from islands.systems.rate_limiter import limit_rate
 
 
 def _delay_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
@@ -66,6 +67,60 @@ CLOCK_SKEW = Effect(
     source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
     similar_to="delay",
     distinguished_by="a delay that grows along the record",
+)
+
+
+#: Number of rates that the calibration starts from.
+_STARTING_RATES = 16
+
+#: Nominal value and upper bound of the rate, relative to the peak rate of the input; it is never reached.
+_MAX_RATE = 2.0
+
+
+def _rate_limit_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    limited: Signal = limit_rate(u, values[0] * context.dt)
+    return limited
+
+
+def _get_rate_range(context: SimulationContext) -> tuple[float, float]:
+    """Return the rate that crosses the range of the input once, and the peak rate, per second."""
+    fitted = context.u[: round(context.fit_end_time / context.dt)]
+    return float(np.ptp(fitted)) / context.fit_end_time, float(np.max(np.abs(np.diff(fitted)))) / context.dt
+
+
+def _rate_limit_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    least, peak = _get_rate_range(context)
+    return (
+        Parameter("rate", f"{context.input_unit}/s", _MAX_RATE * peak, 0.01 * peak, least, _MAX_RATE * peak),
+    )
+
+
+def _rate_limit_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    least, peak = _get_rate_range(context)
+    return tuple((float(rate),) for rate in np.geomspace(0.9 * peak, 2.0 * least, _STARTING_RATES))
+
+
+def _exceeds_least_rate(context: SimulationContext) -> bool:
+    least, peak = _get_rate_range(context)
+    return peak > 4.0 * least
+
+
+RATE_LIMIT = Effect(
+    name="rate-limit",
+    summary="Rate limit of the actuator (slew rate): |u'| is at most the rate",
+    family="timing",
+    site=Site.INPUT,
+    parameters=_rate_limit_parameters,
+    starting_points=_rate_limit_starting_points,
+    form=_rate_limit_form,
+    equation=lambda _: MapEquation("z0", (("limit-rate", "n0"),)),
+    is_applicable=_exceeds_least_rate,
+    source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
+    linear_parameters=0,
+    similar_to="sensor-lag, delay, input-saturation",
+    distinguished_by="the lag grows with the amplitude; slow inputs are followed without error",
 )
 
 

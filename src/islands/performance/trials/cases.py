@@ -23,6 +23,7 @@ from islands.performance.trials.injection.rig import Rig
 from islands.performance.trials.injection.tanks import TANKS
 from islands.performance.trials.targets import EXACT, IDENTIFIED, Targets
 from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.predictors import free_run
 
 #: Parameter constraint of the identified actuator: the output stays constant under a constant input.
 _CONSTRAINT = "hysteresis"
@@ -70,7 +71,7 @@ class SimulatedCase:
     system : Rig
         System that the records come from.
     make : callable
-        Makes the simulator that is compared with a record.
+        Makes the simulator that is compared with a record. RecordError if none can be identified on it.
     goals : Targets
     tolerance : mapping
         Tolerances of the simulator's parameters.
@@ -104,9 +105,13 @@ class SimulatedCase:
 
 
 def _make_narx(faulty: FaultyRecord) -> Simulator:
+    """Identify a model on the visible part of a record; raise RecordError if it diverges on the record."""
     record = faulty.record
     single_input = replace(record, u=record.u[:, :1], input_names=record.input_names[:1], input_units=("V",))
     model = identify_actuator(single_input[: int(VISIBLE_FRACTION * record.samples)])
+    outcome = free_run(model, single_input).outcome
+    if not outcome:
+        raise RecordError(f"the free run of the identified model fails: {outcome}")
     return NarxSimulator(model, "narx", record.y[: model.maximum_lag])
 
 
@@ -120,7 +125,16 @@ _EQUATION_FAULTS = frozenset(("relaxation", "rate-dependent-loop", "loop-asymmet
 
 #: Faults at the input, which need a simulator with an input.
 _INPUT_FAULTS = frozenset(
-    ("delay", "clock-skew", "input-gain", "dead-zone", "input-saturation", "backlash", "stiction")
+    (
+        "delay",
+        "clock-skew",
+        "input-gain",
+        "dead-zone",
+        "input-saturation",
+        "rate-limit",
+        "backlash",
+        "stiction",
+    )
 )
 
 #: Cases by name. To add a case, add an entry; to add a system, add a file to `trials.injection`.

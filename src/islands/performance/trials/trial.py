@@ -1,18 +1,24 @@
 """One blind trial: inject faults, diagnose the record, compare the names."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE, model_form
-from islands.performance.trials.cases import CASES
-from islands.performance.trials.injection.measurement import inject
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.errors import RecordError
+from islands.performance.trials.cases import CASES, SimulatedCase
+from islands.performance.trials.injection.measurement import FaultyRecord, inject
 from islands.performance.trials.injection.piezo import PIEZO
 from islands.performance.trials.oracle import compute_gain_share
 
 #: Stated tolerances of the piezo's parameters.
 TOLERANCE = PIEZO.tolerance
+
+#: Number of records that are drawn until a model can be identified on one.
+MAX_DRAWS = 5
 
 #: Families of causes that belong to a simulator and are not in the catalogue.
 _FAMILIES = {
@@ -132,18 +138,8 @@ class TrialOutcome:
 def run_trial(trial: Trial) -> TrialOutcome:
     """Inject faults, diagnose the record and compare the names."""
     simulated = CASES[trial.core]
-    faulty = inject(
-        trial.effects,
-        np.random.default_rng([trial.seed, *map(ord, "".join(trial.effects))]),
-        trial.seconds,
-        trial.noise,
-        trial.band,
-        trial.variant,
-        simulated.system,
-        simulated.perturbed,
-        simulated.free,
-    )
-    found = diagnose(faulty.record, simulated.make(faulty), simulated.tolerance, trial.seed)
+    faulty, simulator = _draw_record(trial, simulated)
+    found = diagnose(faulty.record, simulator, simulated.tolerance, trial.seed)
     causes = [
         each
         for each in found.effects
@@ -166,3 +162,26 @@ def run_trial(trial: Trial) -> TrialOutcome:
 
 def _get_family(name: str) -> str:
     return CATALOGUE[name].family if name in CATALOGUE else _FAMILIES.get(name, name)
+
+
+def _draw_record(trial: Trial, simulated: SimulatedCase) -> tuple[FaultyRecord, Simulator]:
+    """Return a record with the faults, and the simulator to diagnose.
+
+    A record on which no model can be identified has no simulation, so that another one is drawn.
+    """
+    for draw in range(MAX_DRAWS):
+        seed = [trial.seed, *map(ord, "".join(trial.effects)), *([draw] if draw else [])]
+        faulty = inject(
+            trial.effects,
+            np.random.default_rng(seed),
+            trial.seconds,
+            trial.noise,
+            trial.band,
+            trial.variant,
+            simulated.system,
+            simulated.perturbed,
+            simulated.free,
+        )
+        with suppress(RecordError):
+            return faulty, simulated.make(faulty)
+    raise RecordError(f"no model can be identified on {MAX_DRAWS} records of {trial}")

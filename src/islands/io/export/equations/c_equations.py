@@ -159,7 +159,7 @@ class _CWriter:
             elif name in ("first", "rests"):
                 lines.append(f"const double {result} = {'x[0]' if name == 'first' else 'rests(x, samples)'};")
             else:
-                function = {"low-pass": "low_pass", "interpolate": "interpolate_at"}.get(name, name)
+                function = "interpolate_at" if name == "interpolate" else name.replace("-", "_")
                 texts = ", ".join([f"x, {result}, samples", *map(self.code.write, arguments)])
                 lines += [f"double *const {result} = rows + {index}*samples;", f"{function}({texts});"]
                 local[result] = f"{result}[k]"

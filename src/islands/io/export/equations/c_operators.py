@@ -96,6 +96,24 @@ static void slider(const double *x, double *z, size_t samples, double breakaway)
 }
 """
 
+_LIMIT_RATE = """\
+/* Rate limiter: z follows x, which is linear between samples, by at most a rate per second. */
+static void limit_rate(const double *x, double *z, size_t samples, double rate)
+{
+    const double step = rate*DT;
+    double at = x[0];
+    z[0] = at;
+    for (size_t k = 1; k < samples; ++k) {
+        const double change = x[k] - x[k-1], gap = x[k-1] - at, closing = copysign(step, gap) - change;
+        const double met = gap*closing > 0.0 ? gap/closing : gap == 0.0 ? 0.0 : 1.0;
+        if (met >= 1.0) at += copysign(step, gap);
+        else if (fabs(change) <= step) at = x[k];
+        else at = x[k-1] + change*met + copysign(step, change)*(1.0 - met);
+        z[k] = at;
+    }
+}
+"""
+
 _INTERPOLATE = """\
 /* Signal at the time t*(1 + e) - tau, by Lagrange's polynomial through six samples; its ends are held. */
 static void interpolate_at(const double *x, double *z, size_t samples, double e, double tau)
@@ -139,6 +157,7 @@ C_OPERATORS: Mapping[str, str] = MappingProxyType(
         "resonance": _RESONANCE,
         "play": _PLAY,
         "slider": _SLIDER,
+        "limit-rate": _LIMIT_RATE,
         "interpolate": _INTERPOLATE,
         "rests": _RESTS,
     }

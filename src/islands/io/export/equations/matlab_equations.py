@@ -133,7 +133,7 @@ class _MatlabWriter:
             elif name in ("first", "rests"):
                 lines.append(f"{result} = {'x(1)' if name == 'first' else 'rests(x, c)'};")
             else:
-                function = {"low-pass": "low_pass", "interpolate": "interpolate_at"}.get(name, name)
+                function = "interpolate_at" if name == "interpolate" else name.replace("-", "_")
                 texts += [] if name in ("play", "slider") else ["c"]
                 lines.append(f"{result} = {function}({', '.join(texts)});")
                 local[result] = f"{result}(k)"

@@ -70,6 +70,26 @@ function z = slider(x, breakaway)
 end
 """
 
+_LIMIT_RATE = """\
+function z = limit_rate(x, rate, c)
+% Rate limiter: z follows x, which is linear between samples, by at most a rate per second.
+  z = x;
+  step = rate*c.dt;
+  for k = 2:numel(x)
+    change = x(k) - x(k-1);
+    gap = x(k-1) - z(k-1);
+    met = double(gap ~= 0);
+    closing = sign(gap)*step - change;
+    if gap*closing > 0, met = gap/closing; end
+    if met >= 1
+      z(k) = z(k-1) + sign(gap)*step;
+    elseif abs(change) > step
+      z(k) = x(k-1) + change*met + sign(change)*step*(1 - met);
+    end
+  end
+end
+"""
+
 _INTERPOLATE = """\
 function z = interpolate_at(x, e, tau, c)
 % Signal at the time t*(1 + e) - tau, by Lagrange's polynomial through six samples; its ends are held.
@@ -102,6 +122,7 @@ MATLAB_OPERATORS: Mapping[str, str] = MappingProxyType(
         "resonance": _RESONANCE,
         "play": _PLAY,
         "slider": _SLIDER,
+        "limit-rate": _LIMIT_RATE,
         "interpolate": _INTERPOLATE,
         "rests": _RESTS,
     }

@@ -153,6 +153,7 @@ OSCILLATOR = Rig(
         Fault("cubic-stiffness", 0.004, 0.3, (add_force(force_faults.cube),)),
         Fault("cogging", 0.002, 0.2, (add_force(force_faults.cogging),)),
         Fault("input-saturation", 0.04, 0.5, (before_plant(signal_faults.input_saturation),)),
+        Fault("rate-limit", 0.4, 5.0, (before_plant(signal_faults.rate_limit),)),
         Fault("output-saturation", 0.03, 0.5, (after_plant(signal_faults.output_saturation),)),
         Fault("dead-zone", 0.05, 2.5, (before_plant(signal_faults.dead_zone),)),
         Fault("gain-step", 0.005, 0.15, (gain_step,)),
@@ -165,7 +166,7 @@ OSCILLATOR = Rig(
     unknown={
         **NAMELESS_FORCES,
         **NAMELESS_MAPS,
-        "slew-rate": Fault("", 150.0, 500.0, (before_plant(signal_faults.slew_rate_limit),)),
+        "uneven-lag": Fault("", 2e-4, 0.01, (before_plant(signal_faults.uneven_lag),)),
         "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(2.0, 5.0)),)),
     },
 )

@@ -172,6 +172,7 @@ PIEZO = Rig(
         Fault("even-nonlinearity", 0.002, 0.1, (add_force(force_faults.square),)),
         Fault("cubic-stiffness", 0.004, 0.2, (add_force(force_faults.cube),)),
         Fault("input-saturation", 0.04, 0.4, (before_plant(signal_faults.input_saturation),)),
+        Fault("rate-limit", 0.4, 5.0, (before_plant(signal_faults.rate_limit),)),
         Fault("output-saturation", 0.03, 0.35, (after_plant(signal_faults.output_saturation),)),
         Fault("dead-zone", 0.1, 5.0, (before_plant(signal_faults.dead_zone),)),
         Fault("absolute-value-sensor", 0.004, 0.1, (after_plant(signal_faults.sign_dependent_gain),)),
@@ -185,7 +186,7 @@ PIEZO = Rig(
     unknown={
         **NAMELESS_FORCES,
         **NAMELESS_MAPS,
-        "slew-rate": Fault("", 40.0, 90.0, (before_plant(signal_faults.slew_rate_limit),)),
+        "uneven-lag": Fault("", 5e-4, 0.06, (before_plant(signal_faults.uneven_lag),)),
         "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(3.0, 8.0)),)),
     },
 )

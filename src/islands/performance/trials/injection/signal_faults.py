@@ -194,13 +194,28 @@ def cross_coupling(rng: np.random.Generator, strength: float) -> Map:
     return lambda drive, y: y + c * drive.peak_output * drive.neighbour
 
 
-def slew_rate_limit(_rng: np.random.Generator, strength: float) -> Map:
-    """Rate limiter, in units of the input per second."""
+def rate_limit(_rng: np.random.Generator, strength: float) -> Map:
+    """Rate limiter; the strength is the RMS of the rate of the input relative to the limit."""
 
-    def follow(drive: Excitation, u: Signal) -> Signal:
-        max_step, positions, position = strength / drive.rate, [], float(u[0])
+    def follow(_drive: Excitation, u: Signal) -> Signal:
+        max_step = float(np.sqrt(np.mean(np.diff(u) ** 2))) / strength
+        positions, position = [], float(u[0])
         for target in u.tolist():
             position += min(max(target - position, -max_step), max_step)
+            positions.append(position)
+        return np.array(positions)
+
+    return follow
+
+
+def uneven_lag(_rng: np.random.Generator, strength: float) -> Map:
+    """First-order lag that is three times as slow upwards as downwards; the strength is the slow constant."""
+
+    def follow(drive: Excitation, u: Signal) -> Signal:
+        positions, position = [], float(u[0])
+        up, down = (1.0 - np.exp(-factor / (strength * drive.rate)) for factor in (1.0, 3.0))
+        for target in u.tolist():
+            position += (up if target > position else down) * (target - position)
             positions.append(position)
         return np.array(positions)
 

@@ -208,6 +208,7 @@ TANKS = Rig(
         Fault("thermal-drift", 0.005, 0.2, (after_plant(signal_faults.thermal_drift),)),
         Fault("output-saturation", 0.03, 0.5, (after_plant(signal_faults.output_saturation),)),
         Fault("input-saturation", 0.03, 0.5, (before_plant(signal_faults.input_saturation),)),
+        Fault("rate-limit", 0.4, 5.0, (before_plant(signal_faults.rate_limit),)),
         Fault("gain-step", 0.01, 0.2, (gain_step,)),
         Fault("ageing", 0.01, 0.2, (ageing,)),
         Fault(
@@ -220,7 +221,7 @@ TANKS = Rig(
     ),
     unknown={
         **NAMELESS_MAPS,
-        "slew-rate": Fault("", 0.002, 0.01, (before_plant(signal_faults.slew_rate_limit),)),
+        "uneven-lag": Fault("", 0.5, 40.0, (before_plant(signal_faults.uneven_lag),)),
         "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(1.0, 3.0)),)),
     },
 )

@@ -18,6 +18,7 @@ from islands.discrepancy.interfaces.segments import is_resting
 from islands.systems.hysteresis_operators import play_from, slider
 from islands.systems.ode.equation_parser import parse_expression
 from islands.systems.ode.ode_expression import evaluate
+from islands.systems.rate_limiter import limit_rate
 
 Array = NDArray[np.float64]
 
@@ -55,6 +56,7 @@ FUNCTIONS: dict[str, Callable[..., Array | float]] = {
     "resonance": resonate,
     "play": lambda x, _, width: play_from(x, width) if width > 0.0 else x,
     "slider": lambda x, _, breakaway: slip(x, breakaway) if breakaway > 0.0 else x,
+    "limit-rate": lambda x, context, rate: limit_rate(x, rate * context.dt),
     "interpolate": lambda x, context, e, tau: interpolate_at(
         x, np.arange(x.size) * (1.0 + e) - tau / context.dt
     ),
