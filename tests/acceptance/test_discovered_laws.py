@@ -17,11 +17,8 @@ FAST = ("cubic damping", "third-power outflow", "voltage in the loop")
 
 #: Laws that are found in some records only; `missing_terms.py` gives the rates.
 UNCERTAIN = (
-    "fifth power",
     "Stribeck friction",
     "softening damper",
-    "one-sided spring",
-    "tanh spring",
     "pump curve",
 )
 

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import SimulationContext
-from islands.systems.hysteresis_operators import play_from
+from islands.systems.memory_operators import play_from
 from support.built_in_simulators import make_piezo
 
 Signal = NDArray[np.float64]

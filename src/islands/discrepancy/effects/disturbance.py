@@ -8,16 +8,11 @@ from numpy.typing import NDArray
 from islands.discrepancy.effects.channels import channel, channel_range, channel_unit, has_channel
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.input_spectrum import LINE_WIDTH, compute_spectrum, find_single_frequency
 from islands.discrepancy.interfaces.map_equation import MapEquation
 
-#: Half width of a line in the spectrum and error of its frequency, relative to the resolution.
-LINE_WIDTH, LINE_ERROR = 2.0, 0.1
-
-#: Least number of periods of an input in the estimation part, so that there is space between its harmonics.
-MIN_PERIODS = 8
-
-#: Fraction of the power of the input in its largest line, from which it has one frequency only.
-MIN_LINE_POWER = 0.8
+#: Error of the frequency of a line in the spectrum, relative to the resolution.
+LINE_ERROR = 0.1
 
 
 def _cross_coupling_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
@@ -72,11 +67,6 @@ def _periodic_disturbance_parameters(context: SimulationContext) -> tuple[Parame
     )
 
 
-def _compute_spectrum(signal: Signal) -> NDArray[np.floating[Any]]:
-    """Return the spectrum of a signal; zero padding resolves frequencies between its bins."""
-    return np.abs(np.fft.rfft(signal * np.hanning(signal.size), 4 * signal.size))
-
-
 def _find_input_harmonics(
     frequencies: NDArray[np.floating[Any]], context: SimulationContext
 ) -> NDArray[np.bool_]:
@@ -84,24 +74,19 @@ def _find_input_harmonics(
 
     A disturbance there cannot be distinguished from a distortion of the response.
     """
-    resolution = 1.0 / context.fit_end_time
-    u = context.u[: int(context.fit_end_time / context.dt)]
-    spectrum = _compute_spectrum(u - u.mean()) ** 2
-    line = float(frequencies[np.argmax(spectrum)])
-    is_near = np.abs(frequencies - line) < LINE_WIDTH * resolution
-    is_resolved = line >= MIN_PERIODS * resolution
-    if not is_resolved or spectrum[is_near].sum() < MIN_LINE_POWER * spectrum.sum():
+    line = find_single_frequency(context)
+    if line is None:
         return np.zeros(frequencies.size, dtype=np.bool_)
     order = np.round(frequencies / line)
     distance = np.abs(frequencies - order * line)
-    return (order >= 1) & (distance < (LINE_WIDTH + LINE_ERROR * order) * resolution)
+    return (order >= 1) & (distance < (LINE_WIDTH + LINE_ERROR * order) / context.fit_end_time)
 
 
 def _periodic_disturbance_starting_points(
     context: SimulationContext, residual: Signal
 ) -> tuple[tuple[float, ...], ...]:
     fitted = int(context.fit_end_time / context.dt)
-    spectrum = _compute_spectrum(residual[:fitted])
+    spectrum = compute_spectrum(residual[:fitted])
     frequencies = np.fft.rfftfreq(4 * fitted, context.dt)
     spectrum[frequencies < 2.0 / context.fit_end_time] = 0.0
     spectrum[_find_input_harmonics(frequencies, context)] = 0.0

@@ -8,7 +8,7 @@ from islands.discrepancy.effects.filters import low_pass
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 from islands.discrepancy.interfaces.map_equation import MapEquation
 from islands.systems.curve import PLACES, VALUES, interpolate_curve, write_curve
-from islands.systems.hysteresis_operators import play_from
+from islands.systems.memory_operators import play_from
 
 #: Time constants of a free filter: from the sampling time to this fraction of the estimation part.
 TIME_CONSTANTS, LONGEST = 6, 0.1

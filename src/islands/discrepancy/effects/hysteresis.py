@@ -7,7 +7,7 @@ import numpy as np
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Signal, SimulationContext, Site
 from islands.discrepancy.interfaces.map_equation import MapEquation
-from islands.systems.hysteresis_operators import play_from, slider
+from islands.systems.memory_operators import play_from, slider
 
 
 def _stiction_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
@@ -173,13 +173,18 @@ _SECOND_HYSTERESIS_CHI = (0.3, 1.0, 2.5, 8.0, 25.0)
 #: Starting points of g, relative to chi.
 _SECOND_HYSTERESIS_G = (0.0, 0.8, -1.2)
 
+#: Largest absolute value of g, relative to chi. With larger ones the element dissipates little, and draws the
+#: curve of a saturating or hardening spring.
+_MAX_RATIO = 1.5
+
 
 def _second_hysteresis_force(_x: float, _rate: float, z: float, numbers: Any) -> float:
     return numbers[0] * z
 
 
 def _second_hysteresis_derivative(_x: float, rate: float, z: float, numbers: Any) -> float:
-    return rate - numbers[1] * abs(rate) * z - numbers[2] * rate * abs(z)
+    most = _MAX_RATIO * numbers[1]
+    return rate - numbers[1] * abs(rate) * z - min(max(numbers[2], -most), most) * rate * abs(z)
 
 
 def _second_hysteresis_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
@@ -222,7 +227,7 @@ def _second_hysteresis_starting_points(
 
 SECOND_HYSTERESIS = Effect(
     name="second-hysteresis",
-    summary="An additional hysteretic element: + k z, z' = x' - chi |x'| z - g x' |z|",
+    summary=f"Another hysteretic element: + k z, z' = x' - chi |x'| z - g x' |z|, |g| <= {_MAX_RATIO} chi",
     family="memory",
     site=Site.FORCE,
     parameters=_second_hysteresis_parameters,
@@ -232,7 +237,7 @@ SECOND_HYSTERESIS = Effect(
         _second_hysteresis_derivative,
         initial_state_index=3,
         equation="n0*z",
-        state_equation="v - n1*abs(v)*z - n2*v*abs(z)",
+        state_equation=f"v - n1*abs(v)*z - min(max(n2, -{_MAX_RATIO}*n1), {_MAX_RATIO}*n1)*v*abs(z)",
     ),
     source="Ikhouane and Rodellar, Systems with Hysteresis, section 2",
     similar_to="exponential-creep, coulomb-friction, cubic-stiffness; on a single sine also quadratic-drag",

@@ -41,7 +41,7 @@ CUBIC_STIFFNESS = Effect(
     starting_points=_cubic_stiffness_starting_points,
     form=ForceLaw(_cubic_stiffness_force, equation="n0*x*x*x"),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
-    similar_to="input-saturation; second-hysteresis if that does not dissipate",
+    similar_to="input-saturation",
     distinguished_by="an odd curve over the coordinate, at all rates",
 )
 

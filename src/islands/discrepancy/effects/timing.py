@@ -6,8 +6,9 @@ import scipy
 from islands.discrepancy.effects.filters import interpolate_at, low_pass
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.input_spectrum import find_single_frequency
 from islands.discrepancy.interfaces.map_equation import MapEquation
-from islands.systems.rate_limiter import limit_rate
+from islands.systems.memory_operators import limit_rate
 
 
 def _delay_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
@@ -102,9 +103,10 @@ def _rate_limit_starting_points(
     return tuple((float(rate),) for rate in np.geomspace(0.9 * peak, 2.0 * least, _STARTING_RATES))
 
 
-def _exceeds_least_rate(context: SimulationContext) -> bool:
+def _has_rates_to_limit(context: SimulationContext) -> bool:
+    # With a sine of one amplitude, the limit is an odd distortion, as that of dry friction.
     least, peak = _get_rate_range(context)
-    return peak > 4.0 * least
+    return peak > 4.0 * least and find_single_frequency(context) is None
 
 
 RATE_LIMIT = Effect(
@@ -116,7 +118,7 @@ RATE_LIMIT = Effect(
     starting_points=_rate_limit_starting_points,
     form=_rate_limit_form,
     equation=lambda _: MapEquation("z0", (("limit-rate", "n0"),)),
-    is_applicable=_exceeds_least_rate,
+    is_applicable=_has_rates_to_limit,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     linear_parameters=0,
     similar_to="sensor-lag, delay, input-saturation",

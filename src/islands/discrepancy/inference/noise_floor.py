@@ -12,7 +12,7 @@ from islands.discrepancy.inference.noise_surrogates import (
 )
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.segments import count_runs, find_bounds, take_backward_differences
-from islands.systems.hysteresis_operators import play_from
+from islands.systems.memory_operators import play_from
 
 #: Lags of the features, in samples.
 LAGS = (1, 2, 4, 8, 16, 32)

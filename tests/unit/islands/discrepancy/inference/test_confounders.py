@@ -12,7 +12,7 @@ from islands.discrepancy.inference.confounders import Confounder, find_confounde
 from islands.discrepancy.inference.screening import screen_effects
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator
-from islands.systems.hysteresis_operators import play_from, slider
+from islands.systems.memory_operators import play_from, slider
 from support.simulated_records import recorded
 
 Array = NDArray[np.float64]
