@@ -27,14 +27,16 @@ import numba
 from llvmlite.binding import get_host_cpu_name
 from numba.core import config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core.ccallback import CFunc
 from numba.core.codegen import get_host_cpu_features
+from numba.core.sigutils import normalize_signature
 from platformdirs import user_cache_path
 
 #: File in the cache folder that marks it as complete: every kernel has been compiled.
 STAMP = "complete"
 
 #: Folders of the package that contain compiled functions.
-COMPILED = ("kernels", "systems")
+COMPILED = ("kernels", "systems", "discrepancy/effects")
 
 
 def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -53,6 +55,28 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
         with _numba_caches_in(folder):
             dispatcher._cache = _Cache(function)
     return dispatcher
+
+
+def compile_callback(function: Callable[..., Any], signature: Any) -> CFunc:
+    """Compile a function for calls through its ``address``; 1/0 is inf and not an exception.
+
+    Functions of `COMPILED` are stored. Those of other packages are compiled in every process, since the name
+    of the folder does not depend on their sources.
+
+    Parameters
+    ----------
+    function : callable
+    signature : numba signature
+    """
+    types, returned = normalize_signature(signature)
+    compiled = CFunc(function, (types, returned), {}, {"error_model": "numpy"})
+    packages = tuple(f"{__name__.partition('.')[0]}.{part.replace('/', '.')}." for part in COMPILED)
+    folder = cache_folder()
+    if folder is not None and function.__closure__ is None and function.__module__.startswith(packages):
+        with _numba_caches_in(folder):
+            compiled._cache = _Cache(function)
+    compiled.compile()
+    return compiled
 
 
 @cache

@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import cfunc, types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from islands.kernels.jit_cache import kernel
+from islands.kernels.jit_cache import compile_callback, kernel
 
 #: Maximum size of the numbers of an element: its values, followed by its constants.
 WIDTH = 8
@@ -45,7 +45,7 @@ class Elements(NamedTuple):
 @cache
 def compile_law(function):
     """Compile a scalar function of an element; `Elements` stores its ``address``."""
-    return cfunc(_SIGNATURE, error_model="numpy")(function)
+    return compile_callback(function, _SIGNATURE)
 
 
 @intrinsic

@@ -239,3 +239,26 @@ def test_element_state_along_a_motion_matches_reference_solution() -> None:
             )
             z = float(step.y[0, -1])
     assert found[0] == pytest.approx(np.array(known), abs=1e-7)
+
+
+def test_only_laws_of_the_package_are_loaded_from_the_cache_folder() -> None:
+    """The name of the folder depends on the sources of the package alone."""
+    compile_law.__wrapped__(hysteresis.SECOND_HYSTERESIS.form.force)
+    assert compile_law.__wrapped__(hysteresis.SECOND_HYSTERESIS.form.force).cache_hits == 1
+    compile_law.__wrapped__(state_force)
+    assert compile_law.__wrapped__(state_force).cache_hits == 0
+
+
+@pytest.mark.parametrize("ratio", [-50.0, -1.2, 0.0, 0.8, 50.0])
+@pytest.mark.parametrize("chi", [0.3, 3.0])
+def test_second_hysteresis_dissipates(chi: float, ratio: float) -> None:
+    """Without dissipation, its curve would be that of a spring: a tanh, or a power."""
+    angle = np.linspace(0.0, 8.0 * np.pi, 4001)
+    x, dt = np.sin(angle), float(angle[1])
+    form = hysteresis.SECOND_HYSTERESIS.form
+    z = np.empty((1, x.size))
+    law = (form.force, form.state_derivative, 1.0, 0.0, (1.0, chi, ratio * chi, 0.0))
+    integrate_along(x, np.cos(angle), dt, elements(law), z)
+    period = slice(-1001, None)
+    loop = float(np.trapezoid(z[0, period], x[period]))
+    assert loop > 0.05 * float(np.ptp(z[0, period]) * np.ptp(x[period]))
