@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from threadpoolctl import threadpool_limits
+
 from islands.data.dataset import Dataset
 from islands.data.split import hold_out
 from islands.discrepancy.diagnosis import diagnose as diagnose_simulator
@@ -86,7 +88,9 @@ def diagnose(
         held_out = as_record(validation, dt=dt, inputs=inputs, output=output, resting_inputs=True)
         record = hold_out(record, held_out)
     simulator = _as_simulator(simulation, record, columns)
-    return diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)
+    # The matrices are small: several threads take twice the CPU time.
+    with threadpool_limits(1, user_api="blas"):
+        return diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)
 
 
 def plan_experiment(
