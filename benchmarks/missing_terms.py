@@ -185,6 +185,7 @@ LAWS: Mapping[str, Mapping[str, tuple[int | None, Term]]] = {
     },
     "bouc-wen-piezo": {
         "product of position and velocity": (None, lambda _s, u, w, _t: 5e-4 * u * w),
+        "position-dependent damping": (None, lambda _s, u, w, _t: -2e-5 * u * u * w),
         "saturating hysteresis": (None, lambda s, _u, _w, _t: 2.0 * np.tanh(s[0] / 5.0)),
         "voltage in the loop": (0, lambda _s, u, w, _t: 0.002 * abs(w) * u),
     },

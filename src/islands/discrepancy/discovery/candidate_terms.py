@@ -31,6 +31,10 @@ RATE_FORMS = ("a", "abs(a)", "sign(a)", "abs(a)*a", "a**3")
 #: Factors of products of two signals.
 FACTORS = ("a", "a**2", "abs(a)", "sign(a)")
 
+#: Factors of the rate in its products with the factors of the input, for damping and friction that depend on
+#: the position where the input is the coordinate.
+RATE_FACTORS = ("a", "abs(a)", "sign(a)")
+
 #: Largest number of signals of which products are candidates: these grow with the cube of the number.
 MAX_MULTIPLIED_SIGNALS = 8
 
@@ -163,6 +167,8 @@ def _list_texts(signals: list[str], rate: str) -> Iterator[str]:
         yield f"{TIME}*{signal}"
         yield f"{rate}*{signal}"
         yield f"abs({rate})*{signal}"
+    for first, second in itertools.product(RATE_FACTORS, FACTORS):
+        yield f"{_insert(first, rate)}*{_insert(second, signals[-1])}"
     if len(signals) > MAX_MULTIPLIED_SIGNALS:
         return
     for one, other in itertools.combinations(signals, 2):

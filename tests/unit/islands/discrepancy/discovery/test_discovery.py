@@ -148,6 +148,8 @@ def test_definition_of_a_rate_gets_no_terms() -> None:
     assert {each.target for each in terms} == {"v", "output"}
     assert len({(each.target, each.text) for each in terms}) == len(terms)
     assert {each.size for each in terms if each.text == "x**2*v"} == {2.0}
+    # Where the input is the coordinate, its rate has the products that v has here.
+    assert {each.size for each in terms if each.text == "rate(F)*F**2"} == {36.0}
 
 
 def test_many_signals_have_no_products() -> None:
