@@ -74,9 +74,6 @@ CLOCK_SKEW = Effect(
 #: Number of rates that the calibration starts from.
 _STARTING_RATES = 16
 
-#: Nominal value and upper bound of the rate, relative to the peak rate of the input; it is never reached.
-_MAX_RATE = 2.0
-
 
 def _rate_limit_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
     limited: Signal = limit_rate(u, values[0] * context.dt)
@@ -85,15 +82,16 @@ def _rate_limit_form(u: Signal, values: Signal, context: SimulationContext) -> S
 
 def _get_rate_range(context: SimulationContext) -> tuple[float, float]:
     """Return the rate that crosses the range of the input once, and the peak rate, per second."""
-    fitted = context.u[: round(context.fit_end_time / context.dt)]
-    return float(np.ptp(fitted)) / context.fit_end_time, float(np.max(np.abs(np.diff(fitted)))) / context.dt
+    steps = np.abs(context.take_differences(context.u))
+    return float(np.ptp(context.u)) / context.fit_end_time, float(np.max(steps)) / context.dt
 
 
 def _rate_limit_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    least, peak = _get_rate_range(context)
-    return (
-        Parameter("rate", f"{context.input_unit}/s", _MAX_RATE * peak, 0.01 * peak, least, _MAX_RATE * peak),
-    )
+    # The bounds depend on scales alone: a saved simulation keeps its limit on records with other rates.
+    _, peak = _get_rate_range(context)
+    least = 0.1 * context.input_peak / context.fit_end_time
+    most = 2.0 * context.input_peak / context.dt
+    return (Parameter("rate", f"{context.input_unit}/s", most, 0.01 * (peak or most), least, most),)
 
 
 def _rate_limit_starting_points(
