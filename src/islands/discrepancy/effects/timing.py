@@ -76,7 +76,7 @@ _STARTING_RATES = 16
 
 
 def _rate_limit_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
-    limited: Signal = limit_rate(u, values[0] * context.dt)
+    limited: Signal = limit_rate(u, context.dt / values[0]) if values[0] > 0.0 else u
     return limited
 
 
@@ -87,18 +87,19 @@ def _get_rate_range(context: SimulationContext) -> tuple[float, float]:
 
 
 def _rate_limit_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    # The bounds depend on scales alone: a saved simulation keeps its limit on records with other rates.
     _, peak = _get_rate_range(context)
-    least = 0.1 * context.input_peak / context.fit_end_time
-    most = 2.0 * context.input_peak / context.dt
-    return (Parameter("rate", f"{context.input_unit}/s", most, 0.01 * (peak or most), least, most),)
+    most = 10.0 * context.fit_end_time / (context.input_peak or 1.0)
+    return (
+        Parameter("inverse_rate", f"s/{context.input_unit}", 0.0, 0.1 / peak if peak else most, 0.0, most),
+    )
 
 
 def _rate_limit_starting_points(
     context: SimulationContext, _residual: Signal
 ) -> tuple[tuple[float, ...], ...]:
     least, peak = _get_rate_range(context)
-    return tuple((float(rate),) for rate in np.geomspace(0.9 * peak, 2.0 * least, _STARTING_RATES))
+    rates = np.geomspace(0.9 * peak, 2.0 * least, _STARTING_RATES)
+    return tuple((1.0 / float(rate),) for rate in rates)
 
 
 def _has_rates_to_limit(context: SimulationContext) -> bool:
@@ -109,7 +110,7 @@ def _has_rates_to_limit(context: SimulationContext) -> bool:
 
 RATE_LIMIT = Effect(
     name="rate-limit",
-    summary="Rate limit of the actuator (slew rate): |u'| is at most the rate",
+    summary="Rate limit of the actuator (slew rate): |u'| is at most 1/inverse_rate",
     family="timing",
     site=Site.INPUT,
     parameters=_rate_limit_parameters,

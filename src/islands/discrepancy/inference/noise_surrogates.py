@@ -80,8 +80,9 @@ def draw_surrogates(
     stable = noise.limit_poles(residual.size)
     bounds = find_bounds(segments, residual.size)
     is_kept = np.zeros(residual.size, dtype=bool)
-    for first, _ in bounds:
-        is_kept[first : first + noise.order] = True
+    for first, last in bounds:
+        # Between many gaps, recordings may be as short as the model.
+        is_kept[first : first + min(noise.order, (last - first) // 2)] = True
     centred = np.where(is_kept, 0.0, innovations - innovations[~is_kept].mean())
     randomise = _RANDOMISE[randomisation]
     for _ in range(count):

@@ -12,14 +12,14 @@ from islands.discrepancy.interfaces.context import SimulationContext
 #: * ``low-pass`` (time constant in s): `islands.discrepancy.effects.filters.low_pass`
 #: * ``resonance`` (period in s, damping ratio): mode in series with the signal
 #: * ``play`` (half width), ``slider`` (breakaway): `islands.systems.memory_operators`
-#: * ``limit-rate`` (rate per second): `islands.systems.memory_operators`
+#: * ``limit-rate`` (inverse of the rate per second): `islands.systems.memory_operators`
 #: * ``interpolate`` (e, tau in s): the signal at the time ``t (1 + e) - tau``
 #: * ``first``: number, the first sample
 #: * ``rests``: number, 1 if the signal is constant over the estimation part, otherwise 0
 #: * ``temperature``: the first temperature among the channels, relative to its first value
 #: * ``coupled``: the first other channel
 #:
-#: Without a positive first argument, the first four return the signal itself.
+#: Without a positive first argument, the first five return the signal itself.
 OPERATORS = (
     "low-pass",
     "resonance",

@@ -98,9 +98,9 @@ static void slider(const double *x, double *z, size_t samples, double breakaway)
 
 _LIMIT_RATE = """\
 /* Rate limiter: z follows x, which is linear between samples, by at most a rate per second. */
-static void limit_rate(const double *x, double *z, size_t samples, double rate)
+static void limit_rate(const double *x, double *z, size_t samples, double inverse_rate)
 {
-    const double step = rate*DT;
+    const double step = inverse_rate > 0.0 ? DT/inverse_rate : INFINITY;
     double at = x[0];
     z[0] = at;
     for (size_t k = 1; k < samples; ++k) {

@@ -71,10 +71,11 @@ end
 """
 
 _LIMIT_RATE = """\
-function z = limit_rate(x, rate, c)
+function z = limit_rate(x, inverse_rate, c)
 % Rate limiter: z follows x, which is linear between samples, by at most a rate per second.
   z = x;
-  step = rate*c.dt;
+  if ~(inverse_rate > 0), return; end
+  step = c.dt/inverse_rate;
   for k = 2:numel(x)
     change = x(k) - x(k-1);
     gap = x(k-1) - z(k-1);

@@ -55,7 +55,7 @@ FUNCTIONS: dict[str, Callable[..., Array | float]] = {
     "resonance": resonate,
     "play": lambda x, _, width: play_from(x, width) if width > 0.0 else x,
     "slider": lambda x, _, breakaway: slip(x, breakaway) if breakaway > 0.0 else x,
-    "limit-rate": lambda x, context, rate: limit_rate(x, rate * context.dt),
+    "limit-rate": lambda x, context, inverse: limit_rate(x, context.dt / inverse) if inverse > 0.0 else x,
     "interpolate": lambda x, context, e, tau: interpolate_at(
         x, np.arange(x.size) * (1.0 + e) - tau / context.dt
     ),
