@@ -61,7 +61,7 @@ def compile_callback(function: Callable[..., Any], signature: Any) -> CFunc:
     """Compile a function for calls through its ``address``; 1/0 is inf and not an exception.
 
     Functions of `COMPILED` are stored. Those of other packages are compiled in every process, since the name
-    of the folder does not depend on their sources.
+    of the folder does not depend on their sources, and so are those that enclose others (see `kernel`).
 
     Parameters
     ----------

@@ -7,11 +7,12 @@ as a built-in one.
 from functools import cache
 from typing import Any
 
-from numba import cfunc, types
+from numba import types
 from numba.core.errors import NumbaError
 from numba.extending import register_jitable
 
 from islands.errors import ModelError
+from islands.kernels.jit_cache import compile_callback
 from islands.model.expression import Primitive
 
 _ROW = types.CPointer(types.float64)
@@ -42,7 +43,7 @@ def _compile(scalar: Any, arity: int, name: str) -> Any:
             target[lane] = scalar(first[lane], second[lane])
 
     try:
-        return cfunc(_SIGNATURE, error_model="numpy")(unary if arity == 1 else binary)
+        return compile_callback(unary if arity == 1 else binary, _SIGNATURE)
     except NumbaError as error:
         raise ModelError(
             f"primitive {name!r} does not compile; use arithmetic, comparisons and math alone: {error}"

@@ -87,7 +87,7 @@ def test_equation_replaces_two_names_that_fit_worse() -> None:
 
 
 @pytest.mark.ci
-def test_an_equation_with_fewer_values_replaces_a_name_that_fits_worse() -> None:
-    """The best name is `second-hysteresis`, with four values; the equation has two and the better score."""
+def test_an_equation_with_fewer_values_replaces_a_curve() -> None:
+    """The nearest cause is a stiffness curve of seven values; the best name is `cubic-stiffness`."""
     found = run_trial(Trial(("tanh-spring",), 7_715_008, "white", (1.0, 4.0), core="second-order"))
     assert (found.verdict, found.named) == ("discovered", ("missing-term",))
