@@ -131,14 +131,12 @@ def diagnose(
         effects = [*effects, *(form for form in forms if form in outcome.hypothesis.effects)]
     progress("searching for missing terms", 0.92)
     terms = (
-        None
-        if is_clean
-        else find_missing_terms(base, outcome.hypothesis, outcome.screened, target, parallel_map)
+        None if is_clean else find_missing_terms(base, outcome, target, effects, fitted, rng, parallel_map)
     )
     progress("screening alternative causes", 0.95)
     found = make_diagnosis(record, outcome, base, terms, effects, fitted, rng, parallel_map)
-    if terms is not None and replaces_effects(terms, base, outcome.hypothesis, target, fitted, rng):
-        found = extend_equations(found, terms, target, rng)
+    if terms is not None and replaces_effects(terms, base, outcome, target, fitted, rng):
+        found = extend_equations(found, terms, target, effects, rng, parallel_map)
     closed_loop = find_closed_loop(found.best, record.y, fitted, record.input_names[0])
     return replace(found, record_findings=(*record_findings, *closed_loop))
 

@@ -18,7 +18,7 @@ from islands.discrepancy.inference.experiment_design import suggest_experiment
 from islands.discrepancy.inference.finding import Finding, describe_effects
 from islands.discrepancy.inference.holdout import bound_gain, compute_rmse, measure_gain
 from islands.discrepancy.inference.residual_structure import find_residual_structure
-from islands.discrepancy.inference.screening import ScreenedEffect
+from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.strategies import SearchOutcome
 from islands.discrepancy.inference.verdict import Verdict, choose_reference_fit, classify, explained_fraction
 from islands.discrepancy.interfaces.effect import Effect
@@ -57,7 +57,12 @@ def make_gross_diagnosis(
 
 
 def extend_equations(
-    found: Diagnosis, terms: MissingTerms, target: Target, rng: np.random.Generator
+    found: Diagnosis,
+    terms: MissingTerms,
+    target: Target,
+    effects: Sequence[Effect],
+    rng: np.random.Generator,
+    parallel_map: ParallelMap,
 ) -> Diagnosis:
     """Return the diagnosis with discovered terms in place of effects, if the hold-out part confirms them.
 
@@ -87,13 +92,15 @@ def extend_equations(
         == Verdict.UNKNOWN
     ):
         return found
+    findings = describe_terms(replace(terms.search, fit=fit), terms.discovery, found.base, target, floor**2)
+    if (added := terms.outcome) is not None:
+        screened = screen_effects(added.base, added.target, effects, parallel_map)
+        added = replace(added, screened=screened, hypothesis=replace(added.hypothesis, fit=fit))
+        findings += describe_effects(added, effects, None, parallel_map)[0]
     return replace(
         found,
         verdict=Verdict.DISCOVERED,
-        effects=(
-            *describe_terms(replace(terms.search, fit=fit), terms.discovery, found.base, target, floor**2),
-            *describe_noise(record.y[:fitted], residual, context),
-        ),
+        effects=(*findings, *describe_noise(record.y[:fitted], residual, context)),
         gain=gain,
         residual_structure=structure,
         suggested_experiment="",

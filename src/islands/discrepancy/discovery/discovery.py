@@ -12,13 +12,15 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     evaluate_fit,
 )
 from islands.discrepancy.calibration.target import Target
+from islands.discrepancy.discovery.joint_search import JointResult, search_jointly
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.inference.confidence import CONFIDENCE_TEMPERATURE
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, Finding, Rival, Value
 from islands.discrepancy.inference.holdout import cross_validate_gain
-from islands.discrepancy.inference.hypothesis import Hypothesis
-from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
-from islands.discrepancy.inference.verdict import explained_fraction
+from islands.discrepancy.inference.screening import bic_penalty
+from islands.discrepancy.inference.strategies import SearchOutcome
+from islands.discrepancy.inference.verdict import Verdict, explained_fraction
+from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 
 #: Part of the gain of the terms by which they have to be better than effects. The catalogue has one form of
@@ -41,9 +43,10 @@ class Discovery:
     equations : str
         Extended equations, and the values of their new parameters.
     nearest : tuple of str
-        Names of the effects that explain the record best.
+        Names of the effects that explain the record best, without those that act in addition to the terms.
     worse_by : float
-        Difference between their score and that of the equations; negative if they explain the record better.
+        Difference between the score of the effects and that of the equations; negative if effects without
+        terms explain the record better.
     """
 
     equations: str
@@ -53,10 +56,19 @@ class Discovery:
 
 @dataclass(frozen=True, slots=True)
 class MissingTerms:
-    """Result of a search for missing terms, compared with the effects of the catalogue."""
+    """Result of a search for missing terms, compared with the effects of the catalogue.
+
+    Attributes
+    ----------
+    search : TermSearchResult
+    discovery : Discovery
+    outcome : SearchOutcome or None
+        Effects that act in addition to the terms.
+    """
 
     search: TermSearchResult
     discovery: Discovery
+    outcome: SearchOutcome | None = None
 
     @property
     def rival(self) -> Rival | None:
@@ -68,28 +80,46 @@ class MissingTerms:
         if law is not None and all(re.fullmatch(law, each.term.text) for each in self.search.terms):
             return None
         lead = min(self.discovery.worse_by, 0.0)
-        return Rival(MISSING_TERM, self.search.fit, lead, len(self.search.terms))
+        return Rival(MISSING_TERM, self.search.fit, lead, len(self.search.terms), self.search.effects)
+
+    def is_better(self, alone: SearchOutcome) -> bool:
+        """Return whether the terms explain clearly more than effects alone."""
+        found, hypothesis = self.search, alone.hypothesis
+        margin = max(EQUIVALENCE_MARGIN, MIN_RELATIVE_GAIN * found.gain)
+        if any(effect.is_free for effect in hypothesis.effects):
+            margin = 0.0  # A formula is preferred to a curve that explains as much.
+        else:
+            values = sum(len(term.parameters) for term in found.terms)
+            if values + _count_values(found.fit) < _count_values(hypothesis.fit):
+                margin = EQUIVALENCE_MARGIN  # Effects with more values are no idealisation of the terms.
+        return self.discovery.worse_by >= margin
 
 
 def find_missing_terms(
     base: CalibrationResult,
-    hypothesis: Hypothesis,
-    screened: Sequence[ScreenedEffect],
+    alone: SearchOutcome,
     target: Target,
+    effects: Sequence[Effect],
+    fitted: int,
+    rng: np.random.Generator,
     parallel_map: ParallelMap = map,
 ) -> MissingTerms | None:
     """Search for missing terms, and compare them with the effects of the catalogue.
+
+    Effects in addition to the terms are searched for if a single effect does not explain the record as well.
 
     Parameters
     ----------
     base : CalibrationResult
         The simulation without effects, calibrated to unweighted residuals.
-    hypothesis : Hypothesis
-        The best effects, if there are any.
-    screened : sequence of ScreenedEffect
-        Single effects, the best first; the nearest one if the hypothesis has none.
+    alone : SearchOutcome
+        Outcome of the search for effects. If it has none, the nearest one is the best of those screened.
     target : Target
         Target of ``base``.
+    effects : sequence of Effect
+        Effects that are searched for.
+    fitted : int
+        Number of samples used for estimation.
     parallel_map : ParallelMap
         Fits the terms.
 
@@ -99,22 +129,36 @@ def find_missing_terms(
         None if the simulator has no equations, or if no term gains enough.
     """
     found = search_terms(base, target, parallel_map)
-    if found is None:
-        return None
-    nearest = [] if hypothesis.effects else [each for each in screened if not each.effect.is_free][:1]
+    terms = None if found is None else _compare(JointResult(found), base, alone, target)
+    if alone.target.effective_samples is not None:
+        return terms  # A search with model error has no noise model that further effects could whiten.
+    is_named = len(alone.hypothesis.effects) == 1 and alone.verdict == Verdict.NAMED
+    if is_named and (terms is None or not terms.is_better(alone)):
+        return terms
+    joint = search_jointly(found, base, alone, target, effects, fitted, rng, parallel_map)
+    return None if joint is None else _compare(joint, base, alone, target)
+
+
+def _compare(
+    joint: JointResult, base: CalibrationResult, alone: SearchOutcome, target: Target
+) -> MissingTerms:
+    """Compare terms with effects alone, or with the nearest effect if there are none."""
+    hypothesis = alone.hypothesis
+    nearest = [] if hypothesis.effects else [each for each in alone.screened if not each.effect.is_free][:1]
     effects = hypothesis.effects or tuple(each.effect for each in nearest)
     fit = nearest[0].fit if nearest else hypothesis.fit
     # The scores of a search with model error count other samples.
     scored = evaluate_fit(fit.simulation, target, fit.values)
     cost = scored.score + sum(bic_penalty(effect, base) for effect in effects)
-    names = tuple(dict.fromkeys(effect.cause for effect in effects))
-    return MissingTerms(found, Discovery(found.describe(), names, cost - found.cost))
+    names = tuple(dict.fromkeys(effect.cause for effect in effects if effect not in joint.terms.effects))
+    discovery = Discovery(joint.terms.describe(), names, cost - joint.terms.cost)
+    return MissingTerms(joint.terms, discovery, joint.outcome)
 
 
 def replaces_effects(
     terms: MissingTerms,
     base: CalibrationResult,
-    hypothesis: Hypothesis,
+    alone: SearchOutcome,
     target: Target,
     fitted: int,
     rng: np.random.Generator,
@@ -123,28 +167,20 @@ def replaces_effects(
 
     Parameters
     ----------
-    base, hypothesis, target
+    base, alone, target
         Arguments of `find_missing_terms`.
     fitted : int
         Number of samples used for estimation.
     """
-    found = terms.search
-    margin = max(EQUIVALENCE_MARGIN, MIN_RELATIVE_GAIN * (base.score - found.cost))
-    if any(effect.is_free for effect in hypothesis.effects):
-        margin = 0.0  # A formula is preferred to a curve that explains as much.
-    elif sum(len(term.parameters) for term in found.terms) < _count_values(hypothesis):
-        margin = EQUIVALENCE_MARGIN  # Effects with more values are no idealisation of the terms.
-    if terms.discovery.worse_by < margin:
+    if not terms.is_better(alone):
         return False
-    return cross_validate_gain(base, False, found.fit, target, fitted, rng) > 0.0
+    return cross_validate_gain(base, False, terms.search.fit, target, fitted, rng) > 0.0
 
 
-def _count_values(hypothesis: Hypothesis) -> int:
-    """Count the values of effects, without initial states."""
-    context = hypothesis.fit.simulation.context
-    return sum(
-        not parameter.initial for effect in hypothesis.effects for parameter in effect.parameters(context)
-    )
+def _count_values(fit: CalibrationResult) -> int:
+    """Count the values of the effects of a fit, without initial states."""
+    context, effects = fit.simulation.context, fit.simulation.effects
+    return sum(not parameter.initial for effect in effects for parameter in effect.parameters(context))
 
 
 def describe_terms(

@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.discovery.candidate_terms import CandidateTerm
 from islands.discrepancy.interfaces.context import Signal
@@ -44,9 +42,17 @@ def add_terms(
         system = term.add_to(system, number, target_sizes[term.target])
     simulation = replace(fit.simulation, simulator=with_equations(fit.simulation.simulator, system))
     values = {term.name_parameters(number)[0]: 0.0 for term, number in terms}
-    values |= {each.name: v for each, v in zip(fit.simulation.parameters, fit.values, strict=True)}
-    start = [values.get(parameter.name, parameter.nominal) for parameter in simulation.parameters]
-    return simulation, np.array(start)
+    known = fit.simulation.simulator_slice
+    values |= {
+        each.name: value
+        for each, value in zip(fit.simulation.parameters[known], fit.values[known], strict=True)
+    }
+    start = simulation.nominal
+    part = simulation.simulator_slice
+    start[part] = [values.get(each.name, each.nominal) for each in simulation.parameters[part]]
+    for effect in simulation.effects:
+        start[simulation.get_slice(effect)] = fit.values[fit.simulation.get_slice(effect)]
+    return simulation, start
 
 
 def get_system(fit: CalibrationResult) -> OdeSystem:

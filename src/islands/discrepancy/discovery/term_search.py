@@ -23,8 +23,10 @@ from islands.discrepancy.discovery.candidate_terms import (
 )
 from islands.discrepancy.discovery.equation_simulator import add_terms, find_equations, get_system
 from islands.discrepancy.discovery.term_ranking import RankedTerm, rank_terms
+from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.context import Signal
+from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -70,18 +72,32 @@ class TermSearchResult:
 
     Attributes
     ----------
+    base : CalibrationResult
+        The simulation without the terms. It may have effects.
     fit : CalibrationResult
     terms : tuple of DiscoveredTerm
         In the order in which they were found.
     """
 
+    base: CalibrationResult
     fit: CalibrationResult
     terms: tuple[DiscoveredTerm, ...]
 
     @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects of the simulation."""
+        return self.fit.simulation.effects
+
+    @property
     def cost(self) -> float:
-        """Score of the fit plus the penalties of its terms; less is better."""
-        return self.fit.score + sum(each.penalty for each in self.terms)
+        """Score of the fit plus the penalties of its terms and effects; less is better."""
+        effects = sum(bic_penalty(effect, self.fit) for effect in self.effects)
+        return self.fit.score + sum(each.penalty for each in self.terms) + effects
+
+    @property
+    def gain(self) -> float:
+        """Score gain of the terms in minus twice the log-likelihood, less their penalties."""
+        return self.base.score - self.fit.score - sum(each.penalty for each in self.terms)
 
     def describe(self) -> str:
         """Return the extended equations and the values of their new parameters as one line."""
@@ -108,7 +124,7 @@ def search_terms(
     Parameters
     ----------
     base : CalibrationResult
-        The calibrated simulation.
+        The calibrated simulation. It keeps its effects.
     target : Target
     parallel_map : ParallelMap
         Fits the terms.
@@ -132,7 +148,7 @@ def search_terms(
         OUTPUT: context.output_peak,
         **{name: sizes[f"d{name}/dt"] for name, _ in system.derivatives},
     }
-    found, unweighted = TermSearchResult(base, ()), target
+    found, unweighted = TermSearchResult(base, base, ()), target
     while len(found.terms) < MAX_TERMS:
         target = whiten_target(target, found.fit)
         found = _improve(found, calibrate(found.fit.simulation, target, found.fit.values))
@@ -167,7 +183,7 @@ def _eliminate_terms(
             kept = tuple(each for each in found.terms if each is not left_out)
             numbered = [(each.term, each.number) for each in kept]
             simulation, start = add_terms(found.fit, system, numbered, target_sizes)
-            smaller.append(TermSearchResult(calibrate(simulation, target, start), kept))
+            smaller.append(replace(found, fit=calibrate(simulation, target, start), terms=kept))
         best = min(smaller, key=lambda each: each.cost)
         if best.cost > found.cost + MIN_GAIN:
             break
@@ -201,7 +217,7 @@ def _find_best_term(
         # Any of the candidates could gain by chance.
         penalty = term.value_count * log_n + log_choices
         added = DiscoveredTerm(term, number, fit.score - fitted.score - penalty, penalty)
-        results.append(TermSearchResult(fitted, (*found.terms, added)))
+        results.append(replace(found, fit=fitted, terms=(*found.terms, added)))
     return min(results, key=lambda each: each.cost, default=None)
 
 

@@ -90,12 +90,24 @@ class Rival:
         By how much its score exceeds that of the effects.
     size : int
         Number of its causes.
+    effects : tuple of Effect
+        Effects that it has in addition to these causes.
     """
 
     name: str
     fit: CalibrationResult
     lead: float
     size: int
+    effects: tuple[Effect, ...] = ()
+
+    def is_alternative(self, effect: Effect, effects: Sequence[Effect]) -> bool:
+        """Return whether it explains a record without one of several effects.
+
+        With as many causes as there are effects, it is another form of all of them together.
+        """
+        if self.effects or len(effects) == 1:
+            return effect not in self.effects
+        return self.size < len(effects)
 
 
 def describe_effects(
@@ -115,7 +127,7 @@ def describe_effects(
     effects : sequence of Effect
         Effects that were searched for.
     rival : Rival, optional
-        Further alternative of a single effect, or of each of more effects than its size.
+        Further alternative of those effects that it does not have.
     """
     findings, equivalents = [], []
     base, hypothesis, target = outcome.base, outcome.hypothesis, outcome.target
@@ -150,7 +162,7 @@ def describe_effects(
         scored[effect.cause] = ScoredAlternative(
             score, sum_squares_by_block(hypothesis.fit, hypothesis.fit, target)
         )
-        if rival is not None and (len(hypothesis.effects) == 1 or rival.size < len(hypothesis.effects)):
+        if rival is not None and rival.is_alternative(effect, hypothesis.effects):
             scored[rival.name] = ScoredAlternative(
                 score + rival.lead, sum_squares_by_block(rival.fit, hypothesis.fit, target)
             )

@@ -110,7 +110,7 @@ def search_with_ar_noise(
         base = calibrate(base.simulation, target, base.values)
         screened = screen_effects(base, target, effects, parallel_map)
     hypothesis, target = stepwise_search(base, screened, target, effects, progress, parallel_map)
-    return _make_outcome(base, screened, target, hypothesis)
+    return make_outcome(base, screened, target, hypothesis)
 
 
 def search_with_model_error(
@@ -142,13 +142,13 @@ def search_with_model_error(
         hypothesis, _ = stepwise_search(base, screened, target, effects, progress, parallel_map, pairs=True)
         if not hypothesis.effects:
             break
-    return _make_outcome(base, screened, target, hypothesis)
+    return make_outcome(base, screened, target, hypothesis)
 
 
 def make_exact_outcome(base: CalibrationResult, target: Target) -> SearchOutcome:
     """Return the outcome for a residual that is rounding: there is nothing to be searched for."""
     hypothesis = Hypothesis(base, base.score, ())
-    return replace(_make_outcome(base, (), target, hypothesis), verdict=Verdict.NOTHING)
+    return replace(make_outcome(base, (), target, hypothesis), verdict=Verdict.NOTHING)
 
 
 def assess_evidence(
@@ -230,7 +230,7 @@ def best_single(base: CalibrationResult, screened: Sequence[ScreenedEffect]) -> 
     return screened[0].fit if screened and screened[0].score_gain(base) > MIN_GAIN else base
 
 
-def _make_outcome(
+def make_outcome(
     base: CalibrationResult, screened: Sequence[ScreenedEffect], target: Target, hypothesis: Hypothesis
 ) -> SearchOutcome:
     """Return an outcome that has not been assessed yet."""

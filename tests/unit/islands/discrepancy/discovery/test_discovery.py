@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -199,3 +200,46 @@ def test_named_effect_wins_over_terms_that_explain_as_much() -> None:
     found = diagnose("dry friction")
     assert [each.name for each in found.effects][:1] == ["coulomb-friction"]
     assert found.discovery is None
+
+
+def add_jump(record: Dataset, size: float) -> Dataset:
+    """Add a jump of the output at two fifths of the record, in standard deviations of the output."""
+    jump = size * np.std(record.y) * (np.arange(record.samples) > 0.4 * record.samples)
+    return replace(record, y=record.y + jump)
+
+
+@cache
+def diagnose_with_jump(name: str) -> Diagnosis:
+    spec = OdeSpec.model_validate({"kind": "ode", **DOCUMENT})
+    return islands.diagnose(add_jump(simulate(LAWS[name][0]), 0.05), spec)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", ["bilinear", "fifth power"])
+def test_effect_and_missing_term_are_found_together(name: str) -> None:
+    found = diagnose_with_jump(name)
+    assert found.verdict == Verdict.DISCOVERED
+    assert sorted(each.name for each in found.effects) == ["jump", "missing-term"]
+    assert found.discovery is not None
+    assert LAWS[name][1] in found.discovery.equations
+    assert "jump" not in found.discovery.nearest
+    values = {each.name: next(iter(each.parameters.values())) for each in found.effects}
+    assert values["missing-term"].value == pytest.approx(LAWS[name][2], rel=0.05)
+    assert values["jump"].value == pytest.approx(0.05 * np.std(simulate(LAWS[name][0]).y), rel=0.1)
+    assert np.sqrt(found.best.mean_square) < 1.05 * found.noise_floor
+
+
+@pytest.mark.ci
+def test_extension_by_a_term_and_an_effect_is_simulated_and_exported() -> None:
+    found = diagnose_with_jump("bilinear")
+    document = json.loads(extended_json(found.best, found.record))
+    other = add_jump(simulate(LAWS["bilinear"][0], seed=2), 0.05)
+    assert np.std(other.y - simulate_spec(document, other)) < 0.02 * np.std(other.y)
+
+
+@pytest.mark.ci
+def test_two_named_effects_are_not_replaced_by_terms() -> None:
+    record = add_jump(simulate(lambda x, _v, _u: 300.0 * x**3), 0.05)
+    found = islands.diagnose(record, OdeSpec.model_validate({"kind": "ode", **DOCUMENT}))
+    assert found.verdict == Verdict.NAMED
+    assert sorted(each.name for each in found.effects) == ["cubic-stiffness", "jump"]
