@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from islands.discrepancy.effects import CATALOGUE
+from islands.performance.trials.cases import CASES
 from islands.performance.trials.injection.noise import NOISES
 from islands.performance.trials.trial import Trial, run_trial
 from support.command_line import fail, succeed
@@ -32,15 +33,20 @@ def test_trials_are_counted_by_simulation(tmp_path: Path, monkeypatch: pytest.Mo
     pool = "islands_service.runtime.parallel_map.ray_pool"
     monkeypatch.setattr(pool, lambda _workers, _address: nullcontext(map))
     command = ("trials", "--core", "column", "--effects", "offset", "--count", 1, "--clean", 1)
-    more = ("--open-set", 0, "--seconds", 10, "--seed", 8, "--json", tmp_path / "trials.json")
+    limits = ("--open-set", 0, "--mixed", 1, "--seconds", 10, "--seed", 8)
+    more = (*limits, "--json", tmp_path / "trials.json")
     with undrawn_figures():
         printed = succeed(*command, *more, "--figure", tmp_path / "confusion.svg")
     assert "column" in printed
     document = json.loads((tmp_path / "trials.json").read_text())
-    assert [(each["trial"]["effects"], each["named"]) for each in document["outcomes"]] == [
+    *single, mixed = document["outcomes"]
+    assert [(each["trial"]["effects"], each["named"]) for each in single] == [
         (["offset"], ["offset"]),
         ([], []),
     ]
+    known, unknown = mixed["trial"]["effects"]
+    assert known == "offset"
+    assert unknown in CASES["column"].nameless
     counted = percentages(document["cores"]["column"])
     assert counted["named first, where detected"] == 100.0
     assert counted["false names on clean records"] == 0.0

@@ -57,6 +57,12 @@ def trials(
         int,
         typer.Option("--open-set", min=0, help="Records of each cause that is not in the catalogue."),
     ] = 2,
+    mixed: Annotated[
+        int,
+        typer.Option(
+            "--mixed", min=0, help="Records with an effect and a cause that is not in the catalogue."
+        ),
+    ] = 0,
     variant: Annotated[
         bool, typer.Option("--variant", help="Inject effects in other forms than those of the catalogue.")
     ] = False,
@@ -99,6 +105,10 @@ def trials(
                 trial([str(each) for each in rng.choice(names, size, replace=False)], turn, COMBINED_BAND)
                 for turn in range(many)
             ]
+        planned += [
+            trial([str(rng.choice(each)) for each in (names, simulated.nameless)], turn, COMBINED_BAND)
+            for turn in range(mixed)
+        ]
     compile_kernels()
     found = []
     # Imported here: the help of the command must not need Ray.

@@ -146,7 +146,8 @@ def score(
     """
     known = [each for each in outcomes if not set(each.trial.effects) & set(unknown)]
     clean = [each for each in known if not each.trial.effects]
-    open_set = [each for each in outcomes if each not in known]
+    open_set = [each for each in outcomes if each.trial.effects and {*each.trial.effects} <= {*unknown}]
+    mixed = [each for each in outcomes if each not in known and each not in open_set]
     every = [each for each in known if len(each.trial.effects) == 1]
     single = [each for each in every if each.misfit > MIDDLE_MISFIT]
     pairs = [each for each in known if len(each.trial.effects) == 2]
@@ -213,6 +214,14 @@ def score(
             goals.misnamed,
             True,
         ),
+        proportion("known cause named, next to an unknown one", mixed, lambda each: each.one_right, None),
+        proportion(
+            "known cause and an equation or a family, next to an unknown one",
+            mixed,
+            lambda each: each.one_right and each.verdict in ("discovered", "family"),
+            None,
+        ),
+        proportion("wrong name next to an unknown cause", mixed, lambda each: bool(each.wrong), None, True),
     ]
 
 

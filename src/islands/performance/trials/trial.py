@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.discrepancy.diagnosis import diagnose
+from islands.discrepancy.discovery.discovery import MISSING_TERM
 from islands.discrepancy.effects import CATALOGUE, model_form
+from islands.discrepancy.effects.free_forms import FREE_FORMS
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.errors import RecordError
 from islands.performance.trials.cases import CASES, SimulatedCase
@@ -111,6 +113,16 @@ class TrialOutcome:
     def first_right(self) -> bool:
         """Whether the first name is an injected fault."""
         return bool(self.named) and self.named[0] in self.trial.effects
+
+    @property
+    def one_right(self) -> bool:
+        """Whether one of the names is an injected fault."""
+        return bool({*self.named} & {*self.trial.effects})
+
+    @property
+    def wrong(self) -> set[str]:
+        """Names that are not injected faults. Discovered terms and free forms are no names."""
+        return {*self.named} - {*self.trial.effects, MISSING_TERM, *(form.cause for form in FREE_FORMS)}
 
     @property
     def exact(self) -> bool:

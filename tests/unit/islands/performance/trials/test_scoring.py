@@ -65,8 +65,11 @@ def test_every_outcome_is_counted_in_its_scores() -> None:
         "false names on clean records": (1, 2),
         "pairs exact": (1, 2),
         "triples exact": (0, 0),
-        "unknown causes silently misnamed": (2, 3),
-        "unknown causes misnamed with a confidence above 0.9": (0, 3),
+        "unknown causes silently misnamed": (1, 2),
+        "unknown causes misnamed with a confidence above 0.9": (0, 2),
+        "known cause named, next to an unknown one": (1, 1),
+        "known cause and an equation or a family, next to an unknown one": (0, 1),
+        "wrong name next to an unknown cause": (0, 1),
     }
 
 
@@ -129,6 +132,20 @@ def test_confidences_are_compared_with_frequencies() -> None:
     misnamed = counted(*outcomes)["unknown causes misnamed with a confidence above 0.9"]
     assert misnamed == (1, 2)
     assert row.kept is False
+
+
+def test_mixed_records_count_the_known_cause_and_the_equation() -> None:
+    found = counted(
+        outcome(("jump", "ripple"), ("missing-term", "jump"), verdict="discovered"),
+        outcome(("jump", "ripple"), ("jump", "stiffness-curve"), verdict="family"),
+        outcome(("jump", "ripple"), ("jump", "delay"), verdict="named"),
+        outcome(("jump", "ripple"), (), verdict="unknown"),
+        outcome(("ripple",), ("jump",), verdict="named"),
+    )
+    assert found["known cause named, next to an unknown one"] == (3, 4)
+    assert found["known cause and an equation or a family, next to an unknown one"] == (2, 4)
+    assert found["wrong name next to an unknown cause"] == (1, 4)
+    assert found["unknown causes silently misnamed"] == (1, 1)
 
 
 def test_full_confidence_is_in_the_last_bin() -> None:
