@@ -22,7 +22,7 @@ _VERDICTS = {
     Verdict.REMAINDER: "The simulation lacks a known effect, which explains most of the discrepancy.",
     Verdict.UNKNOWN: "The simulation is wrong, and no known effect explains the discrepancy.",
     Verdict.FAMILY: "The simulation lacks an effect of this kind, whose shape is that of no known effect.",
-    Verdict.DISCOVERED: "The equations lack terms, which were found. No known effect explains as much.",
+    Verdict.DISCOVERED: "The equations lack terms, which were found. Known effects alone explain less.",
     Verdict.GROSS_ERROR: "Record and simulation do not match as they are: correct the record first.",
 }
 
@@ -44,13 +44,16 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     lines = [_verdict(found)]
     lines += [f"  {_finding(finding)}" for finding in found.effects]
     lines += [f"Record: {each.text}" for each in found.record_findings]
-    if found.discovery is not None and found.verdict != Verdict.DISCOVERED:
-        lines.append(f"Equations that explain the record as well: {found.discovery.equations}")
-    elif found.discovery is not None:
-        others, worse_by = " and ".join(found.discovery.nearest), found.discovery.worse_by
-        lines.append(f"Equations: {found.discovery.equations}")
-        if others:
-            lines.append(f"The nearest known effect, {others}, has a score that is worse by {worse_by:.0f}.")
+    if (discovery := found.discovery) is not None:
+        is_cause = found.verdict == Verdict.DISCOVERED
+        effects = f", with {' and '.join(discovery.effects)}" if discovery.effects and not is_cause else ""
+        which = "" if is_cause else f" that explain the record as well{effects}"
+        lines.append(f"Equations{which}: {discovery.equations}")
+        if is_cause and discovery.nearest:
+            others = " and ".join(discovery.nearest)
+            lines.append(
+                f"With {others} instead of the terms, the score is worse by {discovery.worse_by:.0f}."
+            )
     if found.verdict == Verdict.UNKNOWN:
         nearest = ", ".join(candidate.name for candidate in found.candidates[:3])
         dependence = ", ".join(found.residual_structure) or "its own past"

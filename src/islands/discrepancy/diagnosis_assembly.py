@@ -96,7 +96,8 @@ def extend_equations(
     if (added := terms.outcome) is not None:
         screened = screen_effects(added.base, added.target, effects, parallel_map)
         added = replace(added, screened=screened, hypothesis=replace(added.hypothesis, fit=fit))
-        findings += describe_effects(added, effects, None, parallel_map)[0]
+        described = describe_effects(added, effects, None, parallel_map)[0]
+        findings += tuple(replace(each, is_claimed=each.confidence >= MIN_CONFIDENCE) for each in described)
     return replace(
         found,
         verdict=Verdict.DISCOVERED,

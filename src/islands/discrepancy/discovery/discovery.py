@@ -6,17 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
     estimate_deviations,
     evaluate_fit,
 )
 from islands.discrepancy.calibration.target import Target
+from islands.discrepancy.discovery.equation_simulator import find_equations
 from islands.discrepancy.discovery.joint_search import JointResult, search_jointly
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.inference.confidence import CONFIDENCE_TEMPERATURE
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, Finding, Rival, Value
-from islands.discrepancy.inference.holdout import cross_validate_gain
+from islands.discrepancy.inference.holdout import bound_reduction, cross_validate_gain
+from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.strategies import SearchOutcome
 from islands.discrepancy.inference.verdict import Verdict, explained_fraction
@@ -42,14 +45,17 @@ class Discovery:
     ----------
     equations : str
         Extended equations, and the values of their new parameters.
+    effects : tuple of str
+        Names of the effects that act in addition to the terms.
     nearest : tuple of str
-        Names of the effects that explain the record best, without those that act in addition to the terms.
+        Names of the effects that explain the record best without the terms, except those in ``effects``.
     worse_by : float
         Difference between the score of the effects and that of the equations; negative if effects without
         terms explain the record better.
     """
 
     equations: str
+    effects: tuple[str, ...]
     nearest: tuple[str, ...]
     worse_by: float
 
@@ -128,31 +134,65 @@ def find_missing_terms(
     MissingTerms or None
         None if the simulator has no equations, or if no term gains enough.
     """
-    found = search_terms(base, target, parallel_map)
-    terms = None if found is None else _compare(JointResult(found), base, alone, target)
+    if find_equations(base.simulation.simulator) is None:
+        return None
+    effects_alone = _score_effects(alone, base, target)
+    found = search_terms(base, target, parallel_map, effects_alone.cost)
+    terms = None if found is None else _compare(JointResult(found), effects_alone)
     if alone.target.effective_samples is not None:
         return terms  # A search with model error has no noise model that further effects could whiten.
-    is_named = len(alone.hypothesis.effects) == 1 and alone.verdict == Verdict.NAMED
-    if is_named and (terms is None or not terms.is_better(alone)):
+    is_better = terms is not None and terms.is_better(alone)
+    if not is_better and len(alone.hypothesis.effects) == 1 and alone.verdict == Verdict.NAMED:
         return terms
-    joint = search_jointly(found, base, alone, target, effects, fitted, rng, parallel_map)
-    return None if joint is None else _compare(joint, base, alone, target)
+    if (
+        is_better
+        and found is not None
+        and _is_contradicted(found.fit, effects_alone.fit, target, fitted, rng)
+    ):
+        return terms
+    joint = search_jointly(found, base, alone, effects_alone.cost, target, effects, fitted, rng, parallel_map)
+    if joint is None:
+        return terms
+    together = _compare(joint, effects_alone)
+    if terms is None or (together.is_better(alone), -joint.terms.cost) > (is_better, -terms.search.cost):
+        return together
+    return terms
 
 
-def _compare(
-    joint: JointResult, base: CalibrationResult, alone: SearchOutcome, target: Target
-) -> MissingTerms:
-    """Compare terms with effects alone, or with the nearest effect if there are none."""
+def _is_contradicted(
+    after: CalibrationResult, before: CalibrationResult, target: Target, fitted: int, rng: np.random.Generator
+) -> bool:
+    """Return whether a fit with the better score has the larger error in the hold-out part.
+
+    The residual is then no noise, and scores of further terms say nothing.
+    """
+    holdout = np.flatnonzero(~np.isnan(target.y[fitted:])) + fitted
+    errors = [
+        (target.y - fit_initial_states(each, target, fitted).output)[holdout] for each in (before, after)
+    ]
+    return bound_reduction(errors[0], errors[1], rng)[1] < 0.0
+
+
+def _score_effects(alone: SearchOutcome, base: CalibrationResult, target: Target) -> Hypothesis:
+    """Return the effects alone, or the nearest one if there are none, with their cost for a target."""
     hypothesis = alone.hypothesis
     nearest = [] if hypothesis.effects else [each for each in alone.screened if not each.effect.is_free][:1]
     effects = hypothesis.effects or tuple(each.effect for each in nearest)
     fit = nearest[0].fit if nearest else hypothesis.fit
     # The scores of a search with model error count other samples.
     scored = evaluate_fit(fit.simulation, target, fit.values)
-    cost = scored.score + sum(bic_penalty(effect, base) for effect in effects)
-    names = tuple(dict.fromkeys(effect.cause for effect in effects if effect not in joint.terms.effects))
-    discovery = Discovery(joint.terms.describe(), names, cost - joint.terms.cost)
-    return MissingTerms(joint.terms, discovery, joint.outcome)
+    return Hypothesis(scored, scored.score + sum(bic_penalty(effect, base) for effect in effects), effects)
+
+
+def _compare(joint: JointResult, alone: Hypothesis) -> MissingTerms:
+    """Compare terms with effects alone."""
+    terms = joint.terms
+    added, replaced = (
+        tuple(dict.fromkeys(effect.cause for effect in each))
+        for each in (terms.effects, [effect for effect in alone.effects if effect not in terms.effects])
+    )
+    discovery = Discovery(terms.describe(), added, replaced, alone.cost - terms.cost)
+    return MissingTerms(terms, discovery, joint.outcome)
 
 
 def replaces_effects(

@@ -14,13 +14,12 @@ from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResul
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.effects import catalogue_order
-from islands.discrepancy.inference.hypothesis import Hypothesis
+from islands.discrepancy.inference.hypothesis import Hypothesis, with_effect
 from islands.discrepancy.inference.screening import screen_effects, transfer_parameters
 from islands.discrepancy.inference.stepwise_search import (
     MIN_GAIN,
     eliminate_backward,
     refit_with_ar_noise,
-    stepwise_search,
 )
 from islands.discrepancy.inference.strategies import (
     SearchOutcome,
@@ -31,7 +30,6 @@ from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.evolution.progress import ignore_progress
 
 
 class JointResult(NamedTuple):
@@ -52,16 +50,17 @@ def search_jointly(
     found: TermSearchResult | None,
     base: CalibrationResult,
     alone: SearchOutcome,
+    least: float,
     target: Target,
     effects: Sequence[Effect],
     fitted: int,
     rng: np.random.Generator,
     parallel_map: ParallelMap = map,
 ) -> JointResult | None:
-    """Search for terms with effects in the simulation, and return the best terms, with or without effects.
+    """Search for terms with effects in the simulation; return None if none are found, or no effect remains.
 
-    The effects are those that improve the equations with the given terms, those of a hypothesis without one
-    of them, and a single one that leaves a remainder.
+    The effects are those of a hypothesis without one of them, a single one that leaves a remainder, and the
+    best one in addition to terms that explain more than a hypothesis.
 
     Parameters
     ----------
@@ -71,6 +70,8 @@ def search_jointly(
         The simulation without effects, calibrated to unweighted residuals.
     alone : SearchOutcome
         Outcome of the search for effects without terms.
+    least : float
+        Cost of these effects.
     target : Target
         Target of ``base``.
     effects : sequence of Effect
@@ -79,15 +80,18 @@ def search_jointly(
         Number of samples used for estimation.
     """
     starts = _list_starts(alone)
-    if found is not None:
-        starts += _add_effects(found, target, effects, parallel_map)
-    results = [] if found is None else [JointResult(found)]
+    if found is not None and (found.cost < least or len(alone.hypothesis.effects) < 2):
+        starts += _add_effect(found, target, effects, parallel_map)
+    best: TermSearchResult | None = None
     for kept in {frozenset(each.effects): each for each in starts}.values():
         if kept.effects and not any(each.is_free or each.family == "scale" for each in kept.effects):
-            terms = _search_with(kept, base, target, parallel_map)
-            if terms is not None:
-                results += _assess_effects(terms, target, effects, fitted, rng, parallel_map)
-    return min(results, key=lambda each: each.terms.cost, default=None)
+            terms = _search_one_term(kept, base, target, parallel_map)
+            if terms is not None and (best is None or terms.cost < best.cost):
+                best = terms
+    if best is None:
+        return None
+    terms = search_terms(best.base, target, parallel_map, least, best)
+    return _assess_effects(terms or best, target, effects, fitted, rng, parallel_map)
 
 
 def _list_starts(alone: SearchOutcome) -> list[Hypothesis]:
@@ -101,30 +105,27 @@ def _list_starts(alone: SearchOutcome) -> list[Hypothesis]:
     ]
 
 
-def _add_effects(
+def _add_effect(
     found: TermSearchResult, target: Target, effects: Sequence[Effect], parallel_map: ParallelMap
 ) -> list[Hypothesis]:
-    """Return the best hypothesis on the equations with terms.
-
-    The terms are searched for again with its effects, so that those that gain nothing alone are left out.
-    """
-    fit, whitened = found.fit, whiten_target(target, found.fit)
-    screened = screen_effects(fit, whitened, effects, parallel_map)
-    gaining = [each.effect for each in screened if each.score_gain(fit) > 0.0]
-    return [stepwise_search(fit, screened, whitened, gaining, ignore_progress, parallel_map)[0]]
+    """Return the hypothesis of the effect that improves the equations with terms most, if one does."""
+    fit = found.fit
+    screened = screen_effects(fit, whiten_target(target, fit), effects, parallel_map)
+    alone = Hypothesis(fit, found.cost, ())
+    return [with_effect(alone, each) for each in screened[:1] if each.score_gain(fit) > MIN_GAIN]
 
 
-def _search_with(
+def _search_one_term(
     kept: Hypothesis, base: CalibrationResult, target: Target, parallel_map: ParallelMap
 ) -> TermSearchResult | None:
-    """Search for terms with the effects of a hypothesis in the simulation of ``base``."""
+    """Search for a term with the effects of a hypothesis in the simulation of ``base``."""
     simulation = base.simulation.with_effects(catalogue_order(kept.effects))
     whitened = whiten_target(target, kept.fit)
     start = _copy_effects(kept, simulation, transfer_parameters(base.values, base.simulation, simulation))
-    terms = search_terms(calibrate(simulation, whitened, start), target, parallel_map)
+    terms = search_terms(calibrate(simulation, whitened, start), target, parallel_map, max_terms=1)
     if terms is None:
         return None
-    # As long as terms were missing, the fit may have moved an instant or a frequency to another optimum.
+    # Without the term, the fit may have moved an instant or a frequency to another optimum.
     values = _copy_effects(kept, terms.fit.simulation, terms.fit.values)
     again = calibrate(terms.fit.simulation, whitened, values)
     return replace(terms, fit=again) if again.score < terms.fit.score else terms
@@ -145,8 +146,8 @@ def _assess_effects(
     fitted: int,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
-) -> list[JointResult]:
-    """Return the terms with those of their effects that pass the tests of effects; none if no effect does."""
+) -> JointResult | None:
+    """Return the terms with those of their effects that pass the tests of effects; None if no effect does."""
     fit, whitened = terms.fit, whiten_target(target, terms.fit)
     simulation = fit.simulation.with_effects(())
     without = calibrate(simulation, whitened, transfer_parameters(fit.values, fit.simulation, simulation))
@@ -155,10 +156,10 @@ def _assess_effects(
     outcome = assess_evidence(make_outcome(without, (), whitened, hypothesis), fitted, effects, rng)
     kept = outcome.hypothesis
     if not kept.effects:
-        return []
+        return None
     base = terms.base
     if set(kept.effects) != set(terms.effects):
         simulation = base.simulation.with_effects(catalogue_order(kept.effects))
         start = transfer_parameters(base.values, base.simulation, simulation)
         base = calibrate(simulation, whitened, start)
-    return [JointResult(replace(terms, base=base, fit=kept.fit), outcome)]
+    return JointResult(replace(terms, base=base, fit=kept.fit), outcome)

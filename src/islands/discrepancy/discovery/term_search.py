@@ -39,6 +39,10 @@ MAX_TERMS = 3
 #: Number of terms of each step that are fitted with all parameters.
 FITTED_TERMS = 12
 
+#: Ratio of the gains of a term and of the one before that is expected at most. Of terms that act together,
+#: the second one may gain more than the first.
+MAX_GAIN_RATIO = 2.0
+
 
 @dataclass(frozen=True, slots=True)
 class DiscoveredTerm:
@@ -117,7 +121,12 @@ class TermSearchResult:
 
 
 def search_terms(
-    base: CalibrationResult, target: Target, parallel_map: ParallelMap = map
+    base: CalibrationResult,
+    target: Target,
+    parallel_map: ParallelMap = map,
+    least: float = np.inf,
+    start: TermSearchResult | None = None,
+    max_terms: int = MAX_TERMS,
 ) -> TermSearchResult | None:
     """Add terms to the equations of a simulation as long as each gains more than any would by chance.
 
@@ -128,6 +137,12 @@ def search_terms(
     target : Target
     parallel_map : ParallelMap
         Fits the terms.
+    least : float
+        Cost of another explanation. The search ends if further terms are not expected to reach it.
+    start : TermSearchResult, optional
+        Result of a search with fewer terms, which is continued.
+    max_terms : int
+        Maximum number of terms.
 
     Returns
     -------
@@ -148,14 +163,18 @@ def search_terms(
         OUTPUT: context.output_peak,
         **{name: sizes[f"d{name}/dt"] for name, _ in system.derivatives},
     }
-    found, unweighted = TermSearchResult(base, base, ()), target
-    while len(found.terms) < MAX_TERMS:
+    found, unweighted = start or TermSearchResult(base, base, ()), target
+    while len(found.terms) < max_terms:
         target = whiten_target(target, found.fit)
         found = _improve(found, calibrate(found.fit.simulation, target, found.fit.values))
         best = _find_best_term(found, target, unweighted, candidates, target_sizes, parallel_map)
         if best is None or best.cost > found.cost - MIN_GAIN:
             break
+        before = found.cost
         found = _eliminate_terms(_select_discretisation(best, target), system, target, target_sizes)
+        missing = max_terms - len(found.terms)
+        if found.cost - missing * MAX_GAIN_RATIO * (before - found.cost) > least:
+            break
     return found if found.terms else None
 
 

@@ -65,7 +65,8 @@ class Finding:
         Fraction of the explainable misfit that the cause explains; None for a property of the noise.
     is_claimed : bool
         Whether it is claimed as a cause. If a remainder shows that the simulation is still wrong, only the
-        first effect is: further ones may follow its wrong form.
+        first effect is: further ones may follow its wrong form. An effect next to discovered terms is not
+        if others are much more probable.
     """
 
     name: str

@@ -13,7 +13,7 @@ from islands.discrepancy.discovery.discovery import Discovery
 from islands.discrepancy.inference.verdict import Verdict
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
-EQUATIONS = Discovery("dx/dt = -x + a1*x**3; a1 = 0.2", ("cubic-stiffness",), 2.0)
+EQUATIONS = Discovery("dx/dt = -x + a1*x**3; a1 = 0.2", ("jump",), ("cubic-stiffness",), 2.0)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,8 @@ def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis
     ):
         assert ["a1*x**3" in text for text in texts] == [True, True, False]
         assert ["explain the record as well" in text for text in texts] == [False, True, False]
-        assert ["nearest known effect" in text for text in texts] == [True, False, False]
+        assert ["instead of the terms" in text for text in texts] == [True, False, False]
+        assert [", with jump:" in text for text in texts] == [False, True, False]
 
 
 @pytest.mark.ci
