@@ -24,6 +24,10 @@ DRAWS = 2000
 #: the cases.
 CONFIDENCE_TEMPERATURE = 2.0
 
+#: Fraction of a misfit that the nearest effect of a cause outside the catalogue leaves at least. In trials it
+#: is 0.006 to 0.16.
+UNLISTED_REMAINDER = 0.005
+
 #: Seed of the draws. It is fixed, so that the same fits have the same confidence.
 SEED = 36
 
@@ -57,6 +61,21 @@ def sum_squares_by_block(fit: CalibrationResult, reference: CalibrationResult, t
     weight = noise.effective_samples / squares.size
     sums: Signal = weight * sum_by_block(squares, BLOCKS) / noise.variance
     return sums
+
+
+def make_unlisted_cause(named: ScoredAlternative, remainder: float) -> ScoredAlternative:
+    """Return the alternative that a cause outside the catalogue resembles the named one.
+
+    If a remainder is left, it is as probable as the named cause together with another one, unless the
+    remainder is small.
+
+    Parameters
+    ----------
+    remainder : float
+        Fraction of the misfit that the named cause leaves; larger than zero.
+    """
+    odds = min(1.0, remainder / UNLISTED_REMAINDER)
+    return ScoredAlternative(named.score + 2.0 * float(np.log(odds)), named.squares)
 
 
 def compute_confidence(named: ScoredAlternative, others: Sequence[ScoredAlternative]) -> float:

@@ -12,13 +12,14 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
 from islands.discrepancy.inference.confidence import (
     ScoredAlternative,
     compute_confidence,
+    make_unlisted_cause,
     sum_squares_by_block,
 )
 from islands.discrepancy.inference.confounders import Confounder, find_confounder
 from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, find_alternatives
 from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
 from islands.discrepancy.inference.strategies import SearchOutcome
-from islands.discrepancy.inference.verdict import choose_reference_fit, explained_fraction
+from islands.discrepancy.inference.verdict import Verdict, choose_reference_fit, explained_fraction
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 
@@ -175,7 +176,12 @@ def describe_effects(
                 values = _scale_values(confounder, values, hypothesis.fit)
         nothing = ScoredAlternative(0.0, sum_squares_by_block(without.fit, hypothesis.fit, target))
         named = scored.pop(name)
-        confidence = compute_confidence(named, [*scored.values(), nothing])
+        others = [*scored.values(), nothing]
+        reference = choose_reference_fit(hypothesis, without.fit, target)
+        explained = explained_fraction(reference, hypothesis.fit, outcome.noise_floor)
+        if outcome.verdict == Verdict.REMAINDER and explained < 1.0:
+            others.append(make_unlisted_cause(named, 1.0 - explained))
+        confidence = compute_confidence(named, others)
         free = {each.effect.cause for each, _ in rivals if each.effect.is_free}
         equal = {
             each
@@ -183,7 +189,6 @@ def describe_effects(
             if other.score > named.score - (0.0 if each in free else EQUIVALENCE_MARGIN)
         }
         equivalents += [each for each, _ in rivals if each.effect.cause in equal]
-        reference = choose_reference_fit(hypothesis, without.fit, target)
         findings.append(
             Finding(
                 name,
@@ -192,7 +197,7 @@ def describe_effects(
                 tuple(sorted(equal, key=lambda name: -scored[name].score)),
                 values,
                 named.score,
-                explained_fraction(reference, hypothesis.fit, outcome.noise_floor),
+                explained,
             )
         )
     return tuple(findings), tuple(equivalents)

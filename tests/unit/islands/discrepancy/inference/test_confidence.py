@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from islands.discrepancy.inference.confidence import BLOCKS, ScoredAlternative, compute_confidence
+from islands.discrepancy.inference.confidence import (
+    BLOCKS,
+    ScoredAlternative,
+    compute_confidence,
+    make_unlisted_cause,
+)
+from islands.performance.trials.trial import Trial, run_trial
 
 EVEN = np.full(BLOCKS, 10.0)
 
@@ -34,3 +40,17 @@ def test_blocks_that_contradict_each_other_lower_the_confidence() -> None:
 def test_alternative_with_the_same_simulation_is_weighed_by_its_score() -> None:
     named, other = ScoredAlternative(60.0, EVEN), ScoredAlternative(56.0, None)
     assert compute_confidence(named, [other]) == pytest.approx(1.0 / (1.0 + np.exp(-1.0)))
+
+
+def test_remainder_lowers_the_confidence_unless_it_is_small() -> None:
+    named = ScoredAlternative(60.0, EVEN)
+    remainders = (5e-7, 5e-4, 0.005, 0.3)
+    confidences = [compute_confidence(named, [make_unlisted_cause(named, each)]) for each in remainders]
+    assert confidences == pytest.approx([1.0 / (1.0 + odds) for odds in (1e-4, 0.1, 1.0, 1.0)])
+
+
+@pytest.mark.ci
+def test_name_of_an_unlisted_cause_that_leaves_a_remainder_is_not_certain() -> None:
+    found = run_trial(Trial(("cubic-damping",), 910005, core="column"))
+    assert (found.verdict, found.named[0]) == ("named with remainder", "quadratic-drag")
+    assert found.confidence < 0.6
