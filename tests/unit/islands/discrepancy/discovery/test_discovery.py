@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,10 +23,13 @@ from islands.discrepancy.discovery.term_search import TermSearchResult, search_t
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.io.diagnosis_json import diagnosis_document
+from islands.io.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.io.simulator_spec.ode_spec import OdeSpec
+from islands.io.simulator_spec.specification import LocalExtendedSpec
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise
+from support.equation_programs import run_c
 
 DT = 0.01
 
@@ -230,11 +234,14 @@ def test_effect_and_missing_term_are_found_together(name: str) -> None:
 
 
 @pytest.mark.ci
-def test_extension_by_a_term_and_an_effect_is_simulated_and_exported() -> None:
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
+def test_extension_by_a_term_and_an_effect_is_simulated_and_exported(tmp_path: Path) -> None:
     found = diagnose_with_jump("bilinear")
     document = json.loads(extended_json(found.best, found.record))
     other = add_jump(simulate(LAWS["bilinear"][0], seed=2), 0.05)
     assert np.std(other.y - simulate_spec(document, other)) < 0.02 * np.std(other.y)
+    program = run_c(LocalExtendedSpec.model_validate(document), found.record, tmp_path)
+    np.testing.assert_allclose(program, found.best.output, atol=1e-9)
 
 
 @pytest.mark.ci
