@@ -44,16 +44,14 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     lines = [_verdict(found)]
     lines += [f"  {_finding(finding)}" for finding in found.effects]
     lines += [f"Record: {each.text}" for each in found.record_findings]
-    if (discovery := found.discovery) is not None:
-        is_cause = found.verdict == Verdict.DISCOVERED
-        effects = f", with {' and '.join(discovery.effects)}" if discovery.effects and not is_cause else ""
-        which = "" if is_cause else f" that explain the record as well{effects}"
-        lines.append(f"Equations{which}: {discovery.equations}")
-        if is_cause and discovery.nearest:
-            others = " and ".join(discovery.nearest)
-            lines.append(
-                f"With {others} instead of the terms, the score is worse by {discovery.worse_by:.0f}."
-            )
+    if (discovery := found.discovery) is not None and found.verdict == Verdict.DISCOVERED:
+        lines.append(f"Equations: {discovery.equations}")
+        if others := " and ".join(discovery.nearest):
+            worse_by = f"{discovery.worse_by:.0f}"
+            lines.append(f"With {others} instead of the terms, the score is worse by {worse_by}.")
+    elif discovery is not None:
+        effects = f", with {' and '.join(discovery.effects)}" if discovery.effects else ""
+        lines.append(f"Equations that explain the record as well{effects}: {discovery.equations}")
     if found.verdict == Verdict.UNKNOWN:
         nearest = ", ".join(candidate.name for candidate in found.candidates[:3])
         dependence = ", ".join(found.residual_structure) or "its own past"

@@ -94,7 +94,9 @@ def extend_equations(
         return found
     findings = describe_terms(replace(terms.search, fit=fit), terms.discovery, found.base, target, floor**2)
     if (added := terms.outcome) is not None:
-        screened = screen_effects(added.base, added.target, effects, parallel_map)
+        # Alternatives of several effects are screened without each of them.
+        is_single = len(added.hypothesis.effects) == 1
+        screened = screen_effects(added.base, added.target, effects, parallel_map) if is_single else ()
         added = replace(added, screened=screened, hypothesis=replace(added.hypothesis, fit=fit))
         described = describe_effects(added, effects, None, parallel_map)[0]
         findings += tuple(replace(each, is_claimed=each.confidence >= MIN_CONFIDENCE) for each in described)

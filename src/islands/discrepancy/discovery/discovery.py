@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
     estimate_deviations,
@@ -18,7 +17,11 @@ from islands.discrepancy.discovery.joint_search import JointResult, search_joint
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.inference.confidence import CONFIDENCE_TEMPERATURE
 from islands.discrepancy.inference.finding import EQUIVALENCE_MARGIN, Finding, Rival, Value
-from islands.discrepancy.inference.holdout import bound_reduction, cross_validate_gain
+from islands.discrepancy.inference.holdout import (
+    bound_reduction,
+    compute_holdout_errors,
+    cross_validate_gain,
+)
 from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.strategies import SearchOutcome
@@ -144,11 +147,7 @@ def find_missing_terms(
     is_better = terms is not None and terms.is_better(alone)
     if not is_better and len(alone.hypothesis.effects) == 1 and alone.verdict == Verdict.NAMED:
         return terms
-    if (
-        is_better
-        and found is not None
-        and _is_contradicted(found.fit, effects_alone.fit, target, fitted, rng)
-    ):
+    if terms and is_better and _is_contradicted(terms.search.fit, effects_alone.fit, target, fitted, rng):
         return terms
     joint = search_jointly(found, base, alone, effects_alone.cost, target, effects, fitted, rng, parallel_map)
     if joint is None:
@@ -166,11 +165,8 @@ def _is_contradicted(
 
     The residual is then no noise, and scores of further terms say nothing.
     """
-    holdout = np.flatnonzero(~np.isnan(target.y[fitted:])) + fitted
-    errors = [
-        (target.y - fit_initial_states(each, target, fitted).output)[holdout] for each in (before, after)
-    ]
-    return bound_reduction(errors[0], errors[1], rng)[1] < 0.0
+    old, new = (compute_holdout_errors(each, target, fitted) for each in (before, after))
+    return bound_reduction(old, new, rng)[1] < 0.0
 
 
 def _score_effects(alone: SearchOutcome, base: CalibrationResult, target: Target) -> Hypothesis:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.discovery.candidate_terms import CandidateTerm
+from islands.discrepancy.inference.screening import transfer_effects
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -50,8 +51,7 @@ def add_terms(
     start = simulation.nominal
     part = simulation.simulator_slice
     start[part] = [values.get(each.name, each.nominal) for each in simulation.parameters[part]]
-    for effect in simulation.effects:
-        start[simulation.get_slice(effect)] = fit.values[fit.simulation.get_slice(effect)]
+    transfer_effects(fit.values, fit.simulation, start, simulation)
     return simulation, start
 
 

@@ -15,21 +15,16 @@ from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.hypothesis import Hypothesis, with_effect
-from islands.discrepancy.inference.screening import screen_effects, transfer_parameters
-from islands.discrepancy.inference.stepwise_search import (
-    MIN_GAIN,
-    eliminate_backward,
-    refit_with_ar_noise,
+from islands.discrepancy.inference.screening import (
+    screen_effects,
+    transfer_effects,
+    transfer_parameters,
 )
-from islands.discrepancy.inference.strategies import (
-    SearchOutcome,
-    assess_evidence,
-    make_outcome,
-)
+from islands.discrepancy.inference.stepwise_search import MIN_GAIN, eliminate_backward, refit_with_ar_noise
+from islands.discrepancy.inference.strategies import SearchOutcome, assess_evidence, make_outcome
 from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.interfaces.effect import Effect, Signal
+from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
-from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 
 class JointResult(NamedTuple):
@@ -66,25 +61,17 @@ def search_jointly(
     ----------
     found : TermSearchResult or None
         Terms that were found without effects.
-    base : CalibrationResult
-        The simulation without effects, calibrated to unweighted residuals.
-    alone : SearchOutcome
-        Outcome of the search for effects without terms.
     least : float
-        Cost of these effects.
-    target : Target
-        Target of ``base``.
-    effects : sequence of Effect
-        Effects that are searched for.
-    fitted : int
-        Number of samples used for estimation.
+        Cost of the effects without terms.
+    base, alone, target, effects, fitted
+        Arguments of `discovery.find_missing_terms`.
     """
     starts = _list_starts(alone)
     if found is not None and (found.cost < least or len(alone.hypothesis.effects) < 2):
         starts += _add_effect(found, target, effects, parallel_map)
     best: TermSearchResult | None = None
     for kept in {frozenset(each.effects): each for each in starts}.values():
-        if kept.effects and not any(each.is_free or each.family == "scale" for each in kept.effects):
+        if not any(each.is_free or each.family == "scale" for each in kept.effects):
             terms = _search_one_term(kept, base, target, parallel_map)
             if terms is not None and (best is None or terms.cost < best.cost):
                 best = terms
@@ -121,22 +108,16 @@ def _search_one_term(
     """Search for a term with the effects of a hypothesis in the simulation of ``base``."""
     simulation = base.simulation.with_effects(catalogue_order(kept.effects))
     whitened = whiten_target(target, kept.fit)
-    start = _copy_effects(kept, simulation, transfer_parameters(base.values, base.simulation, simulation))
+    start = transfer_parameters(base.values, base.simulation, simulation)
+    transfer_effects(kept.fit.values, kept.fit.simulation, start, simulation)
     terms = search_terms(calibrate(simulation, whitened, start), target, parallel_map, max_terms=1)
     if terms is None:
         return None
     # Without the term, the fit may have moved an instant or a frequency to another optimum.
-    values = _copy_effects(kept, terms.fit.simulation, terms.fit.values)
+    values = terms.fit.values.copy()
+    transfer_effects(kept.fit.values, kept.fit.simulation, values, terms.fit.simulation)
     again = calibrate(terms.fit.simulation, whitened, values)
     return replace(terms, fit=again) if again.score < terms.fit.score else terms
-
-
-def _copy_effects(source: Hypothesis, simulation: ExtendedSimulator, values: Signal) -> Signal:
-    """Return values of a simulation, those of its effects from a hypothesis."""
-    copied = values.copy()
-    for effect in simulation.effects:
-        copied[simulation.get_slice(effect)] = source.fit.values[source.fit.simulation.get_slice(effect)]
-    return copied
 
 
 def _assess_effects(
@@ -149,8 +130,7 @@ def _assess_effects(
 ) -> JointResult | None:
     """Return the terms with those of their effects that pass the tests of effects; None if no effect does."""
     fit, whitened = terms.fit, whiten_target(target, terms.fit)
-    simulation = fit.simulation.with_effects(())
-    without = calibrate(simulation, whitened, transfer_parameters(fit.values, fit.simulation, simulation))
+    without = _calibrate_with(fit, (), whitened)
     (hypothesis,), whitened = refit_with_ar_noise([Hypothesis(fit, terms.cost, terms.effects)], whitened)
     hypothesis = eliminate_backward(hypothesis, whitened, MIN_GAIN, parallel_map)
     outcome = assess_evidence(make_outcome(without, (), whitened, hypothesis), fitted, effects, rng)
@@ -159,7 +139,11 @@ def _assess_effects(
         return None
     base = terms.base
     if set(kept.effects) != set(terms.effects):
-        simulation = base.simulation.with_effects(catalogue_order(kept.effects))
-        start = transfer_parameters(base.values, base.simulation, simulation)
-        base = calibrate(simulation, whitened, start)
+        base = _calibrate_with(base, kept.effects, whitened)
     return JointResult(replace(terms, base=base, fit=kept.fit), outcome)
+
+
+def _calibrate_with(fit: CalibrationResult, effects: Sequence[Effect], target: Target) -> CalibrationResult:
+    """Calibrate the simulation of a fit with some of its effects."""
+    simulation = fit.simulation.with_effects(catalogue_order(effects))
+    return calibrate(simulation, target, transfer_parameters(fit.values, fit.simulation, simulation))

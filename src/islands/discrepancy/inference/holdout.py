@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.data.dataset import Dataset
+from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.effect import Signal
@@ -92,6 +93,12 @@ def measure_gain(
         100 * (1 - rmse[1] / rmse[0]),
         (low, high),
     )
+
+
+def compute_holdout_errors(fit: CalibrationResult, target: Target, fitted: int) -> Signal:
+    """Return the errors of a fit at the samples of the hold-out part that are not missing."""
+    errors: Signal = (target.y - fit_initial_states(fit, target, fitted).output)[fitted:]
+    return errors[~np.isnan(target.y[fitted:])]
 
 
 def bound_reduction(before: Signal, after: Signal, rng: np.random.Generator) -> tuple[float, float]:

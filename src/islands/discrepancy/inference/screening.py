@@ -122,10 +122,17 @@ def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSim
     """Return the values of a simulation for one with other effects; new effects have their nominal values."""
     transferred = new.nominal
     transferred[new.simulator_slice] = values[old.simulator_slice]
+    transfer_effects(values, old, transferred, new)
+    return transferred
+
+
+def transfer_effects(
+    values: Signal, old: ExtendedSimulator, transferred: Signal, new: ExtendedSimulator
+) -> None:
+    """Set the values of the effects that two simulations have in common, in place."""
     for effect in new.effects:
         if effect in old.effects:
             transferred[new.get_slice(effect)] = values[old.get_slice(effect)]
-    return transferred
 
 
 def get_starting_points(

@@ -6,12 +6,15 @@ from enum import StrEnum
 
 import numpy as np
 
-from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain, draw_noise
 from islands.discrepancy.inference.confounders import find_confounder
-from islands.discrepancy.inference.holdout import bound_reduction, cross_validate_gain
+from islands.discrepancy.inference.holdout import (
+    bound_reduction,
+    compute_holdout_errors,
+    cross_validate_gain,
+)
 from islands.discrepancy.inference.hypothesis import Hypothesis, without_effect
 from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
@@ -109,13 +112,11 @@ def withdraw_effects(
     fitted : int
         Number of samples used for estimation.
     """
-    is_judged = ~np.isnan(target.y[fitted:])
     for effect in hypothesis.effects[:0:-1]:
         if effect.family == "scale":
             continue
         without = without_effect(hypothesis, effect, target)
-        outputs = [fit_initial_states(each.fit, target, fitted).output for each in (without, hypothesis)]
-        before, after = (np.array((target.y - each)[fitted:][is_judged]) for each in outputs)
+        before, after = (compute_holdout_errors(each.fit, target, fitted) for each in (without, hypothesis))
         is_visible = np.std(after - before) > MIN_VISIBLE_FRACTION * np.std(before)
         if is_visible and bound_reduction(before, after, rng)[0] <= 0.0:
             hypothesis = without
