@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.kernels.interpreter import Program
-from islands.kernels.simulation.simulate_coupled import LANES, simulate_coupled
+from islands.kernels.simulation.simulate_coupled import LANES, MANY_LANES, simulate_coupled
 from islands.model.regressor import Regressor
 from islands.program.term_pool import link
-from islands.simulation.predictors import divergence_bound_of_range
+from islands.simulation.predictors import BOUND, divergence_bound_of_range
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,7 @@ class LinkedModel:
         ----------
         theta : ndarray, shape (runs, regressors)
         u : sequence of ndarray, each of shape (inputs, samples)
-            Inputs of each run.
+            Inputs of each run. Runs with equal ones should share the array.
         start : ndarray, shape (runs, warm_up)
             Measured output before the first prediction.
 
@@ -64,31 +64,35 @@ class LinkedModel:
         samples = u[0].shape[1]
         if samples <= self.warm_up:
             raise RecordError(f"the input has {samples} samples and the warm-up takes {self.warm_up}")
-        blocks = [
-            self._run_lanes(
-                theta[begin : begin + LANES], u[begin : begin + LANES], start[begin : begin + LANES]
-            )
-            for begin in range(0, len(theta), LANES)
-        ]
-        return np.concatenate(blocks)
+        predicted = np.empty((len(theta), samples))
+        lanes = LANES if len(theta) <= LANES else MANY_LANES
+        for begin in range(0, len(theta), lanes):
+            block = slice(begin, begin + lanes)
+            predicted[block] = self._run_lanes(theta[block], u[block], start[block])
+        predicted[:, : self.warm_up] = np.nan
+        # No bound of a run is smaller than `BOUND`.
+        if not (np.abs(predicted[:, self.warm_up :]) <= BOUND).all():
+            for run, first in zip(predicted, start, strict=True):
+                outside = ~(np.abs(run[self.warm_up :]) <= divergence_bound_of_range(first, complete=False))
+                if outside.any():
+                    run[self.warm_up + int(np.argmax(outside)) :] = np.nan
+        return predicted
 
     def _run_lanes(
         self, theta: NDArray[np.float64], u: Sequence[NDArray[np.float64]], start: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Simulate at most as many runs as a row of the kernel has lanes."""
+        """Simulate at most as many runs as a row of the kernel has lanes, shape (runs, samples)."""
         runs, (inputs, samples) = len(theta), u[0].shape
         # Lanes that are left over repeat the runs, and are ignored.
-        lanes = [lane % runs for lane in range(LANES)]
-        signals = np.empty((1 + inputs, samples, LANES))
+        lanes = [lane % runs for lane in range(LANES if runs <= LANES else MANY_LANES)]
+        signals = np.empty((1 + inputs, samples, len(lanes)))
         signals[0, : self.warm_up] = start[lanes].T
-        signals[1:] = np.array([u[lane] for lane in lanes]).transpose(1, 2, 0)
+        if all(each is u[0] for each in u):
+            signals[1:] = u[0][:, :, None]
+        else:
+            signals[1:] = np.array([u[lane] for lane in lanes]).transpose(1, 2, 0)
         ends = np.array([theta.shape[1]], dtype=np.int64)
         rows = signals.reshape(1 + inputs, -1)
         simulate_coupled(self._program, np.ascontiguousarray(theta[lanes].T), ends, self.warm_up, rows)
-        predicted = np.ascontiguousarray(signals[0, :, :runs].T)
-        predicted[:, : self.warm_up] = np.nan
-        for run, first in zip(predicted, start, strict=True):
-            outside = ~(np.abs(run[self.warm_up :]) <= divergence_bound_of_range(first, complete=False))
-            if outside.any():
-                run[self.warm_up + int(np.argmax(outside)) :] = np.nan
+        predicted: NDArray[np.float64] = signals[0, :, :runs].T
         return predicted

@@ -139,8 +139,9 @@ class CalibrationProblem:
         for index, step, output in zip(self._free, steps, shifted, strict=True):
             columns[:, index] = self._weighting.select((output - point.output) / step)
         # A simulation that diverges at the shifted value gives no information about that direction.
-        jacobian = np.nan_to_num(columns, nan=0.0)
-        return FittedPoint(point.values, point.output, point.residual, point.cost, jacobian)
+        if not np.isfinite(columns).all():
+            columns = np.nan_to_num(columns, nan=0.0)
+        return FittedPoint(point.values, point.output, point.residual, point.cost, columns)
 
     def _compare(self, values: Signal, output: Signal) -> FittedPoint:
         residual = self._weighting.residual(output)

@@ -4,14 +4,19 @@ psi is a regressor of the model, c the slope of a line over the input.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
-from islands.discrepancy.interfaces.simulator import Simulator, split_recordings
+from islands.discrepancy.interfaces.simulator import (
+    SimulationRun,
+    Simulator,
+    simulate_runs,
+    split_recordings,
+)
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
 from islands.model.model import Model
 from islands.model.primitives import MUL, PRIMITIVES, SUB
@@ -162,25 +167,29 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
         own, added = simulator.parameters, parameters(context)[:-1]
         recordings = split_recordings(simulator, context)
 
-        def simulate(change: Signal | float = 0.0, **shape: float) -> Signal:
+        def simulate(changes: Signal, shapes: Sequence[Mapping[str, float]]) -> Signal:
+            """Simulate with each change of the parameters and each shape, (simulations, fitted)."""
             outputs = []
             for each, part in recordings:
                 nominal = np.array([parameter.nominal for parameter in each.parameters])
-                outputs.append(each.simulate(nominal + change, part.u, part, shape, ()))
-            return np.concatenate(outputs)[:fitted]
+                runs = [
+                    SimulationRun(nominal + change, part.u, shape, ())
+                    for change, shape in zip(changes, shapes, strict=True)
+                ]
+                outputs.append(simulate_runs(each, runs, part))
+            return np.concatenate(outputs, axis=1)[:, :fitted]
 
-        at_rest = simulate()
-        moved = _STEP * np.diag([each.scale for each in own])
-        known = [(simulate(change) - at_rest) / _STEP for change in moved]
+        moved = np.vstack([np.zeros(len(own)), _STEP * np.diag([each.scale for each in own])])
+        at_rest, *changed = simulate(moved, [{}] * len(moved))
+        known = [(output - at_rest) / _STEP for output in changed]
         u = context.u[:fitted]
         regression_slope = float(np.polyfit(u, at_rest, 1)[0])
         trials: list[tuple[float, tuple[float, ...]]] = []
         for factor in _SLOPES:
             slope = factor * regression_slope
-            columns = known + [
-                (simulate(**{SLOPE: slope, each.name: _STEP * each.scale}) - at_rest) / _STEP
-                for each in added
-            ]
+            shapes = [{SLOPE: slope, each.name: _STEP * each.scale} for each in added]
+            outputs = simulate(np.zeros((len(shapes), len(own))), shapes)
+            columns = known + [(output - at_rest) / _STEP for output in outputs]
             design = np.column_stack(columns)
             if not np.isfinite(design).all():
                 continue

@@ -90,13 +90,16 @@ def add_output_forces(
     x: Signal, context: SimulationContext, forces: Sequence[tuple[ForceLaw, Signal]]
 ) -> Signal:
     """Return the sum of the forces on the coordinate ``x``, for a simulator without inertia."""
-    return sum_output_forces([x], context, [forces])[0]
+    total: Signal = sum_output_forces([x], context, [forces])[0]
+    return total
 
 
 def sum_output_forces(
     inputs: Sequence[Signal], context: SimulationContext, forces: Sequence[Sequence[tuple[ForceLaw, Signal]]]
-) -> list[Signal]:
-    """Return `add_output_forces` of several simulations; a law is computed once for equal inputs and values.
+) -> Signal:
+    """Return `add_output_forces` of several simulations, shape (simulations, samples).
+
+    A law is computed once for equal inputs and values.
 
     Parameters
     ----------
@@ -114,12 +117,10 @@ def sum_output_forces(
         signals |= zip(
             ((id(x), *key) for key in laws), _integrate_forces(x, context, list(laws.values())), strict=True
         )
-    sums = []
-    for x, given in zip(inputs, forces, strict=True):
-        total = np.zeros(x.size)
+    sums = np.zeros((len(inputs), inputs[0].size))
+    for row, (x, given) in enumerate(zip(inputs, forces, strict=True)):
         for law, values in given:
-            total += signals[id(x), law, values.tobytes()]
-        sums.append(total)
+            sums[row] += signals[id(x), law, values.tobytes()]
     return sums
 
 

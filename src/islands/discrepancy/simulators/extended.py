@@ -188,7 +188,8 @@ class ExtendedSimulator:
                 y = self.simulator.simulate(
                     run.values, run.x, self.context, run.effect_parameters, run.forces
                 )
-            return self._apply_output_maps(y, values)
+            mapped: Signal = self._apply_output_maps([y], values[None])[0]
+            return mapped
         return self.simulate_batch(values[None])[0]
 
     def simulate_batch(self, points: Signal, near: NDArray[np.int64] | None = None) -> Signal:
@@ -231,10 +232,7 @@ class ExtendedSimulator:
             inputs: dict[bytes, Signal] = {}
             places = {key: place for place, key in enumerate(missing)}
             runs = [
-                replace(
-                    self._make_run(values, _NONE, (), inputs),
-                    near=places[bases[key]] if key in bases else None,
-                )
+                self._make_run(values, _NONE, (), inputs, places[bases[key]] if key in bases else None)
                 for key, values in missing.items()
             ]
             with np.errstate(over="ignore", invalid="ignore"):
@@ -244,17 +242,19 @@ class ExtendedSimulator:
             self._cache.update({key: known[key].copy() for key in list(missing)[-_CACHE_SIZE:]})
             while len(self._cache) > _CACHE_SIZE:
                 del self._cache[next(iter(self._cache))]
-        return np.stack(
-            [self._apply_output_maps(known[key], values) for key, values in zip(keys, points, strict=True)]
-        )
+        return self._apply_output_maps([known[key] for key in keys], points)
 
-    def _apply_output_maps(self, y: Signal, values: Signal) -> Signal:
+    def _apply_output_maps(self, outputs: Sequence[Signal], points: Signal) -> Signal:
+        """Return the outputs of several points after the output maps; NaN if they diverge."""
+        mapped = np.stack(outputs)
         with np.errstate(over="ignore", invalid="ignore"):
             for effect, part in zip(self.effects, self._slices[1:], strict=True):
                 if effect.site == Site.OUTPUT:
-                    y = apply_map(effect, y, values[part], self.context)
-            diverged = not float(np.max(np.abs(y))) < _DIVERGENCE_FACTOR * self.context.output_peak
-        return np.full_like(y, np.nan) if diverged else y
+                    for row, values in enumerate(points):
+                        mapped[row] = apply_map(effect, mapped[row], values[part], self.context)
+            limit = _DIVERGENCE_FACTOR * self.context.output_peak
+            mapped[~(np.abs(mapped).max(axis=1) < limit)] = np.nan
+        return mapped
 
     def _make_run(
         self,
@@ -262,6 +262,7 @@ class ExtendedSimulator:
         effect_parameters: Mapping[str, float],
         further: Forces,
         inputs: dict[bytes, Signal],
+        near: int | None = None,
     ) -> SimulationRun:
         """Return the run, without output maps. Runs with equal input maps share their input in ``inputs``."""
         forces = list(further)
@@ -290,7 +291,7 @@ class ExtendedSimulator:
                 case Site.FORCE:
                     assert isinstance(effect.form, ForceLaw)
                     forces.append((effect.form, values[part]))
-        return SimulationRun(simulator_values, inputs[key], parameters, forces)
+        return SimulationRun(simulator_values, inputs[key], parameters, forces, near=near)
 
     def _get_parameter_index(self, effect: Effect) -> int:
         _, _, name = effect.name.partition(":")

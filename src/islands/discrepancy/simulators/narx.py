@@ -141,7 +141,8 @@ class NarxSimulator:
         if SLOPE in runs[0].effect_parameters:
             simulated = self._run_extended(theta, runs, start)
         else:
-            simulated = self._linked.free_runs(theta, [run.x[None] for run in runs], start)
+            inputs = {id(run.x): run.x[None] for run in runs}
+            simulated = self._linked.free_runs(theta, [inputs[id(run.x)] for run in runs], start)
         simulated[:, :warm_up] = start
         if any(run.forces for run in runs):
             simulated += sum_output_forces([run.x for run in runs], context, [run.forces for run in runs])
@@ -151,15 +152,16 @@ class NarxSimulator:
         """Run the model with the missing terms; signals are constant before the first sample."""
         missing = [[run.effect_parameters.get(term.name, 0.0) for term in self._missing] for run in runs]
         before = self._extended.warm_up - start.shape[1]
-        channels = []
+        inputs, channels = [], dict[tuple[int, float], Signal]()
         for run in runs:
-            channel = np.empty((2, run.x.size + before))
-            channel[0, :before], channel[0, before:] = run.x[0], run.x
-            channel[1] = run.effect_parameters[SLOPE]
-            channels.append(channel)
+            key = id(run.x), run.effect_parameters[SLOPE]
+            if key not in channels:
+                padded = np.concatenate([np.full(before, run.x[0]), run.x])
+                channels[key] = np.stack([padded, np.full_like(padded, key[1])])
+            inputs.append(channels[key])
         first = start[:, :1] if start.shape[1] else np.zeros((len(runs), 1))
         initial = np.hstack([np.repeat(first, before, axis=1), start])
-        return self._extended.free_runs(np.hstack([theta, missing]), channels, initial)[:, before:]
+        return self._extended.free_runs(np.hstack([theta, missing]), inputs, initial)[:, before:]
 
 
 def _is_linear_in_output(item: Regressor) -> bool:
