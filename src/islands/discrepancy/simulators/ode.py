@@ -160,7 +160,7 @@ class OdeSimulator:
             outputs = self._fit_shots(self.shots, program, active, runs, context)[:, ::every]
         if not self._has_force_equation and runs[0].forces:
             further = sum_output_forces([run.x for run in runs], context, [run.forces for run in runs])
-            outputs = outputs + np.stack(further)[:, ::every]
+            outputs = outputs + further[:, ::every]
         return outputs
 
     @property

@@ -61,7 +61,7 @@ def _make_simulator(count):
                 execute(code[index, 0], target, first, second, addresses[index], count, 1)
             term = 0
             for output in range(ends.size):
-                # The terms of an equation are added in their order, as in the simulation of a single equation.
+                # The terms of an equation are added in their order, as in the simulation of a single one.
                 y = broadcast(0.0, count)
                 while term < ends[output]:
                     a, b = places[factors[term, 0]], places[factors[term, 1]]
