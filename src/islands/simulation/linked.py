@@ -87,10 +87,10 @@ class LinkedModel:
         lanes = [lane % runs for lane in range(LANES if runs <= LANES else MANY_LANES)]
         signals = np.empty((1 + inputs, samples, len(lanes)))
         signals[0, : self.warm_up] = start[lanes].T
-        if all(each is u[0] for each in u):
-            signals[1:] = u[0][:, :, None]
-        else:
-            signals[1:] = np.array([u[lane] for lane in lanes]).transpose(1, 2, 0)
+        signals[1:] = u[0][:, :, None]
+        for lane, run in enumerate(lanes):
+            if u[run] is not u[0]:
+                signals[1:, :, lane] = u[run]
         ends = np.array([theta.shape[1]], dtype=np.int64)
         rows = signals.reshape(1 + inputs, -1)
         simulate_coupled(self._program, np.ascontiguousarray(theta[lanes].T), ends, self.warm_up, rows)
