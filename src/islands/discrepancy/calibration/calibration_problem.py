@@ -97,13 +97,13 @@ class CalibrationProblem:
     ) -> None:
         self._simulation, self._weighting = simulation, weighting
         self._inverse_std, self._nominal = inverse_std, nominal
-        self._scales, self._bounds = simulation.scales, simulation.bounds
+        self._scales = simulation.scales
         count = nominal.size
         self._free = np.arange(count) if is_fixed is None else np.flatnonzero(~is_fixed)
 
     def evaluate(self, values: Signal, with_jacobian: bool = False) -> Simulated[FittedPoint]:
-        """Simulate at the given values, clipped to their bounds, and around them for the derivatives."""
-        values = np.clip(values, *self._bounds)
+        """Simulate at the nearest values within the bounds, and around them for the derivatives."""
+        values = self._simulation.project(values[None])[0]
         if not with_jacobian:
             (output,) = yield Points(values[None])
             return self._compare(values, output)
@@ -128,10 +128,11 @@ class CalibrationProblem:
     def _list_differences(self, values: Signal) -> tuple[Signal, Signal]:
         """Return the points for the derivatives, and the step of each as a fraction of the scale."""
         free, scales = self._free, self._scales[self._free]
-        is_inside = values[free] + DIFFERENCE_STEP * scales <= self._bounds[1][free]
+        changes = np.zeros((free.size, values.size))
+        changes[np.arange(free.size), free] = DIFFERENCE_STEP * scales
+        is_inside = (self._simulation.project(values + changes) == values + changes).all(axis=1)
         steps = np.where(is_inside, DIFFERENCE_STEP, -DIFFERENCE_STEP)
-        points = np.tile(values, (free.size, 1))
-        points[np.arange(free.size), free] += steps * scales
+        points = values + np.where(is_inside[:, None], changes, -changes)
         return points, steps
 
     def _differentiate(self, point: FittedPoint, shifted: list[Signal], steps: Signal) -> FittedPoint:
@@ -180,7 +181,7 @@ class CalibrationProblem:
         is_kept = damped > np.finfo(float).eps * curvatures.size * damped.max(axis=1, keepdims=True)
         along = np.where(is_kept, directions.T @ (slope / sizes) / damped, 0.0)
         moved = point.values + (along @ directions.T) / sizes * self._scales
-        values = np.clip(moved, *self._bounds)
+        values = self._simulation.project(moved)
         changes = (values - point.values) / self._scales
         predicted = 2.0 * changes @ slope - np.einsum("ij,jk,ik->i", changes, hessian, changes)
         return values, predicted

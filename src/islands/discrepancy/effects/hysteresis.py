@@ -187,6 +187,12 @@ def _second_hysteresis_derivative(_x: float, rate: float, z: float, numbers: Any
     return rate - numbers[1] * abs(rate) * z - min(max(numbers[2], -most), most) * rate * abs(z)
 
 
+def _project_second_hysteresis(values: Signal) -> Signal:
+    projected, most = values.copy(), _MAX_RATIO * values[1]
+    projected[2] = np.clip(values[2], -most, most)
+    return projected
+
+
 def _second_hysteresis_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     coordinate = context.force_coordinate
     inverse_peak = 1.0 / coordinate.peak
@@ -240,6 +246,7 @@ SECOND_HYSTERESIS = Effect(
         state_equation=f"v - n1*abs(v)*z - min(max(n2, -{_MAX_RATIO}*n1), {_MAX_RATIO}*n1)*v*abs(z)",
     ),
     source="Ikhouane and Rodellar, Systems with Hysteresis, section 2",
+    project=_project_second_hysteresis,
     similar_to="exponential-creep, coulomb-friction, cubic-stiffness; on a single sine also quadratic-drag",
     distinguished_by="memory that does not depend on the rate: repeat the record at another frequency",
 )

@@ -58,6 +58,9 @@ class Effect:
         ``context -> bool``: whether the record can show the effect.
     linear_parameters : int
         Number of leading parameters to which the response of a weak effect is proportional.
+    project : callable or None
+        ``values -> values``: the nearest values that the form admits, if these are not given by the bounds of
+        each value. Calibration moves along such a limit and not beyond it, where derivatives would be zero.
     is_gain : bool
         Whether the effect is a gain. Gains are searched for only if every parameter except initial states has
         a tolerance; otherwise calibration absorbs them.
@@ -89,6 +92,7 @@ class Effect:
     equation: MakeEquation | None = None
     is_applicable: Callable[[SimulationContext], bool] = lambda _: True
     linear_parameters: int = 1
+    project: Callable[[Signal], Signal] | None = None
     is_gain: bool = False
     is_free: bool = False
     special_cases: tuple[str, ...] = ()

@@ -43,6 +43,8 @@ class ExtendedSimulator:
     context : SimulationContext
     parameters : tuple of Parameter
         Parameters of the simulator, then those of each effect.
+    bounds : tuple of ndarray, each of shape (parameters,)
+        Lower and upper bounds of the values.
     recordings : ndarray of int, shape (parameters,)
         Index of the recording that an initial state belongs to; zero for all other parameters.
     parts : tuple of ExtendedSimulator
@@ -53,6 +55,7 @@ class ExtendedSimulator:
     effects: tuple[Effect, ...]
     context: SimulationContext
     parameters: tuple[Parameter, ...] = field(init=False)
+    bounds: tuple[Signal, Signal] = field(init=False)
     recordings: NDArray[np.int64] = field(init=False)
     parts: "tuple[ExtendedSimulator, ...]" = field(init=False)
     _places: tuple[NDArray[np.int64], ...] = field(init=False)
@@ -90,8 +93,10 @@ class ExtendedSimulator:
             ExtendedSimulator(simulator, self.effects, context)
             for simulator, context in (split if len(split) > 1 else ())
         ]
+        lower, upper = (each.lower for each in parameters), (each.upper for each in parameters)
         for name, value in (
             ("parameters", tuple(parameters)),
+            ("bounds", (np.array([*lower]), np.array([*upper]))),
             ("recordings", np.array(recordings, dtype=np.int64)),
             ("parts", tuple(parts)),
             ("_places", tuple(np.array(each, dtype=np.int64) for each in places)),
@@ -105,13 +110,13 @@ class ExtendedSimulator:
         """Nominal values of the simulator and of the effects, at which effects vanish."""
         return np.array([parameter.nominal for parameter in self.parameters])
 
-    @property
-    def bounds(self) -> tuple[Signal, Signal]:
-        """Lower and upper bounds of the values."""
-        return (
-            np.array([parameter.lower for parameter in self.parameters]),
-            np.array([parameter.upper for parameter in self.parameters]),
-        )
+    def project(self, points: Signal) -> Signal:
+        """Return the nearest points within the bounds and the limits of the effects, (points, parameters)."""
+        projected = np.clip(points, *self.bounds)
+        for effect, part in zip(self.effects, self._slices[1:], strict=True):
+            if effect.project is not None:
+                projected[:, part] = [effect.project(values) for values in projected[:, part]]
+        return projected
 
     @property
     def scales(self) -> Signal:

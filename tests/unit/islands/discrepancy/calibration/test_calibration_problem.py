@@ -77,3 +77,20 @@ def test_fits_from_several_starts_do_not_depend_on_each_other(
     alone = [minimise(simulation, target, [start])[0] for start in starts]
     assert len({each.values.tobytes() for each in together}) == 3
     assert [each.values.tobytes() for each in together] == [each.values.tobytes() for each in alone]
+
+
+@pytest.mark.parametrize(("chi", "g"), [(8.0, 0.0), (1.0, 0.8)])
+def test_calibration_reaches_values_next_to_the_limit_of_an_effect(chi: float, g: float) -> None:
+    """The first steps lead beyond |g| = 1.5 chi, where the response does not depend on g."""
+    u = wave(600)
+    record = recorded(u, u / 200.0)
+    core, effect = make_simulator(SPRING, record), CATALOGUE["second-hysteresis"]
+    context = make_context(record, core, 450)
+    simulation, peak = ExtendedSimulator(core, (effect,), context), context.force_coordinate.peak
+    true, start = simulation.nominal, simulation.nominal
+    part = simulation.get_slice(effect)
+    true[part] = [60.0, 4.0 / peak, -1.4 * 4.0 / peak, 0.0]
+    start[part] = [30.0, chi / peak, g * chi / peak, 0.0]
+    target = Target(simulation.simulate(true), np.arange(600) < 450, None, {})
+    fit = calibrate(simulation, target, start)
+    np.testing.assert_allclose(fit.values[part][:3], true[part][:3], rtol=1e-3)
