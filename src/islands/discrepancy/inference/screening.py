@@ -207,7 +207,6 @@ class StartFinder:
         """
         base, projection, simulation = self.base, self.projection, _extend(self.base, effect)
         part = simulation.get_slice(effect)
-        lower, upper = simulation.bounds
         points, changes = simulate_starting_points(base, simulation, effect, self.target)
         responses = [projection(change) for change in changes]
         if effect.is_free and responses:
@@ -225,7 +224,7 @@ class StartFinder:
                 values[part.start : part.start + effect.linear_parameters] *= np.clip(
                     factor, -MAX_SCALING, MAX_SCALING
                 )
-            scaled = np.clip(scaled, lower, upper)
+            scaled = simulation.project(scaled)
             others = simulation.simulate_batch(scaled) - base.output
             starts = [
                 min(start, (_sum_squares(projection.residual - projection(other)), values), key=itemgetter(0))
