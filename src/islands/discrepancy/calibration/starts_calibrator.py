@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+
 from islands.discrepancy.calibration.levenberg_marquardt import (
     MAX_ITERATIONS,
     MIN_DECREASE,
@@ -25,6 +27,11 @@ FIRST_ITERATIONS, FIRST_ITERATIONS_WITH_MODEL_ERROR = 6, 12
 
 #: Decrease of the cost at which a rough calibration ends. Scores that differ by this are ties.
 ROUGH_DECREASE = 0.5
+
+#: Least number of simulations that are calibrated to convergence, the best ones after a rough calibration, if
+#: the residual is noise and if it is model error, and distance from the least cost within which all others
+#: are as well.
+MIN_CONVERGED, MIN_CONVERGED_WITH_MODEL_ERROR, MAX_DISTANCE = 3, 6, 20.0
 
 #: A simulation to be calibrated, and its starting points.
 CalibrationTask: TypeAlias = tuple[ExtendedSimulator, Sequence[Signal]]
@@ -87,6 +94,32 @@ def calibrate_all(
         min((compare_output(simulation, calibrator.target, *end) for end in ends), key=attrgetter("score"))
         for (simulation, _), ends in zip(tasks, parallel_map(calibrator, tasks), strict=True)
     ]
+
+
+def calibrate_best(
+    tasks: Sequence[CalibrationTask],
+    penalties: Sequence[float],
+    target: Target,
+    parallel_map: ParallelMap,
+) -> list[CalibrationResult]:
+    """Return the best fit of each task, roughly, and to convergence if its cost may be the least.
+
+    Parameters
+    ----------
+    penalties : sequence of float
+        Penalty of each simulation, which is added to the score.
+    """
+    fits = calibrate_all(StartsCalibrator(target, is_rough=True), tasks, parallel_map)
+    costs = np.array([fit.score for fit in fits]) + np.array(penalties)
+    order = np.argsort(costs, kind="stable")
+    # Simulations that are far from the best ones need no better fit.
+    near = np.count_nonzero(costs < np.nanmin(costs, initial=np.inf) + MAX_DISTANCE)
+    least = MIN_CONVERGED if target.effective_samples is None else MIN_CONVERGED_WITH_MODEL_ERROR
+    best = np.sort(order[: max(near, least)])
+    starts = [(fits[index].simulation, [fits[index].values]) for index in best]
+    for index, fit in zip(best, calibrate_all(StartsCalibrator(target), starts, parallel_map), strict=True):
+        fits[index] = fit
+    return fits
 
 
 def make_task_key(calibrator: StartsCalibrator, task: CalibrationTask) -> Hashable:

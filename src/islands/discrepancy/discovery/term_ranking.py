@@ -57,24 +57,30 @@ def rank_terms(
     """
     projections = [Projection(fit, target) for target in targets]
 
-    def explain_group(group: Sequence[CandidateTerm]) -> list[NDArray[np.float64]]:
-        # Each lane has the coefficient of one of the terms.
+    def explain_group(group: Sequence[CandidateTerm]) -> NDArray[np.float64]:
         numbers = find_free_numbers(get_system(fit), len(group))
         numbered = list(zip(group, numbers, strict=True))
         simulation, start = add_terms(fit, get_system(fit), numbered, target_sizes)
-        places = {parameter.name: index for index, parameter in enumerate(simulation.parameters)}
-        lanes = np.arange(len(group)), [places[term.name_parameters(number)[0]] for term, number in numbered]
-        points = np.tile(start, (len(group), 1))
-        points[lanes] = [simulation.parameters[place].nominal for place in lanes[1]]
-        small, outputs = points[lanes], simulation.simulate_batch(points)
-        found = []
-        for projection in projections:
-            linear = [_explain(output - fit.output, projection) for output in outputs]
-            points[lanes] = small * [factor for _, factor in linear]
-            large = simulation.simulate_batch(points)
-            explained = [_explain(output - fit.output, projection)[0] for output in large]
-            found.append(np.column_stack([[each for each, _ in linear], explained, points[lanes]]))
-        return found
+        index = {parameter.name: place for place, parameter in enumerate(simulation.parameters)}
+        places = [index[term.name_parameters(number)[0]] for term, number in numbered]
+
+        def respond(coefficients: Signal) -> Signal:
+            """Return the responses to one term at a time, shape (rows, terms, samples)."""
+            points = np.tile(start, (coefficients.size, 1))
+            points[np.arange(len(points)), places * len(coefficients)] = coefficients.ravel()
+            responses = simulation.simulate_batch(points) - fit.output
+            return responses.reshape(*coefficients.shape, -1)
+
+        small = np.array([[simulation.parameters[place].nominal for place in places]])
+        (responses,) = respond(small)
+        linear = np.array([[_explain(each, projection) for each in responses] for projection in projections])
+        large = small * linear[:, :, 1]
+        # All targets share a call, since the lanes of one would not fill it.
+        explained = [
+            [_explain(each, projection)[0] for each in responses]
+            for responses, projection in zip(respond(large), projections, strict=True)
+        ]
+        return np.dstack([linear[:, :, 0], explained, large])
 
     groups = [
         candidates[first : first + TERMS_PER_CALL] for first in range(0, len(candidates), TERMS_PER_CALL)

@@ -13,7 +13,7 @@ import numpy as np
 
 from islands.discrepancy.calibration.intersample_selection import get_discretisation, select_intersample
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
-from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all
+from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all, calibrate_best
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.candidate_terms import (
     STARTING_SCALES,
@@ -171,7 +171,8 @@ def search_terms(
         if best is None or best.cost > found.cost - MIN_GAIN:
             break
         before = found.cost
-        found = _eliminate_terms(_select_discretisation(best, target), system, target, target_sizes)
+        best = _select_discretisation(best, target)
+        found = _eliminate_terms(best, system, target, target_sizes, parallel_map)
         missing = max_terms - len(found.terms)
         if found.cost - missing * MAX_GAIN_RATIO * (before - found.cost) > least:
             break
@@ -193,16 +194,22 @@ def _select_discretisation(found: TermSearchResult, target: Target) -> TermSearc
 
 
 def _eliminate_terms(
-    found: TermSearchResult, system: OdeSystem, target: Target, target_sizes: Mapping[str, float]
+    found: TermSearchResult,
+    system: OdeSystem,
+    target: Target,
+    target_sizes: Mapping[str, float],
+    parallel_map: ParallelMap,
 ) -> TermSearchResult:
     """Remove terms that later ones have made unnecessary; ``system`` has none of them."""
     while len(found.terms) > 1:
-        smaller = []
-        for left_out in found.terms:
-            kept = tuple(each for each in found.terms if each is not left_out)
+        reduced = [tuple(each for each in found.terms if each is not left_out) for left_out in found.terms]
+        tasks = []
+        for kept in reduced:
             numbered = [(each.term, each.number) for each in kept]
             simulation, start = add_terms(found.fit, system, numbered, target_sizes)
-            smaller.append(replace(found, fit=calibrate(simulation, target, start), terms=kept))
+            tasks.append((simulation, [start]))
+        fits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
+        smaller = [replace(found, fit=fit, terms=kept) for fit, kept in zip(fits, reduced, strict=True)]
         best = min(smaller, key=lambda each: each.cost)
         if best.cost > found.cost + MIN_GAIN:
             break
@@ -228,15 +235,14 @@ def _find_best_term(
     for each in ranked:
         simulation, start = add_terms(fit, get_system(fit), [(each.term, number)], target_sizes)
         tasks.append((simulation, _list_starts(simulation, start, each, number)))
+    # Any of the candidates could gain by chance.
+    penalties = [each.term.value_count * log_n + log_choices for each in ranked]
     results = []
-    terms, calibrator = [each.term for each in ranked], StartsCalibrator(target)
-    for term, fitted in zip(terms, calibrate_all(calibrator, tasks, parallel_map), strict=True):
-        if not np.isfinite(fitted.score):
-            continue
-        # Any of the candidates could gain by chance.
-        penalty = term.value_count * log_n + log_choices
-        added = DiscoveredTerm(term, number, fit.score - fitted.score - penalty, penalty)
-        results.append(replace(found, fit=fitted, terms=(*found.terms, added)))
+    fits = calibrate_best(tasks, penalties, target, parallel_map)
+    for each, penalty, fitted in zip(ranked, penalties, fits, strict=True):
+        if np.isfinite(fitted.score):
+            added = DiscoveredTerm(each.term, number, fit.score - fitted.score - penalty, penalty)
+            results.append(replace(found, fit=fitted, terms=(*found.terms, added)))
     return min(results, key=lambda each: each.cost, default=None)
 
 

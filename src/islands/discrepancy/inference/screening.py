@@ -8,7 +8,7 @@ import numpy as np
 
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.calibration.projection import Projection
-from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all
+from islands.discrepancy.calibration.starts_calibrator import calibrate_best
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.interfaces.effect import Effect, Signal, invalid_effect_error
@@ -36,11 +36,6 @@ MIN_CALIBRATED_EFFECTS = 5
 #: Fraction of the best promised gain below which a further effect is not calibrated. If the noise is small,
 #: every effect promises more than its penalty.
 MIN_PROMISE = 0.05
-
-#: Least number of effects that are calibrated to convergence, the best ones after a rough calibration, if the
-#: residual is noise and if it is model error, and distance from the best score within which all others are as
-#: well.
-MIN_CONVERGED_EFFECTS, MIN_CONVERGED_WITH_MODEL_ERROR, MAX_DISTANCE = 3, 6, 20.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,22 +95,10 @@ def screen_effects(
             or promise > max(bic_penalty(candidate[1], base), MIN_PROMISE * promises[0])
         ]
     tasks = [(_extend(base, effect), starts) for _, effect, starts in candidates]
-    rough = calibrate_all(StartsCalibrator(target, is_rough=True), tasks, parallel_map)
-    screened = [ScreenedEffect(effect, fit) for (_, effect, _), fit in zip(candidates, rough, strict=True)]
-    # Effects that are far from the best ones need no better fit.
-    ranked = sorted(screened, key=lambda each: -each.score_gain(base))
-    gains = [each.score_gain(base) for each in ranked]
-    count = sum(gain > gains[0] - MAX_DISTANCE for gain in gains)
-    least = MIN_CONVERGED_EFFECTS if is_noise else MIN_CONVERGED_WITH_MODEL_ERROR
-    best = [each for each in screened if each in ranked[: max(count, least)]]
-    converged = calibrate_all(
-        StartsCalibrator(target), [(each.fit.simulation, [each.fit.values]) for each in best], parallel_map
-    )
-    found = {each.effect.name: each for each in screened}
-    found |= {
-        each.effect.name: ScreenedEffect(each.effect, fit) for each, fit in zip(best, converged, strict=True)
-    }
-    return sorted(found.values(), key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
+    penalties = [bic_penalty(effect, base) for _, effect, _ in candidates]
+    fits = calibrate_best(tasks, penalties, target, parallel_map)
+    screened = [ScreenedEffect(effect, fit) for (_, effect, _), fit in zip(candidates, fits, strict=True)]
+    return sorted(screened, key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
 
 
 def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSimulator) -> Signal:

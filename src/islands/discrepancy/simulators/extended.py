@@ -93,10 +93,9 @@ class ExtendedSimulator:
             ExtendedSimulator(simulator, self.effects, context)
             for simulator, context in (split if len(split) > 1 else ())
         ]
-        lower, upper = (each.lower for each in parameters), (each.upper for each in parameters)
         for name, value in (
             ("parameters", tuple(parameters)),
-            ("bounds", (np.array([*lower]), np.array([*upper]))),
+            ("bounds", tuple(np.reshape([(each.lower, each.upper) for each in parameters], (-1, 2)).T)),
             ("recordings", np.array(recordings, dtype=np.int64)),
             ("parts", tuple(parts)),
             ("_places", tuple(np.array(each, dtype=np.int64) for each in places)),
@@ -193,8 +192,7 @@ class ExtendedSimulator:
                 y = self.simulator.simulate(
                     run.values, run.x, self.context, run.effect_parameters, run.forces
                 )
-            mapped: Signal = self._apply_output_maps([y], values[None])[0]
-            return mapped
+            return self._apply_output_maps([y], values[None]).reshape(-1)
         return self.simulate_batch(values[None])[0]
 
     def simulate_batch(self, points: Signal, near: NDArray[np.int64] | None = None) -> Signal:
@@ -257,8 +255,7 @@ class ExtendedSimulator:
                 if effect.site == Site.OUTPUT:
                     for row, values in enumerate(points):
                         mapped[row] = apply_map(effect, mapped[row], values[part], self.context)
-            limit = _DIVERGENCE_FACTOR * self.context.output_peak
-            mapped[~(np.abs(mapped).max(axis=1) < limit)] = np.nan
+            mapped[~(np.abs(mapped).max(axis=1) < _DIVERGENCE_FACTOR * self.context.output_peak)] = np.nan
         return mapped
 
     def _make_run(
