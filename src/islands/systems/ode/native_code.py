@@ -1,8 +1,8 @@
 """Machine code of a program: what the kernel interprets, with states and intermediate results in registers.
 
 An interpreted instruction waits for the result of the one before in memory. Machine code needs a quarter of
-the time, but some milliseconds of compilation, so that only programs that run often are compiled. It executes
-the same operations in the same order without contraction, so that every bit is that of the interpreter.
+the time, but a compilation takes 50 ms, so that programs are compiled if they run often, and stored. Machine
+code executes the same operations in the same order without contraction: every bit is that of the interpreter.
 Programs that call force laws, or functions of the C library other than the exponential, remain interpreted.
 """
 
@@ -25,6 +25,7 @@ from islands.systems.ode.kernel_arguments import (
     LaneSignals,
 )
 from islands.systems.ode.native_generator import FUNCTION, NativeGenerator, ProgramCode
+from islands.systems.ode.native_store import is_stored, load_code, store_code
 
 #: Interpreted instructions, once per step, after which a program is compiled: they take as long as the
 #: compilation.
@@ -39,7 +40,7 @@ MAX_INSTRUCTIONS = 300
 #: Number of programs whose instructions are counted, and of those with machine code, about 1 MB each.
 _COUNTED, _KEPT = 256, 64
 
-_counts: OrderedDict[ProgramCode, int] = OrderedDict()
+_counts: OrderedDict[ProgramCode, float] = OrderedDict()
 _lock = Lock()
 
 
@@ -49,17 +50,15 @@ class NativeCode:
     Parameters
     ----------
     program : ProgramCode
+    code : bytes
+        The object file of `generate_code`.
     """
 
-    def __init__(self, program: ProgramCode) -> None:
+    def __init__(self, program: ProgramCode, code: bytes) -> None:
         self._lanes = program.lanes
         self._states = slice(program.states, program.states + len(program.slopes))
-        machine = _make_machine()
-        module = binding.parse_assembly(str(NativeGenerator(program).generate()))
-        options = binding.create_pipeline_tuning_options(speed_level=1)
-        builder = binding.create_pass_builder(machine, options)
-        builder.getModulePassManager().run(module, builder)
-        self._engine = binding.create_mcjit_compiler(module, machine)
+        self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _make_machine())
+        self._engine.add_object_file(binding.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
         integers, pointers = [ctypes.c_int64] * 5, [ctypes.c_void_p] * 9
         signature = ctypes.CFUNCTYPE(None, *integers, ctypes.c_double, *pointers)
@@ -94,7 +93,7 @@ class NativeCode:
 def find_native_code(
     instructions: Instructions, signals: LaneSignals, limits: LaneLimits, restarts: LaneRestarts
 ) -> NativeCode | None:
-    """Return the machine code of a program that runs often, and count the instructions of others."""
+    """Return the machine code of a program that runs often or is stored; count the instructions of others."""
     if not _is_supported(instructions):
         return None
     program = ProgramCode(
@@ -112,7 +111,9 @@ def find_native_code(
         lanes=signals.places.shape[2],
     )
     with _lock:
-        executed = _counts.pop(program, 0)
+        executed = _counts.pop(program, None)
+        if executed is None:
+            executed = np.inf if is_stored(program) else 0
         _counts[program] = executed + signals.shared.shape[0] * len(instructions.code)
         while len(_counts) > _COUNTED:
             _counts.popitem(last=False)
@@ -129,7 +130,22 @@ def _is_supported(instructions: Instructions) -> bool:
 
 @lru_cache(maxsize=_KEPT)
 def _compile(program: ProgramCode) -> NativeCode:
-    return NativeCode(program)
+    code = load_code(program)
+    if code is None:
+        code = generate_code(program)
+        store_code(program, code)
+    return NativeCode(program, code)
+
+
+def generate_code(program: ProgramCode) -> bytes:
+    """Generate the machine code of a program for this processor, as an object file."""
+    machine = _make_machine()
+    module = binding.parse_assembly(str(NativeGenerator(program).generate()))
+    options = binding.create_pipeline_tuning_options(speed_level=1)
+    builder = binding.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    code: bytes = machine.emit_object(module)
+    return code
 
 
 def _make_machine() -> Any:

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from islands.systems.ode import native_code
+from islands.systems.ode import native_code, native_store
 from islands.systems.ode.interval_simulation import IntervalSimulation
 from islands.systems.ode.lane_simulation import (
     LaneInput,
@@ -35,6 +36,19 @@ ARITHMETIC = {
     "output": "x + 0.1*y + p*F",
     "parameters": {"a": 0.4, "b": 2.0, "c": 1.2, "k": 80.0},
 }
+
+
+@pytest.fixture(autouse=True)
+def empty_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache folder without programs, and a process that knows none."""
+    monkeypatch.setattr(native_store, "cache_folder", lambda: tmp_path)
+    forget_programs(monkeypatch)
+    return tmp_path
+
+
+def forget_programs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native_code, "_counts", type(native_code._counts)())
+    native_code._compile.cache_clear()
 
 
 def motion(index: int) -> LaneInput:
@@ -123,7 +137,6 @@ def test_functions_of_the_library_remain_interpreted(monkeypatch: pytest.MonkeyP
 def test_program_is_compiled_once_it_has_run_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     program = generate_program(make_system(ARITHMETIC))
     monkeypatch.setattr(native_code, "COMPILED_FROM", 3 * SAMPLES * len(program.instructions.code))
-    monkeypatch.setattr(native_code, "_counts", type(native_code._counts)())
     calls: list[int] = []
     run = native_code.NativeCode.integrate
     monkeypatch.setattr(
@@ -132,3 +145,50 @@ def test_program_is_compiled_once_it_has_run_long_enough(monkeypatch: pytest.Mon
     found = [simulate_lanes(program, DT, [motion(1)]).tobytes() for _ in range(5)]
     assert len(calls) == 2
     assert len(set(found)) == 1
+
+
+def test_stored_code_is_used_at_once_with_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = generate_program(make_system(ARITHMETIC))
+    interpreted, native = simulate_natively(program, make_lanes(), monkeypatch)
+    forget_programs(monkeypatch)
+    monkeypatch.setattr(native_code, "COMPILED_FROM", 1e12)
+    monkeypatch.setattr(native_code, "generate_code", pytest.fail)
+    monkeypatch.setattr("islands.systems.ode.lane_simulation.integrate", pytest.fail)
+    assert simulate_lanes(program, DT, make_lanes()).tobytes() == native.tobytes() == interpreted.tobytes()
+
+
+@pytest.mark.parametrize("damage", [lambda code: code[:-100], lambda code: code[:40] + b"?" + code[41:]])
+def test_damaged_code_is_compiled_again(
+    damage: Callable[[bytes], bytes], empty_store: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = generate_program(make_system(ARITHMETIC))
+    _, native = simulate_natively(program, make_lanes(), monkeypatch)
+    files = list((empty_store / "programs").iterdir())
+    stored = {file: file.read_bytes() for file in files}
+    for file, code in stored.items():
+        file.write_bytes(damage(code))
+    forget_programs(monkeypatch)
+    assert simulate_lanes(program, DT, make_lanes()).tobytes() == native.tobytes()
+    assert {file: file.read_bytes() for file in files} == stored
+
+
+def test_programs_run_without_a_folder_to_store_them(
+    empty_store: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = generate_program(make_system(ARITHMETIC))
+    for folder in (None, empty_store / "deleted"):
+        monkeypatch.setattr(native_store, "cache_folder", lambda folder=folder: folder)
+        forget_programs(monkeypatch)
+        interpreted, native = simulate_natively(program, make_lanes(), monkeypatch)
+        assert native.tobytes() == interpreted.tobytes()
+
+
+def test_the_older_half_of_too_many_programs_is_deleted(
+    empty_store: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(native_store, "MAX_STORED", 4)
+    for count in range(1, 6):
+        native_store.store_code(f"program {count}", b"code")
+        assert len(list((empty_store / "programs").iterdir())) == (count if count < 5 else 3)
+    assert native_store.load_code("program 5") == b"code"
+    assert not native_store.is_stored("program 1")
