@@ -106,8 +106,9 @@ def simulate_oscillator(u: NDArray[np.float64], m: float, c: float, k: float) ->
     return np.asarray(x)
 
 
+@cache
 def write_fmu() -> str:
-    """Write an oscillator as an FMU; return its path."""
+    """Write an oscillator as an FMU, once in a process, since the file must not change; return its path."""
     return str(write_oscillator(Path(FMUS.name) / "oscillator.fmu"))
 
 

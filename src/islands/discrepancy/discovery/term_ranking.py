@@ -67,7 +67,7 @@ def rank_terms(
         def respond(coefficients: Signal) -> Signal:
             """Return the responses to one term at a time, shape (rows, terms, samples)."""
             points = np.tile(start, (coefficients.size, 1))
-            points[np.arange(len(points)), places * len(coefficients)] = coefficients.ravel()
+            points[np.arange(len(points)), np.tile(places, len(coefficients))] = coefficients.ravel()
             responses = simulation.simulate_batch(points) - fit.output
             return responses.reshape(*coefficients.shape, -1)
 
