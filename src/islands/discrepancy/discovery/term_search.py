@@ -13,7 +13,7 @@ import numpy as np
 
 from islands.discrepancy.calibration.intersample_selection import get_discretisation, select_intersample
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
-from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all, calibrate_best
+from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.candidate_terms import (
     STARTING_SCALES,
@@ -238,7 +238,7 @@ def _find_best_term(
     # Any of the candidates could gain by chance.
     penalties = [each.term.value_count * log_n + log_choices for each in ranked]
     results = []
-    fits = calibrate_best(tasks, penalties, target, parallel_map)
+    fits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
     for each, penalty, fitted in zip(ranked, penalties, fits, strict=True):
         if np.isfinite(fitted.score):
             added = DiscoveredTerm(each.term, number, fit.score - fitted.score - penalty, penalty)
