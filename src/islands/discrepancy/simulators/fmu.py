@@ -19,7 +19,7 @@ from islands.systems.fmu.fmi_description import FmiInterface
 from islands.systems.fmu.fmu_instance import FmuRun, load_fmu
 from islands.systems.fmu.fmu_model import FmuInitialValue, FmuModel
 from islands.systems.fmu.fmu_simulation import simulate_fmu
-from islands.systems.ode.lane_simulation import LaneInput
+from islands.systems.ode.lane_values import LaneInput
 from islands.systems.ode.ode_expression import FMU, OdeExpression, Operation, Symbol
 from islands.systems.ode.ode_program import OdeProgram, generate_program
 from islands.systems.ode.ode_system import OdeSystem

@@ -24,16 +24,12 @@ from islands.discrepancy.simulators.ode_effects import (
 from islands.discrepancy.simulators.record_channels import refine_input, sample_channels
 from islands.discrepancy.simulators.shooting import Shots
 from islands.systems.ode.equation_parser import TIME
-from islands.systems.ode.lane_simulation import (
-    LaneInput,
-    SampledSignal,
-    interpolate_linearly,
-    make_time,
-    simulate_lanes,
-)
+from islands.systems.ode.lane_simulation import simulate_lanes
+from islands.systems.ode.lane_values import LaneInput
 from islands.systems.ode.ode_expression import OdeExpression, Symbol
 from islands.systems.ode.ode_program import OdeProgram, generate_program
 from islands.systems.ode.ode_system import OdeParameter, OdeSystem
+from islands.systems.ode.sampled_signal import SampledSignal, interpolate_linearly, make_time
 from islands.systems.ode.system_parts import OdeEffect
 
 #: Name of the factor of the parameter that is the gain; no name in equations has brackets.
@@ -259,7 +255,7 @@ class OdeSimulator:
                     signals[_GAIN] = interpolate_linearly(gain).refine(steps)
             else:
                 between = self._get_between(run, context) * gain
-                signals[self.system.input] = SampledSignal(run.x * gain, *between).refine(steps)
+                signals[self.system.input] = SampledSignal.join(run.x * gain, *between).refine(steps)
             given = dict(zip(names, run.values.tolist(), strict=True))
             laws = list(enumerate(run.forces)) if self._has_force_equation else []
             calls = [law for _, law in laws if not is_term(law[0])]

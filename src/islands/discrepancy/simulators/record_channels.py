@@ -9,7 +9,7 @@ from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import Signal, SimulationContext
 from islands.errors import RecordError
-from islands.systems.ode.lane_simulation import SampledSignal, interpolate_linearly
+from islands.systems.ode.sampled_signal import SampledSignal, interpolate_linearly
 
 
 def find_channel(name: str, record: Dataset, reader: str) -> str:
@@ -52,7 +52,7 @@ def sample_channels(
         signal = context.channels[recorded]
         steps = np.arange(samples) * (signal.size / samples)
         values = np.interp(steps, np.arange(signal.size), signal)
-        found[name] = SampledSignal(values, values, values) if is_held else interpolate_linearly(values)
+        found[name] = SampledSignal.join(values, values, values) if is_held else interpolate_linearly(values)
     return found
 
 
@@ -72,7 +72,7 @@ def refine_input(x: Signal, between: Signal, parts: int) -> SampledSignal:
 
 @lru_cache(maxsize=4)
 def _refine_bytes(x: bytes, between: bytes, parts: int) -> SampledSignal:
-    return SampledSignal(np.frombuffer(x), *np.frombuffer(between).reshape(2, -1)).refine(parts)
+    return SampledSignal.join(np.frombuffer(x), *np.frombuffer(between).reshape(2, -1)).refine(parts)
 
 
 def make_nominal_context(record: Dataset) -> SimulationContext:

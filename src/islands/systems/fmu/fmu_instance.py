@@ -20,7 +20,7 @@ from islands.errors import ModelError
 from islands.systems.fmu.fmi_calls import TERMINATED, FmiFunctions
 from islands.systems.fmu.fmi_description import FmiDescription, FmiInterface, import_fmpy, read_description
 from islands.systems.fmu.fmi_kernel import FmuEquations, integrate, take_steps
-from islands.systems.ode.lane_simulation import SampledSignal
+from islands.systems.ode.sampled_signal import SampledSignal
 
 #: Largest number of FMUs that a process keeps loaded.
 _LOADED = 8
@@ -118,7 +118,7 @@ class FmuInstance:
             except Exception as error:  # a status of the FMU that is not OK, or an instance that fails
                 self._is_fresh = False
                 self._recover(getattr(error, "status", 0))
-                size = next(iter(signals.values())).start.size, equations.instructions.outputs.size
+                size = len(next(iter(signals.values())).moments), equations.instructions.outputs.size
                 return FmuRun(np.full(size[::-1], np.nan), self._describe(str(error)))
             return self._run(signals, equations, start_time, dt)
 
@@ -173,16 +173,14 @@ class FmuInstance:
     def _run(
         self, signals: Mapping[int, SampledSignal], equations: FmuEquations, start_time: float, dt: float
     ) -> FmuRun:
-        def stack(part: str) -> NDArray[np.float64]:
-            return np.column_stack([getattr(signal, part) for signal in signals.values()])
-
         inputs = np.array(list(signals), dtype=np.uint32)
-        start, middle = stack("start"), stack("middle")
+        moments = np.stack([signal.moments for signal in signals.values()])
+        start, middle, end = (np.ascontiguousarray(each.T) for each in moments.transpose(2, 0, 1))
         y = np.full((len(start), equations.instructions.outputs.size), np.nan)
         description = self.description
         if description.interface == FmiInterface.MODEL_EXCHANGE:
             done, status = integrate(
-                *(self._functions, equations, start_time, dt, start, middle, stack("end"), inputs),
+                *(self._functions, equations, start_time, dt, start, middle, end, inputs),
                 *(len(description.states), description.indicators, description.completes, y),
             )
         else:

@@ -8,13 +8,8 @@ from islands.systems.fmu.fmi_kernel import FmuEquations
 from islands.systems.fmu.fmu_instance import FmuInstance, FmuRun
 from islands.systems.fmu.fmu_model import FmuModel
 from islands.systems.ode.kernel_arguments import LANES
-from islands.systems.ode.lane_simulation import (
-    LaneInput,
-    pack_arena,
-    pack_elements,
-    pack_limits,
-    pack_signals,
-)
+from islands.systems.ode.lane_simulation import pack_signals
+from islands.systems.ode.lane_values import LaneInput, LaneValues
 from islands.systems.ode.ode_expression import FMU, Operation, Symbol
 from islands.systems.ode.ode_program import OdeProgram
 
@@ -65,7 +60,7 @@ def _pack_equations(model: FmuModel, program: OdeProgram, dt: float, lane: LaneI
                 values.append((references[name], row))
             case _:
                 signals.append(expression)
-    full = [lane] * LANES
+    given = LaneValues(program, [lane]).take(np.zeros(LANES, dtype=np.int64))
     found, order = pack_signals(signals, dt, [lane])
     # Internal states of force laws follow the states of the FMU.
     following = itertools.count(len(model.description.states))
@@ -73,11 +68,11 @@ def _pack_equations(model: FmuModel, program: OdeProgram, dt: float, lane: LaneI
     places += [next(following) for _ in program.instructions.slopes[len(places) :]]
     return FmuEquations(
         program.instructions,
-        pack_arena(program, full),
+        given.arena,
         found.shared,
         np.array([rows[signals[place]] for place in order], dtype=np.int64),
-        pack_elements(full),
-        pack_limits(program.states, full),
+        given.laws,
+        given.limits,
         np.array(places, dtype=np.int64),
         np.array([place for place, _ in derivatives], dtype=np.int64),
         np.array([row for _, row in derivatives], dtype=np.int64),

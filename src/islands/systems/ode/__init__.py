@@ -1,5 +1,6 @@
 """Systems of ordinary differential equations that users write as text.
 
 Read `ode_system` first. `equation_parser` reads equations, `ode_program` translates a system to instructions,
-and `ode_kernel` integrates them for eight sets of values at once. No system is compiled.
+and `ode_kernel` integrates them for sixteen sets of values at once. Programs that run often are machine code
+(`native`).
 """

@@ -11,15 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.systems.ode.kernel_arguments import LANES, MANY_LANES, LaneRestarts, LaneSignals
-from islands.systems.ode.lane_simulation import (
-    LaneInput,
-    SampledSignal,
-    Signal,
-    integrate_group,
-    list_signals,
-    stack_signals,
-)
+from islands.systems.ode.lane_simulation import count_samples, integrate_group, list_signals
+from islands.systems.ode.lane_values import LaneInput, LaneValues
 from islands.systems.ode.ode_program import OdeProgram
+from islands.systems.ode.sampled_signal import SampledSignal, Signal, chain_signals
 
 #: Time of a call of the kernel, in intervals of `LANES` lanes.
 _CALL_TIME = 1.0
@@ -52,14 +47,15 @@ class IntervalSimulation:
     ) -> None:
         assert tuple(restarted) == tuple(program.states[: len(restarted)])
         self._program, self._dt, self.lanes = program, dt, lanes
+        self._values = LaneValues(program, lanes)
         self._interval, self._every = interval, every
         elements = lanes[0].elements
         has_state = elements is not None and bool(elements.state_derivatives.any())
         self.is_independent = len(restarted) == len(program.states) and not has_state
-        samples = len(next(iter(lanes[0].signals.values())).start)
-        self._count = -(-samples // interval)
-        found, self._indices = list_signals(program.signals, dt, lanes)
-        self._signals = _stack(tuple(found), samples, self._count * interval)
+        self._count = -(-count_samples(lanes) // interval)
+        found, indices = list_signals(program.signals, dt, lanes)
+        self._signals = _chain(tuple(found), self._count * interval)
+        self._places = 3 * self._count * interval * indices
 
     def simulate(
         self, lanes: NDArray[np.int64], states: Signal, is_asked: NDArray[np.bool_]
@@ -92,19 +88,20 @@ class IntervalSimulation:
         order = np.arange(len(self._program.signals))
         out = np.empty((size // self._every, outputs, width))
         for first in range(0, len(runs), width):
-            run, places = runs[first : first + width], intervals[first : first + width]
-            full = np.pad(run, (0, width - len(run)), "edge")
-            begins = np.pad(places, ((0, width - len(run)), (0, 0)), "edge")
-            given = states[full[:, None], begins].transpose(1, 2, 0)
-            offsets = begins * (self._interval * 3 * self._signals.shape[2])
+            # The last column is repeated in the lanes that are left over.
+            columns = np.minimum(np.arange(first, first + width), len(runs) - 1)
+            given = states[runs[columns, None], intervals[columns]].transpose(1, 2, 0)
+            offsets = 3 * self._interval * intervals[columns].T[:, None]
             signals = LaneSignals(
                 shared,
                 self._signals,
-                np.ascontiguousarray(offsets.T[:, None] + self._indices[lanes[full]].T),
+                np.ascontiguousarray(offsets + self._places[lanes[runs[columns]]].T),
             )
+            run, places = runs[first : first + width], intervals[first : first + width]
             integrate_group(
                 self._program,
-                [self.lanes[index] for index in lanes[run]],
+                self._values,
+                lanes[run],
                 signals,
                 order,
                 LaneRestarts(restarts, np.ascontiguousarray(given.reshape(rows, -1))),
@@ -139,18 +136,17 @@ class IntervalSimulation:
         times = {lanes: -(-columns // lanes) * (rows * time + _CALL_TIME) for lanes, time in _TIMES.items()}
         width = min(times, key=lambda lanes: times[lanes].min())
         best = int(rows[np.argmin(times[width])])
-        parts = []
-        for asked in is_asked:
-            places = np.flatnonzero(asked)
-            lacking = -places.size % best
-            parts.append(np.append(places, places[-1:].repeat(lacking)).reshape(-1, best))
-        runs = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-        return runs, np.concatenate(parts), width
+        runs, places = np.nonzero(is_asked)
+        columns = -(-counts // best)
+        # Intervals of a run follow one another; its last one fills what remains of its last column.
+        ends, sizes = np.cumsum(counts), columns * best
+        rank = np.arange(places.size) - np.repeat(ends - counts, counts)
+        found = np.repeat(places[ends - 1], sizes)
+        found[np.repeat(np.cumsum(sizes) - sizes, counts) + rank] = places
+        return np.repeat(np.arange(counts.size), columns), found.reshape(-1, best), width
 
 
 @lru_cache(maxsize=4)
-def _stack(signals: tuple[SampledSignal, ...], samples: int, size: int) -> Signal:
-    """Return signals that calls have in common as one array, shape (size, 3, signals), zero after the end."""
-    stacked = np.zeros((size, 3, len(signals)))
-    stacked[:samples] = stack_signals(signals, samples)
-    return stacked
+def _chain(signals: tuple[SampledSignal, ...], samples: int) -> Signal:
+    """Return signals that calls have in common, as `chain_signals`."""
+    return chain_signals(signals, samples)

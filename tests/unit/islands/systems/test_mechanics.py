@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from islands.discrepancy.effects import hysteresis
 from islands.systems.mechanics import WIDTH, Elements, compile_law, integrate_along
 from islands.systems.ode.interval_simulation import IntervalSimulation
-from islands.systems.ode.lane_simulation import LaneInput, SampledSignal, simulate_lanes
+from islands.systems.ode.lane_simulation import simulate_lanes
+from islands.systems.ode.lane_values import LaneInput
 from islands.systems.ode.ode_program import generate_program
+from islands.systems.ode.sampled_signal import SampledSignal
 from islands.systems.ode.system_document import make_system
 
 Array = NDArray[np.float64]
@@ -93,7 +95,7 @@ def simulate(
     lane = LaneInput(
         {"m": MASS, "c": DAMPING, "k": STIFFNESS},
         dict(zip("xv", start, strict=True)),
-        {"F": SampledSignal(u(t), u(t + dt / 2), u(t + dt))},
+        {"F": SampledSignal.join(u(t), u(t + dt / 2), u(t + dt))},
         parts if parts.forces.size else None,
     )
     program = generate_program(MOTION, laws=parts.forces.size)

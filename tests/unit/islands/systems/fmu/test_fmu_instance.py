@@ -17,9 +17,10 @@ from islands.systems.fmu.fmu_instance import FmuInstance, FmuRun, load_fmu
 from islands.systems.fmu.fmu_model import FmuParameterChoice, choose_variables
 from islands.systems.fmu.fmu_simulation import simulate_fmu
 from islands.systems.fmu.fmu_system import make_fmu_system
-from islands.systems.ode.lane_simulation import LaneInput, interpolate_linearly
+from islands.systems.ode.lane_values import LaneInput
 from islands.systems.ode.ode_expression import FMU, Operation, Symbol
 from islands.systems.ode.ode_program import generate_program
+from islands.systems.ode.sampled_signal import interpolate_linearly
 from support.oscillator_fmus import write_oscillator
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")

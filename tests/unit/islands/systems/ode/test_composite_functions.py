@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from islands.systems.ode.lane_simulation import LaneInput, interpolate_linearly, simulate_lanes
+from islands.systems.ode.lane_simulation import simulate_lanes
+from islands.systems.ode.lane_values import LaneInput
 from islands.systems.ode.ode_program import generate_program
+from islands.systems.ode.sampled_signal import interpolate_linearly
 from islands.systems.ode.system_document import make_system
 
 

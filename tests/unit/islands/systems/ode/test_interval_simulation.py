@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.systems.ode import native_code
 from islands.systems.ode.interval_simulation import IntervalSimulation
-from islands.systems.ode.lane_simulation import LaneInput, SampledSignal, make_time, simulate_lanes
+from islands.systems.ode.lane_simulation import simulate_lanes
+from islands.systems.ode.lane_values import LaneInput
+from islands.systems.ode.native import native_code
 from islands.systems.ode.ode_expression import Symbol
 from islands.systems.ode.ode_program import OdeProgram, generate_program
+from islands.systems.ode.sampled_signal import SampledSignal, make_time
 from islands.systems.ode.system_document import make_system
 
 DT, SAMPLES, INTERVAL = 0.01, 110, 24
@@ -36,7 +38,7 @@ def program(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 
 def make_lanes() -> list[LaneInput]:
     """Make lanes with different parameters and limits; the last one has another input."""
-    signals = [SampledSignal(*np.random.default_rng(seed).standard_normal((3, SAMPLES))) for seed in (0, 1)]
+    signals = [SampledSignal(np.random.default_rng(seed).standard_normal((SAMPLES, 3))) for seed in (0, 1)]
     time = make_time(2.0, SAMPLES, DT)
     initial = {"x": 0.0, "v": 0.0, "z": 0.0}
     lanes = [LaneInput({"c": 0.1 * index}, initial, {"F": signals[0], **time}) for index in range(7)]
@@ -47,10 +49,7 @@ def make_lanes() -> list[LaneInput]:
 def take_interval(lane: LaneInput, number: int, states: np.ndarray) -> LaneInput:
     """Return the lane of one interval that starts at given states."""
     part = slice(number * INTERVAL, (number + 1) * INTERVAL)
-    signals = {
-        name: SampledSignal(each.start[part], each.middle[part], each.end[part])
-        for name, each in lane.signals.items()
-    }
+    signals = {name: SampledSignal(each.moments[part]) for name, each in lane.signals.items()}
     return replace(lane, signals=signals, initial_states=dict(zip("xvz", states, strict=True)))
 
 

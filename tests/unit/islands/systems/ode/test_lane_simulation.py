@@ -8,16 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from islands.systems.ode.lane_simulation import (
-    LaneInput,
-    SampledSignal,
-    interpolate_linearly,
-    make_time,
-    simulate_lanes,
-)
+from islands.systems.ode.lane_simulation import simulate_lanes
+from islands.systems.ode.lane_values import LaneInput
 from islands.systems.ode.ode_expression import Symbol, evaluate
 from islands.systems.ode.ode_program import generate_program
 from islands.systems.ode.ode_system import OdeSystem, sort_variables
+from islands.systems.ode.sampled_signal import SampledSignal, interpolate_linearly, make_time
 from islands.systems.ode.system_document import make_system
 
 Array = NDArray[np.float64]
@@ -134,7 +130,7 @@ def test_halving_the_step_divides_the_error_by_sixteen() -> None:
     for parts in (1, 2, 64):
         time = TIME[-1] / (60 * parts) * np.arange(60 * parts + 1)
         step = time[1]
-        signal = SampledSignal(*(np.sin(2 * (time + ahead * step)) for ahead in (0.0, 0.5, 1.0)))
+        signal = SampledSignal.join(*(np.sin(2 * (time + ahead * step)) for ahead in (0.0, 0.5, 1.0)))
         errors.append(simulate_lanes(program, step, [LaneInput({}, {"x": 1.5}, {"F": signal})])[0, 0, -1])
     ratio = (errors[0] - errors[2]) / (errors[1] - errors[2])
     assert ratio == pytest.approx(16.0, rel=0.25)
@@ -164,42 +160,3 @@ def test_parts_without_states_are_computed_once() -> None:
     ends = generate_program(make_system(document)).instructions.ends
     # exp, a*b; atan, product; x*b, difference with product, difference, sum; 2*x, sum with product.
     assert np.diff(ends, prepend=0).tolist() == [2, 2, 4, 2]
-
-
-def test_a_delay_of_a_linear_signal_is_exact_between_samples() -> None:
-    signal, steps = interpolate_linearly(FORCE), np.arange(SAMPLES)
-    delayed = signal.delay(0.237 * DT, DT)
-    for part, ahead in ((delayed.start, 0.0), (delayed.middle, 0.5), (delayed.end, 1.0)):
-        assert part == pytest.approx(np.interp(steps + ahead - 0.237, steps, FORCE), abs=1e-13)
-
-
-def test_the_delay_of_a_held_signal_keeps_its_mean() -> None:
-    held = SampledSignal(FORCE, FORCE, FORCE)
-    delayed = held.delay(0.3 * DT, DT)
-    assert delayed.start[1:] == pytest.approx(0.7 * FORCE[1:] + 0.3 * FORCE[:-1], abs=1e-13)
-    assert delayed.start[0] == FORCE[0]
-
-
-def test_the_rate_of_a_held_signal_is_that_of_a_ramp_to_the_next_value() -> None:
-    rate = SampledSignal(FORCE, FORCE, FORCE).differentiate(DT)
-    assert rate.middle[:-1] == pytest.approx(np.diff(FORCE) / DT)
-    assert rate.end[-1] == 0.0
-
-
-def test_the_rate_of_a_parabola_is_exact() -> None:
-    time = np.array([0.0, 0.1, 0.2])
-    parabola = SampledSignal(*((time + ahead) ** 2 for ahead in (0.0, 0.05, 0.1)))
-    rate = parabola.differentiate(0.1)
-    for part, ahead in ((rate.start, 0.0), (rate.middle, 0.05), (rate.end, 0.1)):
-        assert part == pytest.approx(2 * (time + ahead), abs=1e-12)
-
-
-def test_a_divided_step_keeps_lines_parabolas_and_held_values() -> None:
-    line, held = interpolate_linearly(FORCE).refine(3), SampledSignal(FORCE, FORCE, FORCE).refine(4)
-    steps = np.arange(3 * SAMPLES) / 3
-    assert line.middle == pytest.approx(np.interp(steps + 1 / 6, np.arange(SAMPLES), FORCE), abs=1e-13)
-    assert line.end[:-1] == pytest.approx(line.start[1:], abs=1e-13)
-    for part in (held.start, held.middle, held.end):
-        assert np.array_equal(part, np.repeat(FORCE, 4))
-    parabola = SampledSignal(*((np.array([0.0, 0.1]) + ahead) ** 2 for ahead in (0.0, 0.05, 0.1))).refine(2)
-    assert parabola.end == pytest.approx(np.array([0.05, 0.1, 0.15, 0.2]) ** 2, abs=1e-15)

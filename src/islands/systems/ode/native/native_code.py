@@ -17,15 +17,11 @@ from llvmlite import binding
 from numpy.typing import NDArray
 
 from islands.systems.ode import ode_kernel
-from islands.systems.ode.kernel_arguments import (
-    LANES,
-    Instructions,
-    LaneLimits,
-    LaneRestarts,
-    LaneSignals,
-)
-from islands.systems.ode.native_generator import FUNCTION, NativeGenerator, ProgramCode
-from islands.systems.ode.native_store import is_stored, load_code, store_code
+from islands.systems.ode.kernel_arguments import LANES, LaneLimits, LaneRestarts, LaneSignals
+from islands.systems.ode.lane_values import LaneArguments
+from islands.systems.ode.native.native_generator import FUNCTION, NativeGenerator, ProgramCode
+from islands.systems.ode.native.native_store import is_stored, load_code, store_code
+from islands.systems.ode.ode_program import OdeProgram
 
 #: Interpreted instructions, once per step, after which a program is compiled: they take as long as the
 #: compilation.
@@ -66,10 +62,9 @@ class NativeCode:
 
     def integrate(
         self,
-        arena: NDArray[np.float64],
+        given: LaneArguments,
         signals: LaneSignals,
         dt: float,
-        limits: LaneLimits,
         restarts: LaneRestarts,
         lanes: int,
         first: int,
@@ -77,6 +72,7 @@ class NativeCode:
         out: NDArray[np.float64],
     ) -> None:
         """Integrate as `ode_kernel.integrate`, without force laws; restarts are at regular intervals."""
+        arena, limits = given.arena, given.limits
         arrays = (
             *(arena, signals.shared, signals.own, signals.places),
             *(limits.lower, limits.upper, limits.caught, restarts.states, out[:, :, first:]),
@@ -91,41 +87,71 @@ class NativeCode:
 
 
 def find_native_code(
-    instructions: Instructions, signals: LaneSignals, limits: LaneLimits, restarts: LaneRestarts
+    program: OdeProgram,
+    signals: LaneSignals,
+    order: NDArray[np.int64],
+    limits: LaneLimits,
+    restarts: LaneRestarts,
 ) -> NativeCode | None:
     """Return the machine code of a program that runs often or is stored; count the instructions of others."""
-    if not _is_supported(instructions):
+    lanes = signals.places.shape[2]
+    code = _describe(
+        program,
+        order.tobytes(),
+        signals.shared.shape[2],
+        tuple(limits.receivers.tolist()) if limits.lower.size else None,
+        limits.caught.size > 0,
+        restarts.states.shape[1] // lanes,
+        signals.places.shape[0] > 1,
+        lanes,
+    )
+    if code is None:
         return None
-    program = ProgramCode(
+    with _lock:
+        executed = _counts.pop(code, None)
+        if executed is None:
+            executed = np.inf if is_stored(code) else 0
+        _counts[code] = executed + signals.shared.shape[0] * len(program.instructions.code)
+        while len(_counts) > _COUNTED:
+            _counts.popitem(last=False)
+        least = COMPILED_FROM * (1 if lanes == LANES else MANY_LANES_FACTOR)
+        return _compile(code) if executed >= least else None
+
+
+@lru_cache(maxsize=_COUNTED)
+def _describe(
+    program: OdeProgram,
+    order: bytes,
+    shared: int,
+    receivers: tuple[int, ...] | None,
+    is_spilling: bool,
+    restarted: int,
+    is_moving: bool,
+    lanes: int,
+) -> ProgramCode | None:
+    """Return what the machine code of a program depends on; None if it remains interpreted.
+
+    A program remains interpreted if it is long, or calls force laws or functions that machine code cannot.
+    """
+    instructions = program.instructions
+    operations = instructions.code[:, 0]
+    calls = operations[operations >= ode_kernel.POWER]
+    if operations.size > MAX_INSTRUCTIONS or not (calls == ode_kernel.EXPONENTIAL).all():
+        return None
+    return ProgramCode(
         code=instructions.code.tobytes(),
         ends=tuple(instructions.ends.tolist()),
-        signals=tuple(instructions.signals.tolist()),
+        signals=tuple(instructions.signals[np.frombuffer(order, dtype=np.int64)].tolist()),
         slopes=tuple(instructions.slopes.tolist()),
         outputs=tuple(instructions.outputs.tolist()),
         states=instructions.states,
-        shared=signals.shared.shape[2],
-        receivers=tuple(limits.receivers.tolist()) if limits.lower.size else None,
-        is_spilling=limits.caught.size > 0,
-        restarted=restarts.states.shape[1] // signals.places.shape[2],
-        is_moving=signals.places.shape[0] > 1,
-        lanes=signals.places.shape[2],
+        shared=shared,
+        receivers=receivers,
+        is_spilling=is_spilling,
+        restarted=restarted,
+        is_moving=is_moving,
+        lanes=lanes,
     )
-    with _lock:
-        executed = _counts.pop(program, None)
-        if executed is None:
-            executed = np.inf if is_stored(program) else 0
-        _counts[program] = executed + signals.shared.shape[0] * len(instructions.code)
-        while len(_counts) > _COUNTED:
-            _counts.popitem(last=False)
-        least = COMPILED_FROM * (1 if program.lanes == LANES else MANY_LANES_FACTOR)
-        return _compile(program) if executed >= least else None
-
-
-def _is_supported(instructions: Instructions) -> bool:
-    """Return whether a program is short, and calls no force laws and only functions that machine code can."""
-    operations = instructions.code[:, 0]
-    calls = operations[operations >= ode_kernel.POWER]
-    return operations.size <= MAX_INSTRUCTIONS and bool((calls == ode_kernel.EXPONENTIAL).all())
 
 
 @lru_cache(maxsize=_KEPT)

@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 
 from islands.kernels.jit_cache import cache_folder
-from islands.systems.ode.native_generator import ProgramCode
+from islands.systems.ode.native.native_generator import ProgramCode
 
 #: Largest number of stored programs, about 20 kB each. If there are more, the older half is deleted.
 MAX_STORED = 2000

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from llvmlite import binding, ir
 
-from islands.systems.ode.row_operations import RowOperations
+from islands.systems.ode.native.row_operations import RowOperations
 
 #: Name of the function.
 FUNCTION = "integrate"

@@ -1,0 +1,1 @@
+"""Machine code of programs: generated, compiled for this processor, and stored."""
