@@ -1,4 +1,6 @@
-"""Operators with memory: play, stick-slip slider and rate limiter, each a single pass over the samples."""
+"""Operators with memory: play, stick-slip slider, rate limiter and uneven lag."""
+
+import math
 
 import numpy as np
 
@@ -53,6 +55,47 @@ def _limit_steps(u, step, x):
         x[k] = at
 
 
+#: Least time constant of a lag, relative to the sampling time. It has no visible effect.
+LEAST_LAG = 1e-9
+
+
+@kernel
+def _close_gap(gap, slope, time, edge, times):
+    """Return the gap between input and output after a time in which the input has a constant slope.
+
+    Between zero, the edges and infinity the rate of the output is linear in the gap.
+    """
+    while True:
+        side = np.copysign(1.0, gap if gap != 0.0 else slope)
+        distance, rise = side * gap, side * slope
+        near, tau = (times[2], times[3]) if side > 0.0 else (times[1], times[0])
+        lower, rate = edge, edge / near
+        if distance < edge or (distance == edge and rise <= rate):
+            lower, rate, tau = 0.0, 0.0, near
+        # The gap at which the output is as fast as the input, and the gap at which the time constant changes.
+        end = lower + tau * (rise - rate)
+        change = -1.0
+        if end < lower:
+            change = lower
+        elif lower == 0.0 and end > edge:
+            change = edge
+        passed = tau * math.log((distance - end) / (change - end)) if change >= 0.0 else time
+        if passed >= time:
+            return side * (end + (distance - end) * math.exp(-time / tau))
+        gap, time = side * change, time - passed
+
+
+@kernel
+def _follow(u, dt, edge, times, x):
+    gap = 0.0
+    x[0] = u[0]
+    for k in range(1, u.size):
+        slope = (u[k] - u[k - 1]) / dt
+        if gap != 0.0 or slope != 0.0:
+            gap = _close_gap(gap, slope, dt, edge, times)
+        x[k] = u[k] - gap
+
+
 def play_from(u, width):
     """Return the output of a play operator of half width ``width`` with input ``u``."""
     x = np.empty_like(u)
@@ -68,4 +111,24 @@ def limit_rate(u, step):
     """
     x = np.empty_like(u)
     _limit_steps(np.ascontiguousarray(u), step, x)
+    return x
+
+
+def lag_unevenly(u, dt, edge, times):
+    """Return ``u`` (samples,) with a first-order lag whose time constant depends on the distance to ``u``.
+
+    The output starts at ``u[0]``. It is exact for an input that is linear between samples.
+
+    Parameters
+    ----------
+    dt : float
+        Sampling time in seconds.
+    edge : float
+        Distance at which the time constant changes. The rate is continuous there.
+    times : ndarray, shape (4,)
+        Time constants in seconds: far above the input, near above it, near below it, and far below it.
+    """
+    x = np.array(u)
+    if np.max(times) > 0.0:
+        _follow(np.ascontiguousarray(u), dt, edge, np.maximum(times, LEAST_LAG * dt), x)
     return x

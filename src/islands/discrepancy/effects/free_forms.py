@@ -5,6 +5,7 @@ contains that shape approximately. It fits better only if the measured shape is 
 """
 
 from collections.abc import Callable, Sequence
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -39,12 +40,13 @@ def _make_free_form(
     unit: _Text = lambda _: "",
     size: _Number = lambda _: 1.0,
     equation: MakeEquation | None = None,
+    lower: float = -inf,
 ) -> Effect:
     """Return an effect with a coefficient for each label, whose typical value is a fraction of ``size``."""
 
     def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
         change = CHANGE * size(context)
-        return tuple(Parameter(label, unit(context), 0.0, change) for label in labels(context))
+        return tuple(Parameter(label, unit(context), 0.0, change, lower) for label in labels(context))
 
     def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
         return tuple(map(tuple, (START * size(context) * np.eye(len(labels(context)))).tolist()))
@@ -77,6 +79,7 @@ def _damping_force(_x: float, rate: float, _z: float, numbers: Any) -> float:
 
 _CURVE = "IEC 61298-2, terminal-based linearity"
 _FILTER = "Ljung, System Identification, section 4"
+_LAG = "Isermann, Fault-Diagnosis Applications, section 5"
 _MEMORY = "Kuhnen, Modeling, identification and compensation of complex hysteretic nonlinearities, 2003"
 _CHANGE = "Niedzwiecki, Identification of Time-Varying Processes"
 
@@ -104,6 +107,22 @@ FREE_FORMS: tuple[Effect, ...] = (
         "amplitude and phase that change with the frequency, also at small amplitudes",
         free_maps.label_time_constants,
         equation=free_maps.write_low_passes,
+    ),
+    _make_free_form(
+        "input-lag-curve",
+        "Any uneven first-order lag of the input: four time constants, by sign and size of its distance",
+        "timing",
+        Site.INPUT,
+        free_maps.lag_by_distance,
+        _LAG,
+        ("sensor-lag", "rate-limit", "delay"),
+        "input-filter, rate-limit",
+        "transients that differ between up and down, or between small and large steps",
+        lambda _: free_maps.LAG_LABELS,
+        lambda _: "s",
+        lambda context: context.dt / (2.0 * START),
+        free_maps.write_lag_by_distance,
+        0.0,
     ),
     _make_free_form(
         "input-memory",

@@ -8,13 +8,19 @@ from islands.discrepancy.effects.filters import low_pass
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 from islands.discrepancy.interfaces.map_equation import MapEquation
 from islands.systems.curve import PLACES, VALUES, interpolate_curve, write_curve
-from islands.systems.memory_operators import play_from
+from islands.systems.memory_operators import lag_unevenly, play_from
 
 #: Time constants of a free filter: from the sampling time to this fraction of the estimation part.
 TIME_CONSTANTS, LONGEST = 6, 0.1
 
 #: Half widths of the plays of a free memory, relative to the peak of the signal.
 HALF_WIDTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
+
+#: Distance from the input at which the time constant of a free lag changes, relative to the input's peak.
+LAG_EDGE = 0.1
+
+#: Labels of the time constants of a free lag.
+LAG_LABELS = ("falling, far", "falling, near", "rising, near", "rising, far")
 
 
 def label_places(_context: SimulationContext) -> list[str]:
@@ -64,6 +70,18 @@ def add_low_passes(signal: Signal, values: Signal, context: SimulationContext) -
 def write_low_passes(context: SimulationContext) -> MapEquation:
     """Write `add_low_passes`."""
     return _write_changes([("low-pass", str(tau)) for tau in _time_constants(context)])
+
+
+def lag_by_distance(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    """Lag the input with time constants that depend on sign and size of its distance."""
+    lagged: Signal = lag_unevenly(u, context.dt, LAG_EDGE * context.input_peak, values)
+    return lagged
+
+
+def write_lag_by_distance(context: SimulationContext) -> MapEquation:
+    """Write `lag_by_distance`."""
+    values = [f"n{place}" for place in range(len(LAG_LABELS))]
+    return MapEquation("z0", (("lag-unevenly", str(LAG_EDGE * context.input_peak), *values),))
 
 
 def add_plays(signal: Signal, values: Signal, peak: float) -> Signal:

@@ -1,4 +1,4 @@
-"""Operators with memory: stick-slip slider, play and rate limiter."""
+"""Operators with memory: stick-slip slider, play, rate limiter and uneven lag."""
 
 from itertools import pairwise
 
@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from islands.systems.memory_operators import limit_rate, play_from, slider
+from islands.systems.memory_operators import lag_unevenly, limit_rate, play_from, slider
 
 Array = NDArray[np.float64]
 
@@ -90,3 +90,34 @@ def test_the_output_does_not_depend_on_oversampling(u: Array, step: float, facto
 def test_a_step_becomes_a_ramp() -> None:
     u = np.repeat([0.0, 1.0], [2, 6])
     assert limit_rate(u, 0.25) == pytest.approx([0.0, 0.0, 0.25, 0.5, 0.75, 1.0, 1.0, 1.0])
+
+
+#: Time constants of a lag, from far above the input to far below it.
+lags = st.tuples(*[st.floats(0.0, 5.0)] * 4).map(np.array)
+
+
+@given(reals, lags, st.floats(0.01, 5.0), st.integers(2, 5))
+def test_an_uneven_lag_does_not_depend_on_oversampling(
+    u: Array, times: Array, edge: float, factor: int
+) -> None:
+    finer = np.interp(np.arange((u.size - 1) * factor + 1) / factor, np.arange(u.size), u)
+    found = lag_unevenly(finer, 1.0 / factor, edge, times)[::factor]
+    assert found == pytest.approx(lag_unevenly(u, 1.0, edge, times), abs=1e-6)
+
+
+@given(reals, lags, st.floats(0.01, 5.0))
+def test_an_uneven_lag_stays_in_the_range_of_the_input(u: Array, times: Array, edge: float) -> None:
+    x = lag_unevenly(u, 1.0, edge, times)
+    assert x[0] == u[0]
+    assert x.min() >= u.min() - 1e-6
+    assert x.max() <= u.max() + 1e-6
+
+
+def test_an_uneven_lag_approaches_a_step_with_the_time_constants_of_its_side() -> None:
+    """Exponentials: upwards with 2 s near and 4 s far from the input, downwards with 1 s."""
+    rise = lag_unevenly(np.concatenate([[0.0], np.ones(80)]), 0.1, 0.5, np.array([1.0, 1.0, 2.0, 4.0]))
+    # Far from the input, the rate is 0.5/2 at the edge and grows by 1/4 for each unit of the distance.
+    assert np.diff(rise)[-1] / 0.1 == pytest.approx((1.0 - rise[-2]) / 2.0, rel=0.03)
+    assert np.diff(rise)[2] / 0.1 == pytest.approx(0.25 + (0.5 - rise[2]) / 4.0, rel=0.03)
+    fall = lag_unevenly(np.concatenate([[1.0], np.zeros(80)]), 0.1, 0.5, np.array([1.0, 1.0, 2.0, 4.0]))
+    assert fall[2:] / fall[1:-1] == pytest.approx(np.exp(-0.1))

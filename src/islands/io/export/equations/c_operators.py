@@ -114,6 +114,35 @@ static void limit_rate(const double *x, double *z, size_t samples, double invers
 }
 """
 
+_LAG_UNEVENLY = """\
+/* First-order lag of x, which is linear between samples. Its time constants are those far above x, near above
+   it, near below it, and far below it: more than an edge away, or less. */
+static void lag_unevenly(const double *x, double *z, size_t samples, double edge, double above,
+                         double falling, double rising, double below)
+{
+    const double least = 1e-9*DT, times[2][2] = {
+        {fmax(falling, least), fmax(above, least)}, {fmax(rising, least), fmax(below, least)}};
+    double gap = 0.0;
+    z[0] = x[0];
+    for (size_t k = 1; k < samples; ++k) {
+        const double slope = (x[k] - x[k-1])/DT;
+        double left = gap != 0.0 || slope != 0.0 ? DT : 0.0;
+        while (left > 0.0) {
+            const double side = copysign(1.0, gap != 0.0 ? gap : slope), rise = side*slope;
+            const double *tau = times[side > 0.0];
+            const double distance = side*gap, fastest = edge/tau[0];
+            const int far = distance > edge || (distance == edge && rise > fastest);
+            const double lower = far ? edge : 0.0, end = lower + tau[far]*(rise - (far ? fastest : 0.0));
+            const double change = end < lower ? lower : !far && end > edge ? edge : -1.0;
+            const double passed = change < 0.0 ? left : tau[far]*log((distance - end)/(change - end));
+            gap = passed < left ? side*change : side*(end + (distance - end)*exp(-left/tau[far]));
+            left -= passed;
+        }
+        z[k] = x[k] - gap;
+    }
+}
+"""
+
 _INTERPOLATE = """\
 /* Signal at the time t*(1 + e) - tau, by Lagrange's polynomial through six samples; its ends are held. */
 static void interpolate_at(const double *x, double *z, size_t samples, double e, double tau)
@@ -158,6 +187,7 @@ C_OPERATORS: Mapping[str, str] = MappingProxyType(
         "play": _PLAY,
         "slider": _SLIDER,
         "limit-rate": _LIMIT_RATE,
+        "lag-unevenly": _LAG_UNEVENLY,
         "interpolate": _INTERPOLATE,
         "rests": _RESTS,
     }

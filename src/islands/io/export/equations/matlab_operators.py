@@ -91,6 +91,45 @@ function z = limit_rate(x, inverse_rate, c)
 end
 """
 
+_LAG_UNEVENLY = """\
+function z = lag_unevenly(x, edge, above, falling, rising, below, c)
+% First-order lag of x, which is linear between samples. Its time constants are those far above x, near above
+% it, near below it, and far below it: more than an edge away, or less.
+  times = max([falling, above; rising, below], 1e-9*c.dt);
+  z = x;
+  gap = 0;
+  for k = 2:numel(x)
+    slope = (x(k) - x(k-1))/c.dt;
+    left = c.dt*(gap ~= 0 || slope ~= 0);
+    while left > 0
+      side = sign(gap + (gap == 0)*slope);
+      tau = times(1 + (side > 0), :);
+      distance = side*gap;
+      rise = side*slope;
+      fastest = edge/tau(1);
+      far = distance > edge || (distance == edge && rise > fastest);
+      lower = far*edge;
+      last = lower + tau(1 + far)*(rise - far*fastest);
+      change = -1;
+      if last < lower
+        change = lower;
+      elseif ~far && last > edge
+        change = edge;
+      end
+      passed = left;
+      if change >= 0, passed = tau(1 + far)*log((distance - last)/(change - last)); end
+      if passed < left
+        gap = side*change;
+      else
+        gap = side*(last + (distance - last)*exp(-left/tau(1 + far)));
+      end
+      left = left - passed;
+    end
+    z(k) = x(k) - gap;
+  end
+end
+"""
+
 _INTERPOLATE = """\
 function z = interpolate_at(x, e, tau, c)
 % Signal at the time t*(1 + e) - tau, by Lagrange's polynomial through six samples; its ends are held.
@@ -124,6 +163,7 @@ MATLAB_OPERATORS: Mapping[str, str] = MappingProxyType(
         "play": _PLAY,
         "slider": _SLIDER,
         "limit-rate": _LIMIT_RATE,
+        "lag-unevenly": _LAG_UNEVENLY,
         "interpolate": _INTERPOLATE,
         "rests": _RESTS,
     }

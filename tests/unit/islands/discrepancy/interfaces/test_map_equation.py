@@ -15,7 +15,7 @@ from islands.discrepancy.effects.timing import RESONANCE
 from islands.discrepancy.interfaces.effect import Effect, SimulationContext, Site
 from islands.discrepancy.interfaces.map_equation import OPERATORS
 from islands.discrepancy.interfaces.segments import is_resting
-from islands.systems.memory_operators import limit_rate, play_from, slider
+from islands.systems.memory_operators import lag_unevenly, limit_rate, play_from, slider
 from islands.systems.ode.equation_parser import parse_expression
 from islands.systems.ode.ode_expression import evaluate
 
@@ -56,6 +56,7 @@ FUNCTIONS: dict[str, Callable[..., Array | float]] = {
     "play": lambda x, _, width: play_from(x, width) if width > 0.0 else x,
     "slider": lambda x, _, breakaway: slip(x, breakaway) if breakaway > 0.0 else x,
     "limit-rate": lambda x, context, inverse: limit_rate(x, context.dt / inverse) if inverse > 0.0 else x,
+    "lag-unevenly": lambda x, context, edge, *times: lag_unevenly(x, context.dt, edge, np.array(times)),
     "interpolate": lambda x, context, e, tau: interpolate_at(
         x, np.arange(x.size) * (1.0 + e) - tau / context.dt
     ),
