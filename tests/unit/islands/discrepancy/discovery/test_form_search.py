@@ -60,6 +60,26 @@ def test_effect_in_addition_to_a_free_form_is_named() -> None:
 
 
 @pytest.mark.ci
+def test_a_lag_that_is_slower_in_one_direction_is_a_family_with_its_time_constants() -> None:
+    """A valve opens with a time constant of 0.3 s and closes with 0.1 s, ahead of a first-order process."""
+    fine, at, valve = 20, U[0], []
+    for u in np.interp(np.arange(fine * U.size) / fine, np.arange(U.size), U).tolist():
+        at += (u - at) * 0.01 / fine / (0.3 if u > at else 0.1)
+        valve.append(at)
+
+    def follow(u: np.ndarray, dt: float, gain: float = 1.0) -> np.ndarray:
+        return gain * low_pass(u, 0.05, dt)
+
+    y = follow(np.array(valve)[::fine], 0.01)
+    found = islands.diagnose(recorded(U, y + NOISE), islands.function_simulator(follow))
+    assert str(found.verdict) == "family"
+    (form,) = [each for each in found.effects if each.explained_fraction is not None]
+    assert (form.name, form.family) == ("input-lag-curve", "timing")
+    falling, rising = (form.parameters[f"{side}, near"].value for side in ("falling", "rising"))
+    assert (falling, rising) == (pytest.approx(0.1, rel=0.1), pytest.approx(0.3, rel=0.1))
+
+
+@pytest.mark.ci
 def test_listed_shape_keeps_its_name() -> None:
     found = diagnose(THEIRS + 0.02 * U**2)
     assert str(found.verdict) == "named"
