@@ -60,7 +60,7 @@ def test_effect_in_addition_to_a_free_form_is_named() -> None:
 
 
 @pytest.mark.ci
-def test_a_lag_that_is_slower_in_one_direction_is_a_family_with_its_time_constants() -> None:
+def test_uneven_lag_is_a_family_with_its_time_constants() -> None:
     """A valve opens with a time constant of 0.3 s and closes with 0.1 s, ahead of a first-order process."""
     fine, at, valve = 20, U[0], []
     for u in np.interp(np.arange(fine * U.size) / fine, np.arange(U.size), U).tolist():
