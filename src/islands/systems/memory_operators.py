@@ -63,7 +63,7 @@ LEAST_LAG = 1e-9
 def _close_gap(gap, slope, time, edge, times):
     """Return the gap between input and output after a time in which the input has a constant slope.
 
-    Between zero, the edges and infinity the rate of the output is linear in the gap.
+    On each side of zero and of the edges, the rate of the output is linear in the gap.
     """
     while True:
         side = np.copysign(1.0, gap if gap != 0.0 else slope)
@@ -80,7 +80,7 @@ def _close_gap(gap, slope, time, edge, times):
         elif lower == 0.0 and end > edge:
             change = edge
         passed = tau * math.log((distance - end) / (change - end)) if change >= 0.0 else time
-        if passed >= time:
+        if not passed < time:  # also for an input that is not finite
             return side * (end + (distance - end) * math.exp(-time / tau))
         gap, time = side * change, time - passed
 

@@ -110,7 +110,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "input-lag-curve",
-        "Any uneven first-order lag of the input: four time constants, by sign and size of its distance",
+        "Any uneven lag of the input: time constants rising and falling, near (a tenth of the peak) and far",
         "timing",
         Site.INPUT,
         free_maps.lag_by_distance,

@@ -113,6 +113,12 @@ def test_an_uneven_lag_stays_in_the_range_of_the_input(u: Array, times: Array, e
     assert x.max() <= u.max() + 1e-6
 
 
+def test_an_uneven_lag_of_an_input_that_overflows_ends() -> None:
+    x = lag_unevenly(np.array([0.0, np.inf, 1.0, np.nan, 2.0]), 1.0, 0.5, np.ones(4))
+    assert x[0] == 0.0
+    assert not np.isfinite(x[1:]).any()
+
+
 def test_an_uneven_lag_approaches_a_step_with_the_time_constants_of_its_side() -> None:
     """Exponentials: upwards with 2 s near and 4 s far from the input, downwards with 1 s."""
     rise = lag_unevenly(np.concatenate([[0.0], np.ones(80)]), 0.1, 0.5, np.array([1.0, 1.0, 2.0, 4.0]))
