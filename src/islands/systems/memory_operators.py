@@ -60,17 +60,18 @@ LEAST_LAG = 1e-9
 
 
 @kernel
-def _close_gap(gap, slope, time, edge, times):
+def _close_gap(gap, slope, time, slow, times):
     """Return the gap between input and output after a time in which the input has a constant slope.
 
-    On each side of zero and of the edges, the rate of the output is linear in the gap.
+    The gap is a curve over the rate of the output: two straight lines on each side of zero.
     """
     while True:
         side = np.copysign(1.0, gap if gap != 0.0 else slope)
         distance, rise = side * gap, side * slope
         near, tau = (times[2], times[3]) if side > 0.0 else (times[1], times[0])
-        lower, rate = edge, edge / near
-        if distance < edge or (distance == edge and rise <= rate):
+        edge = slow * near
+        lower, rate = edge, slow
+        if distance < edge or (distance == edge and rise <= slow):
             lower, rate, tau = 0.0, 0.0, near
         # The gap at which the output is as fast as the input, and the gap at which the time constant changes.
         end = lower + tau * (rise - rate)
@@ -86,13 +87,13 @@ def _close_gap(gap, slope, time, edge, times):
 
 
 @kernel
-def _follow(u, dt, edge, times, x):
+def _follow(u, dt, slow, times, x):
     gap = 0.0
     x[0] = u[0]
     for k in range(1, u.size):
         slope = (u[k] - u[k - 1]) / dt
         if gap != 0.0 or slope != 0.0:
-            gap = _close_gap(gap, slope, dt, edge, times)
+            gap = _close_gap(gap, slope, dt, slow, times)
         x[k] = u[k] - gap
 
 
@@ -114,8 +115,8 @@ def limit_rate(u, step):
     return x
 
 
-def lag_unevenly(u, dt, edge, times):
-    """Return ``u`` (samples,) with a first-order lag whose time constant depends on the distance to ``u``.
+def lag_unevenly(u, dt, slow, times):
+    """Return ``u`` (samples,) with a first-order lag whose time constant depends on the rate of the output.
 
     The output starts at ``u[0]``. It is exact for an input that is linear between samples.
 
@@ -123,12 +124,12 @@ def lag_unevenly(u, dt, edge, times):
     ----------
     dt : float
         Sampling time in seconds.
-    edge : float
-        Distance at which the time constant changes. The rate is continuous there.
+    slow : float
+        Rate of the output per second at which the time constant changes. The distance to ``u`` is continuous.
     times : ndarray, shape (4,)
-        Time constants in seconds: far above the input, near above it, near below it, and far below it.
+        Time constants in seconds: falling fast, falling slowly, rising slowly, and rising fast.
     """
     x = np.array(u)
     if np.max(times) > 0.0:
-        _follow(np.ascontiguousarray(u), dt, edge, np.maximum(times, LEAST_LAG * dt), x)
+        _follow(np.ascontiguousarray(u), dt, slow, np.maximum(times, LEAST_LAG * dt), x)
     return x

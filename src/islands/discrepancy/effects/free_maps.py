@@ -16,11 +16,8 @@ TIME_CONSTANTS, LONGEST = 6, 0.1
 #: Half widths of the plays of a free memory, relative to the peak of the signal.
 HALF_WIDTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
 
-#: Distance from the input at which the time constant of a free lag changes, relative to the input's peak.
-LAG_EDGE = 0.1
-
 #: Labels of the time constants of a free lag.
-LAG_LABELS = ("falling, far", "falling, near", "rising, near", "rising, far")
+LAG_LABELS = ("falling fast", "falling slowly", "rising slowly", "rising fast")
 
 
 def label_places(_context: SimulationContext) -> list[str]:
@@ -72,16 +69,22 @@ def write_low_passes(context: SimulationContext) -> MapEquation:
     return _write_changes([("low-pass", str(tau)) for tau in _time_constants(context)])
 
 
-def lag_by_distance(u: Signal, values: Signal, context: SimulationContext) -> Signal:
-    """Lag the input with time constants that depend on sign and size of its distance."""
-    lagged: Signal = lag_unevenly(u, context.dt, LAG_EDGE * context.input_peak, values)
+def _typical_rate(context: SimulationContext) -> float:
+    """Return a typical rate of the input per second, from scales that an extended simulation keeps."""
+    coordinate = context.force_coordinate
+    return context.input_peak * coordinate.rate / (coordinate.peak or 1.0)
+
+
+def lag_by_rate(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    """Lag the input with time constants that depend on the rate, which is slow or fast for the input."""
+    lagged: Signal = lag_unevenly(u, context.dt, _typical_rate(context), values)
     return lagged
 
 
-def write_lag_by_distance(context: SimulationContext) -> MapEquation:
-    """Write `lag_by_distance`."""
+def write_lag_by_rate(context: SimulationContext) -> MapEquation:
+    """Write `lag_by_rate`."""
     values = [f"n{place}" for place in range(len(LAG_LABELS))]
-    return MapEquation("z0", (("lag-unevenly", str(LAG_EDGE * context.input_peak), *values),))
+    return MapEquation("z0", (("lag-unevenly", str(_typical_rate(context)), *values),))
 
 
 def add_plays(signal: Signal, values: Signal, peak: float) -> Signal:

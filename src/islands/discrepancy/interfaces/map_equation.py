@@ -13,7 +13,7 @@ from islands.discrepancy.interfaces.context import SimulationContext
 #: * ``resonance`` (period in s, damping ratio): mode in series with the signal
 #: * ``play`` (half width), ``slider`` (breakaway): `islands.systems.memory_operators`
 #: * ``limit-rate`` (inverse of the rate per second): `islands.systems.memory_operators`
-#: * ``lag-unevenly`` (edge, four time constants in s): `islands.systems.memory_operators`
+#: * ``lag-unevenly`` (rate per second, four time constants in s): `islands.systems.memory_operators`
 #: * ``interpolate`` (e, tau in s): the signal at the time ``t (1 + e) - tau``
 #: * ``first``: number, the first sample
 #: * ``rests``: number, 1 if the signal is constant over the estimation part, otherwise 0

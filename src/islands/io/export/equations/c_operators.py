@@ -115,13 +115,13 @@ static void limit_rate(const double *x, double *z, size_t samples, double invers
 """
 
 _LAG_UNEVENLY = """\
-/* First-order lag of x, which is linear between samples. Its time constants are those far above x, near above
-   it, near below it, and far below it: more than an edge away, or less. */
-static void lag_unevenly(const double *x, double *z, size_t samples, double edge, double above,
-                         double falling, double rising, double below)
+/* First-order lag of x, which is linear between samples. Its time constants are those of falling fast,
+   falling slowly, rising slowly and rising fast: z' is above a rate per second, or below. */
+static void lag_unevenly(const double *x, double *z, size_t samples, double slow, double falling_fast,
+                         double falling, double rising, double rising_fast)
 {
     const double least = 1e-9*DT, times[2][2] = {
-        {fmax(falling, least), fmax(above, least)}, {fmax(rising, least), fmax(below, least)}};
+        {fmax(falling, least), fmax(falling_fast, least)}, {fmax(rising, least), fmax(rising_fast, least)}};
     double gap = 0.0;
     z[0] = x[0];
     for (size_t k = 1; k < samples; ++k) {
@@ -130,12 +130,12 @@ static void lag_unevenly(const double *x, double *z, size_t samples, double edge
         while (left > 0.0) {
             const double side = copysign(1.0, gap != 0.0 ? gap : slope), rise = side*slope;
             const double *tau = times[side > 0.0];
-            const double distance = side*gap, fastest = edge/tau[0];
-            const int far = distance > edge || (distance == edge && rise > fastest);
-            const double lower = far ? edge : 0.0, end = lower + tau[far]*(rise - (far ? fastest : 0.0));
-            const double change = end < lower ? lower : !far && end > edge ? edge : -1.0;
-            const double passed = change < 0.0 ? left : tau[far]*log((distance - end)/(change - end));
-            gap = passed < left ? side*change : side*(end + (distance - end)*exp(-left/tau[far]));
+            const double distance = side*gap, edge = slow*tau[0];
+            const int fast = distance > edge || (distance == edge && rise > slow);
+            const double lower = fast ? edge : 0.0, end = lower + tau[fast]*(rise - (fast ? slow : 0.0));
+            const double change = end < lower ? lower : !fast && end > edge ? edge : -1.0;
+            const double passed = change < 0.0 ? left : tau[fast]*log((distance - end)/(change - end));
+            gap = passed < left ? side*change : side*(end + (distance - end)*exp(-left/tau[fast]));
             left -= passed;
         }
         z[k] = x[k] - gap;

@@ -92,10 +92,10 @@ end
 """
 
 _LAG_UNEVENLY = """\
-function z = lag_unevenly(x, edge, above, falling, rising, below, c)
-% First-order lag of x, which is linear between samples. Its time constants are those far above x, near above
-% it, near below it, and far below it: more than an edge away, or less.
-  times = max([falling, above; rising, below], 1e-9*c.dt);
+function z = lag_unevenly(x, slow, falling_fast, falling, rising, rising_fast, c)
+% First-order lag of x, which is linear between samples. Its time constants are those of falling fast, falling
+% slowly, rising slowly and rising fast: z' is above a rate per second, or below.
+  times = max([falling, falling_fast; rising, rising_fast], 1e-9*c.dt);
   z = x;
   gap = 0;
   for k = 2:numel(x)
@@ -106,22 +106,22 @@ function z = lag_unevenly(x, edge, above, falling, rising, below, c)
       tau = times(1 + (side > 0), :);
       distance = side*gap;
       rise = side*slope;
-      fastest = edge/tau(1);
-      far = distance > edge || (distance == edge && rise > fastest);
-      lower = far*edge;
-      last = lower + tau(1 + far)*(rise - far*fastest);
+      edge = slow*tau(1);
+      fast = distance > edge || (distance == edge && rise > slow);
+      lower = fast*edge;
+      last = lower + tau(1 + fast)*(rise - fast*slow);
       change = -1;
       if last < lower
         change = lower;
-      elseif ~far && last > edge
+      elseif ~fast && last > edge
         change = edge;
       end
       passed = left;
-      if change >= 0, passed = tau(1 + far)*log((distance - last)/(change - last)); end
+      if change >= 0, passed = tau(1 + fast)*log((distance - last)/(change - last)); end
       if passed < left
         gap = side*change;
       else
-        gap = side*(last + (distance - last)*exp(-left/tau(1 + far)));
+        gap = side*(last + (distance - last)*exp(-left/tau(1 + fast)));
       end
       left = left - passed;
     end

@@ -75,7 +75,7 @@ def test_uneven_lag_is_a_family_with_its_time_constants() -> None:
     assert str(found.verdict) == "family"
     (form,) = [each for each in found.effects if each.explained_fraction is not None]
     assert (form.name, form.family) == ("input-lag-curve", "timing")
-    falling, rising = (form.parameters[f"{side}, near"].value for side in ("falling", "rising"))
+    falling, rising = (form.parameters[f"{side} slowly"].value for side in ("falling", "rising"))
     assert (falling, rising) == (pytest.approx(0.1, rel=0.1), pytest.approx(0.3, rel=0.1))
 
 

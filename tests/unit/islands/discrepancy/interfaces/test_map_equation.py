@@ -56,7 +56,7 @@ FUNCTIONS: dict[str, Callable[..., Array | float]] = {
     "play": lambda x, _, width: play_from(x, width) if width > 0.0 else x,
     "slider": lambda x, _, breakaway: slip(x, breakaway) if breakaway > 0.0 else x,
     "limit-rate": lambda x, context, inverse: limit_rate(x, context.dt / inverse) if inverse > 0.0 else x,
-    "lag-unevenly": lambda x, context, edge, *times: lag_unevenly(x, context.dt, edge, np.array(times)),
+    "lag-unevenly": lambda x, context, slow, *times: lag_unevenly(x, context.dt, slow, np.array(times)),
     "interpolate": lambda x, context, e, tau: interpolate_at(
         x, np.arange(x.size) * (1.0 + e) - tau / context.dt
     ),
