@@ -56,8 +56,8 @@ class LaneSignals(NamedTuple):
     ----------
     shared : ndarray, shape (samples, 3, shared)
         Signals that are equal in all lanes.
-    own : ndarray, shape (samples, 3, different)
-        Signals of single lanes.
+    own : ndarray, shape (different * samples, 3, 1)
+        Signals of single lanes, one after another.
     places : ndarray of int64, shape (restarts or 1, signals, lanes)
         Index in ``own``, as one row, of the first value of each further signal in each lane. If there are
         several, each restart has its own.
