@@ -24,6 +24,7 @@ from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis_assembly import extend_equations, make_diagnosis, make_gross_diagnosis
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.discovery.discovery import find_missing_terms, replaces_effects
+from islands.discrepancy.discovery.equation_simulator import find_equations
 from islands.discrepancy.discovery.form_search import compare_with_free_forms
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.gross_errors.channel_admission import admit_channels
@@ -44,6 +45,7 @@ from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.output_equation import add_output_equation
 from islands.errors import RecordError
 from islands.evolution.progress import ProgressCallback, ignore_progress
 
@@ -100,6 +102,8 @@ def diagnose(
     except RecordError as error:
         raise explain_divergence(error, record, simulator, fitted, prior_std) from error
     rng = np.random.default_rng(seed)
+    if find_equations(simulator) is None:
+        simulator = add_output_equation(simulator, context)
     simulation = ExtendedSimulator(simulator, (), context)
     target = make_target(record, fitted, prior_std)
     progress("calibrating the simulation", 0.0)

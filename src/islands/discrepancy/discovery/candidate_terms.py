@@ -1,10 +1,11 @@
 """Candidate terms of an equation: small expressions of states, input, the rate of the input, and time.
 
-The output of an FMU is one more signal, in terms that are added to it.
+The output of an FMU, or of a simulation without equations, is one more signal, in terms that are added to
+it.
 """
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,10 +112,9 @@ class CandidateTerm:
         return system.with_term(self.target, f"{coefficient}*({text})", parameters)
 
 
-def find_free_numbers(system: OdeSystem, count: int) -> list[int]:
-    """Return the smallest numbers of terms whose parameters have names that a system does not use."""
-    used = system.find_names()
-    free = (number for number in itertools.count(1) if not {f"a{number}", f"s{number}"} & used.keys())
+def find_free_numbers(used: Set[str], count: int) -> list[int]:
+    """Return the smallest numbers of terms whose parameters have names that are not used."""
+    free = (number for number in itertools.count(1) if not {f"a{number}", f"s{number}"} & used)
     return list(itertools.islice(free, count))
 
 
@@ -135,8 +135,9 @@ def list_candidate_terms(
         Units of the states, of the input, and of the output (``output``); empty if they are not known.
     """
     states = [name for name, _ in system.derivatives]
-    # Only the output can depend on the output of an FMU, which is computed once for each sample.
+    # Only the output can depend on the output of an FMU or of another simulation.
     outputs = [f"{FMU}({name})" for name in system.of_fmu if name not in states]
+    outputs += filter(None, (system.simulated,))
     rate = f"rate({system.input})"
     values, units = {**sizes, TIME: duration}, {**units, TIME: "s"}
     terms = []

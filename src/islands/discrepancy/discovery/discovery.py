@@ -12,7 +12,6 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     evaluate_fit,
 )
 from islands.discrepancy.calibration.target import Target
-from islands.discrepancy.discovery.equation_simulator import find_equations
 from islands.discrepancy.discovery.joint_search import JointResult, search_jointly
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.inference.confidence import CONFIDENCE_TEMPERATURE
@@ -135,10 +134,8 @@ def find_missing_terms(
     Returns
     -------
     MissingTerms or None
-        None if the simulator has no equations, or if no term gains enough.
+        None if no term gains enough.
     """
-    if find_equations(base.simulation.simulator) is None:
-        return None
     effects_alone = _score_effects(alone, base, target)
     found = search_terms(base, target, parallel_map, effects_alone.cost)
     terms = None if found is None else _compare(JointResult(found), effects_alone)

@@ -11,21 +11,22 @@ from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import ResampledSimulator
 from islands.discrepancy.simulators.ode import OdeSimulator
+from islands.discrepancy.simulators.output_equation import OutputEquation
 from islands.systems.ode.ode_system import OdeSystem
 
 
-def find_equations(simulator: Simulator) -> OdeSimulator | None:
+def find_equations(simulator: Simulator) -> OdeSimulator | OutputEquation | None:
     """Return the simulator of equations; None if the simulator has no equations that can be extended."""
     if isinstance(simulator, ResampledSimulator):
         return find_equations(simulator.simulator)
-    return simulator if isinstance(simulator, OdeSimulator) else None
+    return simulator if isinstance(simulator, OdeSimulator | OutputEquation) else None
 
 
 def with_equations(simulator: Simulator, system: OdeSystem) -> Simulator:
     """Return the simulator with other equations; the wrappers stay."""
     if isinstance(simulator, ResampledSimulator):
         return replace(simulator, simulator=with_equations(simulator.simulator, system))
-    assert isinstance(simulator, OdeSimulator)
+    assert isinstance(simulator, OdeSimulator | OutputEquation)
     return replace(simulator, system=system)
 
 
@@ -60,3 +61,8 @@ def get_system(fit: CalibrationResult) -> OdeSystem:
     equations = find_equations(fit.simulation.simulator)
     assert equations is not None
     return equations.system
+
+
+def find_used_names(fit: CalibrationResult) -> set[str]:
+    """Return the names in the equations of a fit and those of its parameters."""
+    return {*get_system(fit).find_names(), *(each.name for each in fit.simulation.parameters)}

@@ -14,6 +14,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResul
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.effects import catalogue_order
+from islands.discrepancy.effects.model_form import CORE_SHAPE
 from islands.discrepancy.inference.hypothesis import Hypothesis, with_effect
 from islands.discrepancy.inference.screening import (
     screen_effects,
@@ -82,14 +83,16 @@ def search_jointly(
 
 
 def _list_starts(alone: SearchOutcome) -> list[Hypothesis]:
-    """Return a hypothesis without each of its effects, not refitted, or a single one with a remainder."""
+    """Return a hypothesis without each of its effects, not refitted, or a single one with a remainder.
+
+    An identified model also keeps its model-form error alone, which all other effects may imitate.
+    """
     found = alone.hypothesis
     if len(found.effects) == 1:
         return [found] if alone.verdict == Verdict.REMAINDER else []
-    return [
-        replace(found, effects=tuple(each for each in found.effects if each is not effect))
-        for effect in found.effects
-    ]
+    kept = [tuple(each for each in found.effects if each is not effect) for effect in found.effects]
+    kept.append(tuple(each for each in found.effects if each.name == CORE_SHAPE))
+    return [replace(found, effects=effects) for effects in kept if effects]
 
 
 def _add_effect(

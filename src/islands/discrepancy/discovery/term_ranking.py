@@ -10,7 +10,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResul
 from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.candidate_terms import CandidateTerm, find_free_numbers
-from islands.discrepancy.discovery.equation_simulator import add_terms, get_system
+from islands.discrepancy.discovery.equation_simulator import add_terms, find_used_names, get_system
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 
@@ -58,7 +58,7 @@ def rank_terms(
     projections = [Projection(fit, target) for target in targets]
 
     def explain_group(group: Sequence[CandidateTerm]) -> NDArray[np.float64]:
-        numbers = find_free_numbers(get_system(fit), len(group))
+        numbers = find_free_numbers(find_used_names(fit), len(group))
         numbered = list(zip(group, numbers, strict=True))
         simulation, start = add_terms(fit, get_system(fit), numbered, target_sizes)
         index = {parameter.name: place for place, parameter in enumerate(simulation.parameters)}

@@ -21,7 +21,12 @@ from islands.discrepancy.discovery.candidate_terms import (
     find_free_numbers,
     list_candidate_terms,
 )
-from islands.discrepancy.discovery.equation_simulator import add_terms, find_equations, get_system
+from islands.discrepancy.discovery.equation_simulator import (
+    add_terms,
+    find_equations,
+    find_used_names,
+    get_system,
+)
 from islands.discrepancy.discovery.term_ranking import RankedTerm, rank_terms
 from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
@@ -117,7 +122,8 @@ class TermSearchResult:
             for parameter, value in zip(self.fit.simulation.parameters, self.fit.values, strict=True)
         }
         new = [values[name] for each in self.terms for name in each.parameters]
-        return "; ".join([*lines, ", ".join(new)])
+        meaning = f"{system.simulated} is the simulated output, {system.input} the input"
+        return "; ".join([*lines, ", ".join(new), *([meaning] if system.simulated else [])])
 
 
 def search_terms(
@@ -158,6 +164,7 @@ def search_terms(
     sizes = {**equations.sizes, system.input: context.input_peak, f"rate({system.input})": rate}
     units = {each.name: each.unit for each in system.states}
     units |= {system.input: context.input_unit, OUTPUT: context.output_unit}
+    units |= dict.fromkeys(filter(None, (system.simulated,)), context.output_unit)
     candidates = list_candidate_terms(system, sizes, context.duration, units)
     target_sizes = {
         OUTPUT: context.output_peak,
@@ -227,7 +234,7 @@ def _find_best_term(
 ) -> TermSearchResult | None:
     """Return the equations with the term that is best after a calibration of all parameters."""
     fit, used = found.fit, {(each.term.target, each.term.text) for each in found.terms}
-    (number,) = find_free_numbers(get_system(fit), 1)
+    (number,) = find_free_numbers(find_used_names(fit), 1)
     free = [each for each in candidates if (each.target, each.text) not in used]
     log_n, log_choices = float(np.log(fit.noise.effective_samples)), 2.0 * float(np.log(len(candidates)))
     ranked = rank_terms(fit, [target, unweighted], free, target_sizes, parallel_map)[:FITTED_TERMS]

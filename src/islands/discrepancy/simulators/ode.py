@@ -70,7 +70,7 @@ class OdeSimulator:
 
     def __post_init__(self) -> None:
         system = self.system
-        free = (_make_parameter(each) for each in system.parameters if not each.fixed)
+        free = (make_parameter(each) for each in system.parameters if not each.fixed)
         supported, of_states = find_effects(system, self.sizes)
         object.__setattr__(self, "parameters", (*free, *self._list_initial_states()))
         object.__setattr__(self, "state_effects", of_states)
@@ -283,7 +283,8 @@ class OdeSimulator:
         return run.intersample_values
 
 
-def _make_parameter(given: OdeParameter) -> Parameter:
+def make_parameter(given: OdeParameter) -> Parameter:
+    """Return a parameter of equations as that of a simulator, with its bounds and its typical change."""
     ends = (0.05 * given.value, 20.0 * given.value)
     lower = min(ends) if given.lower is None else given.lower
     upper = max(ends) if given.upper is None else given.upper

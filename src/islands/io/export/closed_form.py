@@ -86,6 +86,8 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
             )
         case _:
             raise _refuse(f"the simulation {spec.kind}")
+    if spec.output_equation is not None:
+        raise _refuse("an equation of the output with missing terms")
     if (spec.hold, spec.times) != ("first-order", 1):
         raise _refuse("a simulation with several steps per sample")
     # A map replaces the input inside the maps before it, so that the last one is applied first.

@@ -10,7 +10,8 @@ from islands.io.export.closed_form import closed_form
 from islands.io.export.equations.c_equations import c_equations
 from islands.io.export.equations.equation_collection import collect_equations
 from islands.io.export.equations.matlab_equations import matlab_equations
-from islands.io.simulator_spec.ode_spec import OdeSpec
+from islands.io.simulator_spec.ode_spec import OdeParameterSpec, OdeSpec
+from islands.io.simulator_spec.spec_base import ValueSpec
 from islands.io.simulator_spec.specification import LocalExtendedSpec, PhysicalSpec, innermost
 
 
@@ -25,10 +26,11 @@ def as_text(spec: LocalExtendedSpec) -> str:
         lines[0] += f"{simulator.pop('kind', 'extended')} {json.dumps(simulator)}"
     if spec.times > 1 or spec.hold != "first-order":
         lines.append(f"solved with {spec.times} steps per sample; input between samples: {spec.hold}")
+    if (added := spec.output_equation) is not None:
+        lines.append(f"output = {added.equation}, where y_sim is the simulated output and u the input")
+        lines += [f"    {line}" for line in _describe_values(added.parameters)]
     for effect in spec.effects:
-        values = ", ".join(
-            f"{name} = {each.value:.6g} {each.unit}" for name, each in effect.parameters.items()
-        )
+        values = ", ".join(_describe_values(effect.parameters))
         lines.append(f"{effect.name} ({effect.site}): {get_summary(effect.name)}")
         lines.append(f"    {values}")
     return "\n".join(lines) + "\n"
@@ -39,8 +41,12 @@ def _describe_equations(spec: OdeSpec) -> list[str]:
     return [
         *spec.equations.splitlines(),
         f"output = {spec.output}",
-        *(f"{name} = {each.value:.6g} {each.unit}".rstrip() for name, each in spec.parameters.items()),
+        *_describe_values(spec.parameters),
     ]
+
+
+def _describe_values(values: Mapping[str, ValueSpec | OdeParameterSpec]) -> list[str]:
+    return [f"{name} = {each.value:.6g} {each.unit}".rstrip() for name, each in values.items()]
 
 
 def as_json(spec: LocalExtendedSpec) -> str:

@@ -18,12 +18,13 @@ from islands.discrepancy.simulators.intersample import InterSample, ResampledSim
 from islands.discrepancy.simulators.linear import LinearSimulator
 from islands.discrepancy.simulators.narx import NarxSimulator
 from islands.discrepancy.simulators.ode import OdeSimulator
+from islands.discrepancy.simulators.output_equation import OutputEquation
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.io.models import model_json
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
-from islands.io.simulator_spec.ode_spec import OdeSpec
+from islands.io.simulator_spec.ode_spec import OdeSpec, OutputEquationSpec
 from islands.io.simulator_spec.spec_base import EffectSpec, FrameSpec, ScalesSpec, ValueSpec
 from islands.io.simulator_spec.specification import (
     ColumnSpec,
@@ -154,13 +155,19 @@ def _make_extended_spec(
     if isinstance(simulator, ResampledSimulator):
         intersample, oversampling = simulator.intersample, simulator.oversampling
         inner = simulator.simulator
+    equation: OutputEquationSpec | None = None
+    if isinstance(inner, OutputEquation):
+        if inner.system.parameters:
+            equation = OutputEquationSpec.from_system(inner.with_values(values).system)
+        inner = inner.simulator
     return LocalExtendedSpec(
         inputs=inputs,
         output=output,
-        core=describe_extension(inner, values, inputs, output, shape),
+        core=describe_extension(inner, values[: len(inner.parameters)], inputs, output, shape),
         hold=intersample.value,
         times=oversampling,
         effects=tuple(effects),
+        output_equation=equation,
         start=_find_start(inner, values),
         scales=ScalesSpec(
             dt=scales.dt,
@@ -176,7 +183,7 @@ def _make_extended_spec(
 def _find_start(simulator: Simulator, values: Signal) -> dict[str, float]:
     """Return the states of equations at the first sample by name; empty for other simulators."""
     core = simulator
-    while isinstance(core, SavedExtension | ResampledSimulator):
+    while isinstance(core, SavedExtension | ResampledSimulator | OutputEquation):
         core = core.simulator
     if not isinstance(core, OdeSimulator) or isinstance(core, FmuSimulator):
         return {}

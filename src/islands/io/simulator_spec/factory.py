@@ -24,6 +24,7 @@ from islands.discrepancy.simulators.intersample import InterSample, ResampledSim
 from islands.discrepancy.simulators.linear import LinearSimulator, estimate_linear
 from islands.discrepancy.simulators.narx import NarxSimulator
 from islands.discrepancy.simulators.ode_preparation import make_ode_simulator
+from islands.discrepancy.simulators.output_equation import OutputEquation
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
@@ -46,6 +47,7 @@ from islands.io.simulator_spec.specification import (
     parse_spec,
 )
 from islands.model.model import Model
+from islands.systems.ode.output_system import SIMULATED
 
 #: Smallest number of samples from which parameters and the initial state are estimated.
 MIN_SAMPLES = 20
@@ -129,8 +131,11 @@ def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapp
     match_record(driving, record.first_inputs(1), "the extended simulation", advance=False)
     simulator = make_simulator(document.core, record, columns)
     inner: Simulator = simulator
+    if document.output_equation is not None:
+        system = document.output_equation.make_system(simulator.name)
+        inner = OutputEquation(inner, system, {SIMULATED: document.scales.output_peak})
     if (document.hold, document.times) != ("first-order", 1):
-        inner = ResampledSimulator(simulator, InterSample(document.hold), document.times)
+        inner = ResampledSimulator(inner, InterSample(document.hold), document.times)
     known = {**CATALOGUE, **{effect.name: effect for effect in simulator.state_effects}}
     units = record.input_units[0], record.output_unit
     scales = replace(

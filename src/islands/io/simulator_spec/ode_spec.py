@@ -14,6 +14,7 @@ from islands.errors import ModelError, SettingsError
 from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
 from islands.systems.ode.equation_parser import MAX_CHARACTERS
 from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.output_system import make_output_system
 from islands.systems.ode.system_document import (
     MAX_PARAMETERS,
     MAX_STATES,
@@ -67,6 +68,32 @@ class OdeEffectSpec(SpecModel):
 
 def _allow_number(given: Any) -> Any:
     return {"value": given} if isinstance(given, int | float) else given
+
+
+class OutputEquationSpec(SpecModel):
+    """Equation of the output around a simulation without equations; see `OutputEquation`."""
+
+    equation: Annotated[str, Field(min_length=1, max_length=2000)]
+    parameters: Annotated[dict[_Name, OdeParameterSpec], Field(max_length=MAX_PARAMETERS)]
+
+    @model_validator(mode="after")
+    def _check_equation(self) -> "OutputEquationSpec":
+        try:
+            self.make_system("simulation")
+        except ModelError as error:
+            raise PydanticCustomError("equation", "{why}", {"why": str(error)}) from error
+        return self
+
+    def make_system(self, name: str) -> OdeSystem:
+        """Return the equation of the output of a simulation of a given name."""
+        given = self.model_dump(exclude_defaults=True)["parameters"]
+        return make_output_system(name, self.equation, given)
+
+    @classmethod
+    def from_system(cls, system: OdeSystem) -> "OutputEquationSpec":
+        """Return the specification of an equation of the output."""
+        described = describe_system(system)
+        return cls(equation=described["output"], parameters=described["parameters"])
 
 
 class OdeSpec(SimulatorSpec):

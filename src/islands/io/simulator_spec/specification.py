@@ -13,7 +13,7 @@ from pydantic import ConfigDict, Field, FiniteFloat, ValidationError, model_vali
 
 from islands.errors import ModelError, SettingsError, lookup
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
-from islands.io.simulator_spec.ode_spec import OdeSpec
+from islands.io.simulator_spec.ode_spec import OdeSpec, OutputEquationSpec
 from islands.io.simulator_spec.spec_base import (
     EffectSpec,
     ParameterRange,
@@ -120,6 +120,7 @@ class ExtendedSpec(SpecModel):
     hold: Literal["first-order", "zero-order", "band-limited"] = "first-order"
     times: Annotated[int, Field(ge=1, le=64)] = 1
     effects: tuple[EffectSpec, ...]
+    output_equation: OutputEquationSpec | None = None
     start: dict[str, FiniteFloat] = Field(default_factory=dict, max_length=MAX_STATES)
     scales: ScalesSpec
 

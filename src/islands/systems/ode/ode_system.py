@@ -93,6 +93,8 @@ class OdeSystem:
         States whose derivatives, and outputs whose values, an FMU computes: ``fmu(NAME)`` in the equations.
     definitions : tuple of str
         States whose derivatives by the FMU are merely other states.
+    simulated : str
+        Output of another simulation, which the equation of the output reads; empty if there is none.
     """
 
     name: str
@@ -115,6 +117,7 @@ class OdeSystem:
     is_built_in: bool = False
     of_fmu: tuple[str, ...] = ()
     definitions: tuple[str, ...] = ()
+    simulated: str = ""
 
     @property
     def balances(self) -> tuple[str, ...]:
@@ -217,6 +220,7 @@ class OdeSystem:
             **({FORCE: "the sum of the forces"} if self.force and self.force.rate else {}),
             self.input: "the input",
             **dict.fromkeys(self.channels, "a channel"),
+            **dict.fromkeys(filter(None, (self.simulated,)), "the simulated output"),
             **dict.fromkeys((name for name, _ in self.derivatives), "a state"),
             **dict.fromkeys((name for name, _ in self.variables), "a variable"),
             **{each.name: "a parameter" for each in self.parameters},

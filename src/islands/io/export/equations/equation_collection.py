@@ -54,6 +54,8 @@ def collect_equations(spec: ExtendedSpec) -> ExtendedEquations:
         if (levels[-1].hold, levels[-1].times) != ("first-order", 1):
             raise refuse("an extended simulation whose input is interpolated twice")
         levels.append(levels[-1].core)
+    if any(level.output_equation is not None for level in levels):
+        raise refuse("missing terms that are added to the output of an extended simulation")
     system = read_system(levels[-1])
     return _Collection(system, levels).collect()
 
