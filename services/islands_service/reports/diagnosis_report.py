@@ -22,7 +22,7 @@ _VERDICTS = {
     Verdict.REMAINDER: "The simulation lacks a known effect, which explains most of the discrepancy.",
     Verdict.UNKNOWN: "The simulation is wrong, and no known effect explains the discrepancy.",
     Verdict.FAMILY: "The simulation lacks an effect of this kind, whose shape is that of no known effect.",
-    Verdict.DISCOVERED: "The equations lack terms, which were found. Known effects alone explain less.",
+    Verdict.DISCOVERED: "The simulation lacks terms, which were found. Known effects alone explain less.",
     Verdict.GROSS_ERROR: "Record and simulation do not match as they are: correct the record first.",
 }
 

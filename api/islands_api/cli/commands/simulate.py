@@ -167,6 +167,7 @@ def _simulate_extended(
     else:
         expected, expected_output = spec.inputs, spec.output
         effects = [effect.name for effect in spec.effects]
+        effects += [] if spec.output_equation is None else ["missing terms"]
     inner = innermost(spec)
     recorded = (inner.column,) if isinstance(inner, ColumnSpec) else ()
     driving = options.columns(inputs or list(expected))

@@ -19,6 +19,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
 from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, make_task_key
 from islands.discrepancy.calibration.target import Target
+from islands.discrepancy.effects.model_form import CORE_SHAPE
 from islands.discrepancy.inference.chance_gain import ForwardSelection
 from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis
 from islands.discrepancy.inference.noise_floor import (
@@ -180,7 +181,8 @@ def assess_evidence(
     verdict = classify(
         explained, bool(hypothesis.effects), rest.is_structured, target.effective_samples is not None
     )
-    if hypothesis.effects and hypothesis.effects[0].is_free and verdict != Verdict.UNKNOWN:
+    causes = [effect for effect in hypothesis.effects if effect.name != CORE_SHAPE]
+    if causes and causes[0].is_free and verdict != Verdict.UNKNOWN:
         verdict = Verdict.FAMILY
     return replace(
         outcome,
