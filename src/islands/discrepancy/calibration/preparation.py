@@ -9,10 +9,10 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.effects.scale import wrong_parameter
+from islands.discrepancy.interfaces.coordinates import peak_amplitude
 from islands.discrepancy.interfaces.effect import Effect, SimulationContext, Site
 from islands.discrepancy.interfaces.segments import fill_gaps, is_resting, split_at_gaps
 from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.errors import RecordError, SettingsError
 

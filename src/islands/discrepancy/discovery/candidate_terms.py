@@ -21,7 +21,8 @@ from islands.systems.ode.ode_expression import (
     find_symbols,
     render,
 )
-from islands.systems.ode.ode_system import OUTPUT, OdeParameter, OdeSystem
+from islands.systems.ode.ode_system import OUTPUT, OdeSystem
+from islands.systems.ode.system_parts import OdeParameter
 
 #: Functions of one signal ``a``.
 UNARY = ("a", "a**2", "a**3", "a**5", "abs(a)", "abs(a)*a", "sign(a)", "max(a, 0)", "sqrt(abs(a))*sign(a)")

@@ -31,9 +31,9 @@ from islands.discrepancy.discovery.term_ranking import RankedTerm, rank_terms
 from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.context import Signal
+from islands.discrepancy.interfaces.coordinates import peak_amplitude
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
-from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.systems.ode.ode_expression import render
 from islands.systems.ode.ode_system import OUTPUT, OdeSystem

@@ -11,6 +11,7 @@ from enum import IntEnum
 import numpy as np
 
 from islands.discrepancy.interfaces.context import Signal
+from islands.discrepancy.interfaces.coordinates import peak_amplitude
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.planning.experiment import Experiment, MeasuredChannel
 from islands.discrepancy.planning.pair_separation import CausePair, PairSeparation, separate_pairs
@@ -22,7 +23,6 @@ from islands.discrepancy.planning.planned_input import (
     PlannedInput,
     find_rate,
 )
-from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.systems.ode.ode_expression import Symbol

@@ -10,8 +10,8 @@ import numpy as np
 from islands.data.channel_names import is_unit, normalise_unit
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.coordinates import peak_amplitude
 from islands.discrepancy.interfaces.simulator import SimulationRun
-from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.record_channels import find_channel, make_nominal_context
 from islands.errors import RecordError

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from islands.discrepancy.effects.model_form import SLOPE, MissingTerm, missing_terms, model_form
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.coordinates import input_coordinate
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import sum_output_forces
 from islands.discrepancy.interfaces.simulator import Forces, SimulationRun
-from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.errors import ModelError
 from islands.model.model import Model, make_model
 from islands.model.regressor import Regressor

@@ -8,10 +8,10 @@ import numpy as np
 
 from islands.discrepancy.effects.time_variation import GAIN_EFFECTS, gain_over_time
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.coordinates import input_coordinate, output_coordinate, peak_amplitude
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import ForceLaw, pack_force_laws, sum_output_forces
 from islands.discrepancy.interfaces.simulator import Forces, SimulationRun
-from islands.discrepancy.simulators.coordinates import input_coordinate, output_coordinate, peak_amplitude
 from islands.discrepancy.simulators.ode_effects import (
     extend_system,
     find_effects,
@@ -28,9 +28,9 @@ from islands.systems.ode.lane_simulation import simulate_lanes
 from islands.systems.ode.lane_values import LaneInput
 from islands.systems.ode.ode_expression import OdeExpression, Symbol
 from islands.systems.ode.ode_program import OdeProgram, generate_program
-from islands.systems.ode.ode_system import OdeParameter, OdeSystem
+from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.sampled_signal import SampledSignal, interpolate_linearly, make_time
-from islands.systems.ode.system_parts import OdeEffect
+from islands.systems.ode.system_parts import OdeEffect, OdeParameter
 
 #: Name of the factor of the parameter that is the gain; no name in equations has brackets.
 _GAIN = "gain(t)"

@@ -18,8 +18,8 @@ from islands.errors import ModelError
 from islands.systems.mechanics import WIDTH
 from islands.systems.ode.equation_parser import FORCE, parse_expression
 from islands.systems.ode.ode_expression import OdeExpression, Operation, Symbol, substitute
-from islands.systems.ode.ode_system import OdeParameter, OdeSystem
-from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect
+from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeParameter
 
 #: Effects of the catalogue that a term can describe.
 _SUPPORTED = frozenset(each.name for each in CATALOGUE.values() if each.site == Site.CORE) - GAIN_EFFECTS

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.simulators.coordinates import peak_amplitude
+from islands.discrepancy.interfaces.coordinates import peak_amplitude
 from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.record_channels import find_channel, make_nominal_context
 from islands.discrepancy.simulators.shooting import make_shots

@@ -48,7 +48,7 @@ class OutputEquation(SimulatorWrapper):
         return (*self.simulator.parameters, *map(make_parameter, self.system.parameters))
 
     def with_values(self, values: Signal) -> "OutputEquation":
-        """Return the equation with other nominal values of its own parameters, the last of all ``values``."""
+        """Return the equation with other nominal values of its parameters, the last of ``values``."""
         names = [each.name for each in self.system.parameters]
         own = dict(zip(names, values[values.size - len(names) :].tolist(), strict=True))
         return replace(self, system=self.system.with_values(own))

@@ -8,10 +8,10 @@ from math import isfinite
 import numpy as np
 
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.coordinates import input_coordinate
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import add_output_forces
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.errors import RecordError, SettingsError
 
 #: Typical change of a parameter, relative to its value.

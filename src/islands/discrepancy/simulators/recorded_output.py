@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.coordinates import input_coordinate
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import add_output_forces
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import input_coordinate
 
 
 @dataclass(frozen=True, slots=True, eq=False)

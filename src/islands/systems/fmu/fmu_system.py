@@ -11,8 +11,8 @@ from islands.errors import ModelError
 from islands.systems.fmu.fmu_model import FmuModel
 from islands.systems.ode.equation_parser import FORCE, Equation, parse_equations
 from islands.systems.ode.ode_expression import FMU, OdeExpression, Operation, Symbol, find_symbols, render
-from islands.systems.ode.ode_system import OUTPUT, OdeParameter, OdeSystem, check_symbols, sort_variables
-from islands.systems.ode.system_parts import OdeForce, OdeState
+from islands.systems.ode.ode_system import OUTPUT, OdeSystem, check_symbols, sort_variables
+from islands.systems.ode.system_parts import OdeForce, OdeParameter, OdeState
 
 
 def make_fmu_system(

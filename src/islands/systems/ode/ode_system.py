@@ -16,40 +16,10 @@ from islands.systems.ode.ode_expression import (
     render,
     substitute,
 )
-from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeForce, OdeState
+from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeForce, OdeParameter, OdeState
 
 #: Target of `OdeSystem.with_term` for a term that is added to the output.
 OUTPUT = "output"
-
-
-@dataclass(frozen=True, slots=True)
-class OdeParameter:
-    """A parameter of the equations.
-
-    Attributes
-    ----------
-    name : str
-    value : float
-        Nominal value.
-    unit : str
-    tolerance : float or None
-        Relative standard deviation of the true value about the nominal one; None if it is not known.
-    lower, upper : float or None
-        Bounds of a calibration; by default a twentieth and twenty times the value.
-    fixed : bool
-        Whether the value is exact, so that it is not calibrated.
-    positive : bool
-        Whether only positive values are physically possible, as of a mass.
-    """
-
-    name: str
-    value: float
-    unit: str = ""
-    tolerance: float | None = None
-    lower: float | None = None
-    upper: float | None = None
-    fixed: bool = False
-    positive: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ def make_output_system(
     name : str
         Name of the simulation.
     equation : str
-        Output as an expression of that of the simulation ``y_sim``, its input ``u``, the time and the parameters.
+        Output as an expression of that of the simulation ``y_sim``, its input ``u``, the time and parameters.
     parameters : mapping, optional
         Values or documents of the parameters by name.
 

@@ -14,14 +14,8 @@ from islands.systems.ode.equation_parser import (
     parse_expression,
 )
 from islands.systems.ode.ode_expression import Symbol, find_symbols, render
-from islands.systems.ode.ode_system import (
-    OUTPUT,
-    OdeParameter,
-    OdeSystem,
-    check_symbols,
-    sort_variables,
-)
-from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeForce, OdeState
+from islands.systems.ode.ode_system import OUTPUT, OdeSystem, check_symbols, sort_variables
+from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeForce, OdeParameter, OdeState
 
 #: Largest number of states.
 MAX_STATES = 40

@@ -1,4 +1,4 @@
-"""Parts of a system of equations: states, the coordinate of forces, effects."""
+"""Parts of a system of equations: parameters, states, the coordinate of forces, effects."""
 
 from dataclasses import dataclass
 from math import inf
@@ -7,6 +7,36 @@ from islands.systems.ode.ode_expression import OdeExpression
 
 #: Name of the value of an effect in its term.
 EFFECT_VALUE = "value"
+
+
+@dataclass(frozen=True, slots=True)
+class OdeParameter:
+    """A parameter of the equations.
+
+    Attributes
+    ----------
+    name : str
+    value : float
+        Nominal value.
+    unit : str
+    tolerance : float or None
+        Relative standard deviation of the true value about the nominal one; None if it is not known.
+    lower, upper : float or None
+        Bounds of a calibration; by default a twentieth and twenty times the value.
+    fixed : bool
+        Whether the value is exact, so that it is not calibrated.
+    positive : bool
+        Whether only positive values are physically possible, as of a mass.
+    """
+
+    name: str
+    value: float
+    unit: str = ""
+    tolerance: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    fixed: bool = False
+    positive: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.inference.verdict import choose_reference_fit
 from islands.discrepancy.interfaces.context import SimulationContext
-from islands.discrepancy.simulators.coordinates import input_coordinate, output_coordinate
+from islands.discrepancy.interfaces.coordinates import input_coordinate, output_coordinate
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator
 from islands.io.simulator_spec.factory import make_simulator

@@ -6,8 +6,8 @@ import pytest
 
 from islands.errors import ModelError
 from islands.systems.ode.ode_expression import render
-from islands.systems.ode.ode_system import OdeParameter
 from islands.systems.ode.system_document import describe_system, make_system, render_equations
+from islands.systems.ode.system_parts import OdeParameter
 
 DOCUMENT: dict[str, Any] = {
     "name": "two-mass",
