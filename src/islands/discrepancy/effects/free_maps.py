@@ -69,22 +69,22 @@ def write_low_passes(context: SimulationContext) -> MapEquation:
     return _write_changes([("low-pass", str(tau)) for tau in _time_constants(context)])
 
 
-def _typical_rate(context: SimulationContext) -> float:
-    """Return a typical rate of the input per second, from scales that an extended simulation keeps."""
+def _typical_rate(context: SimulationContext, peak: float) -> float:
+    """Return a typical rate of a signal per second, from scales that an extended simulation keeps."""
     coordinate = context.force_coordinate
-    return context.input_peak * coordinate.rate / (coordinate.peak or 1.0)
+    return peak * coordinate.rate / (coordinate.peak or 1.0)
 
 
-def lag_by_rate(u: Signal, values: Signal, context: SimulationContext) -> Signal:
-    """Lag the input with time constants that depend on the rate, which is slow or fast for the input."""
-    lagged: Signal = lag_unevenly(u, context.dt, _typical_rate(context), values)
+def lag_by_rate(signal: Signal, values: Signal, context: SimulationContext, peak: float) -> Signal:
+    """Lag a signal with time constants that depend on its rate, which is slow or fast for the signal."""
+    lagged: Signal = lag_unevenly(signal, context.dt, _typical_rate(context, peak), values)
     return lagged
 
 
-def write_lag_by_rate(context: SimulationContext) -> MapEquation:
+def write_lag_by_rate(context: SimulationContext, peak: float) -> MapEquation:
     """Write `lag_by_rate`."""
     values = [f"n{place}" for place in range(len(LAG_LABELS))]
-    return MapEquation("z0", (("lag-unevenly", str(_typical_rate(context)), *values),))
+    return MapEquation("z0", (("lag-unevenly", str(_typical_rate(context, peak)), *values),))
 
 
 def add_plays(signal: Signal, values: Signal, peak: float) -> Signal:

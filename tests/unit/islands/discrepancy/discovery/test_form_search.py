@@ -62,21 +62,36 @@ def test_effect_in_addition_to_a_free_form_is_named() -> None:
 @pytest.mark.ci
 def test_uneven_lag_is_a_family_with_its_time_constants() -> None:
     """A valve opens with a time constant of 0.3 s and closes with 0.1 s, ahead of a first-order process."""
-    fine, at, valve = 20, U[0], []
-    for u in np.interp(np.arange(fine * U.size) / fine, np.arange(U.size), U).tolist():
-        at += (u - at) * 0.01 / fine / (0.3 if u > at else 0.1)
-        valve.append(at)
 
     def follow(u: np.ndarray, dt: float, gain: float = 1.0) -> np.ndarray:
         return gain * low_pass(u, 0.05, dt)
 
-    y = follow(np.array(valve)[::fine], 0.01)
+    y = follow(lag_unevenly(U, 0.1, 0.3), 0.01)
     found = islands.diagnose(recorded(U, y + NOISE), islands.function_simulator(follow))
+    assert_uneven_lag(found, "input-lag-curve", 0.1, 0.3)
+
+
+@pytest.mark.ci
+def test_uneven_lag_of_a_recorded_output_is_a_family() -> None:
+    """A probe warms up with a time constant of 0.1 s and cools down with 0.3 s."""
+    assert_uneven_lag(diagnose(lag_unevenly(THEIRS, 0.3, 0.1)), "output-lag-curve", 0.3, 0.1)
+
+
+def lag_unevenly(signal: np.ndarray, falling: float, rising: float) -> np.ndarray:
+    """Lag a signal that is linear between samples, in steps of 0.5 ms."""
+    fine, at, lagged = 20, signal[0], []
+    for value in np.interp(np.arange(fine * signal.size) / fine, np.arange(signal.size), signal).tolist():
+        at += (value - at) * 0.01 / fine / (rising if value > at else falling)
+        lagged.append(at)
+    return np.array(lagged)[::fine]
+
+
+def assert_uneven_lag(found: islands.Diagnosis, name: str, falling: float, rising: float) -> None:
     assert str(found.verdict) == "family"
     (form,) = [each for each in found.effects if each.explained_fraction is not None]
-    assert (form.name, form.family) == ("input-lag-curve", "timing")
-    falling, rising = (form.parameters[f"{side} slowly"].value for side in ("falling", "rising"))
-    assert (falling, rising) == (pytest.approx(0.1, rel=0.1), pytest.approx(0.3, rel=0.1))
+    assert (form.name, form.family) == (name, "timing")
+    values = [form.parameters[f"{side} slowly"].value for side in ("falling", "rising")]
+    assert values == [pytest.approx(falling, rel=0.1), pytest.approx(rising, rel=0.1)]
 
 
 @pytest.mark.ci
