@@ -17,6 +17,7 @@ from islands.discrepancy.simulators import (
     linear,
     narx,
     ode,
+    output_equation,
     python_function,
     recorded_output,
     saved_extension,
@@ -26,7 +27,8 @@ from islands.io.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.specification import SIMULATORS, PhysicalSpec
 from support.simulated_records import made, names
 
-#: Classes of the simulators that are not physical systems; "held" is inside an extension.
+#: Classes of the simulators that are not physical systems; those of "held" and "terms" are
+#: inside an extension.
 CLASSES = {
     "ode": ode.OdeSimulator,
     "linear": linear.LinearSimulator,
@@ -35,6 +37,7 @@ CLASSES = {
     "fmu": fmu.FmuSimulator,
     "python": python_function.PythonFunctionSimulator,
     "held": intersample.ResampledSimulator,
+    "terms": output_equation.OutputEquation,
     "extended": saved_extension.SavedExtension,
 }
 
@@ -42,7 +45,6 @@ CLASSES = {
 SHARED_MODULES = {
     "__init__",
     "built_in",
-    "coordinates",
     "extended",
     "ode_effects",
     "ode_preparation",
@@ -53,7 +55,7 @@ SHARED_MODULES = {
 
 def make(name: str) -> Simulator:
     found = made()[name].simulator
-    return found.simulator if name == "held" else found
+    return found.simulator if name in {"held", "terms"} else found
 
 
 @pytest.fixture(params=names())
@@ -119,7 +121,7 @@ def test_the_same_input_gives_the_same_bits(
     first = alone.simulate(alone.nominal)
     again = ExtendedSimulator(simulator, (), context)
     assert np.array_equal(again.simulate(again.nominal), first)
-    other = ExtendedSimulator(made()[name].simulator if name != "held" else simulator, (), context)
+    other = ExtendedSimulator(simulator if name in {"held", "terms"} else made()[name].simulator, (), context)
     assert np.array_equal(other.simulate(other.nominal), first)
     assert np.array_equal(context.u, u)
 

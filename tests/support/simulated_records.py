@@ -74,7 +74,7 @@ class SpecAndRecord:
 
 def names() -> list[str]:
     """Return the names of all specifications, which are made on demand; an FMU requires a C compiler."""
-    return [name for name in (*SIMULATORS, "held", "extended") if name != "fmu" or find_compiler()]
+    return [name for name in (*SIMULATORS, "held", "terms", "extended") if name != "fmu" or find_compiler()]
 
 
 def wave(samples: int = SAMPLES, dt: float = DT) -> NDArray[np.float64]:
@@ -157,6 +157,20 @@ def made() -> Mapping[str, SpecAndRecord]:
         "held": SpecAndRecord(
             LocalExtendedSpec.model_validate({**extension(spring), "hold": "zero-order", "times": 4}),
             oscillator,
+        ),
+        "terms": SpecAndRecord(
+            LocalExtendedSpec.model_validate(
+                {
+                    **extension(MODEL_SPEC),
+                    "inputs": ["u_V"],
+                    "output": "y_um",
+                    "output_equation": {
+                        "equation": "y_sim + a1*(rate(u)*u) + a2*tanh(y_sim/s2)",
+                        "parameters": {"a1": 0.001, "a2": 0.5, "s2": 10.0},
+                    },
+                }
+            ),
+            plain,
         ),
         "extended": SpecAndRecord(
             LocalExtendedSpec.model_validate(

@@ -70,11 +70,16 @@ def _allow_number(given: Any) -> Any:
     return {"value": given} if isinstance(given, int | float) else given
 
 
+_Parameters = Annotated[
+    dict[_Name, Annotated[OdeParameterSpec, BeforeValidator(_allow_number)]], Field(max_length=MAX_PARAMETERS)
+]
+
+
 class OutputEquationSpec(SpecModel):
     """Equation of the output around a simulation without equations; see `OutputEquation`."""
 
     equation: Annotated[str, Field(min_length=1, max_length=2000)]
-    parameters: Annotated[dict[_Name, OdeParameterSpec], Field(max_length=MAX_PARAMETERS)]
+    parameters: _Parameters
 
     @model_validator(mode="after")
     def _check_equation(self) -> "OutputEquationSpec":
@@ -106,10 +111,7 @@ class OdeSpec(SimulatorSpec):
     channels: Annotated[tuple[_Name, ...], Field(max_length=15)] = ()
     equations: Annotated[str, Field(max_length=MAX_CHARACTERS)]
     output: Annotated[str, Field(min_length=1, max_length=2000)]
-    parameters: Annotated[
-        dict[_Name, Annotated[OdeParameterSpec, BeforeValidator(_allow_number)]],
-        Field(max_length=MAX_PARAMETERS),
-    ] = Field(default_factory=dict)
+    parameters: _Parameters = Field(default_factory=dict)
     states: Annotated[dict[_Name, OdeStateSpec], Field(max_length=MAX_STATES)] = Field(default_factory=dict)
     force: OdeForceSpec | None = None
     input_unit: _Unit = ""
