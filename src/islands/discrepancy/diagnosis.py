@@ -23,7 +23,7 @@ from islands.discrepancy.calibration.preparation import (
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis_assembly import extend_equations, make_diagnosis, make_gross_diagnosis
 from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.discovery.discovery import find_missing_terms, replaces_effects
+from islands.discrepancy.discovery.discovery import explain_all, find_missing_terms, replaces_effects
 from islands.discrepancy.discovery.equation_simulator import find_equations
 from islands.discrepancy.discovery.form_search import compare_with_free_forms
 from islands.discrepancy.effects import EFFECTS
@@ -120,9 +120,9 @@ def diagnose(
     simulator = base.simulation.simulator
     progress("analysing the residual", 0.9)
     outcome = assess_evidence(outcome, fitted, effects, rng)
-    if outcome.verdict == Verdict.UNKNOWN or (
-        outcome.verdict == Verdict.NOTHING and outcome.hypothesis.fit.noise.order
-    ):
+    is_unknown = outcome.verdict == Verdict.UNKNOWN
+    is_noise = outcome.verdict == Verdict.NOTHING and outcome.hypothesis.fit.noise.order
+    if is_noise or (is_unknown and not explain_all(base, target, fitted, seed, parallel_map)):
         model_error = search_with_model_error(base, target, effects, progress, parallel_map)
         second = assess_evidence(model_error, fitted, effects, rng)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome

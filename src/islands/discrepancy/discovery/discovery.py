@@ -23,10 +23,11 @@ from islands.discrepancy.inference.holdout import (
 )
 from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.screening import bic_penalty
-from islands.discrepancy.inference.strategies import SearchOutcome
+from islands.discrepancy.inference.strategies import SearchOutcome, analyse_residual
 from islands.discrepancy.inference.verdict import Verdict, explained_fraction
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.discrepancy.simulators.output_equation import OutputEquation
 
 #: Part of the gain of the terms by which they have to be better than effects. The catalogue has one form of
 #: each effect, and another one, such as a sign for a smoothed sign, is no other cause.
@@ -153,6 +154,29 @@ def find_missing_terms(
     if terms is None or (together.is_better(alone), -joint.terms.cost) > (is_better, -terms.search.cost):
         return together
     return terms
+
+
+def explain_all(
+    base: CalibrationResult, target: Target, fitted: int, seed: int, parallel_map: ParallelMap = map
+) -> bool:
+    """Return whether missing terms at the output of a simulation leave nothing but noise.
+
+    It is for simulations without equations, whose terms are found in a tenth of the time that the search with
+    model error takes. Of other simulations it returns False.
+
+    Parameters
+    ----------
+    base, target, fitted, parallel_map
+        Arguments of `find_missing_terms`.
+    seed : int
+        Seed of the surrogates of the residual.
+    """
+    if not isinstance(base.simulation.simulator, OutputEquation):
+        return False
+    found = search_terms(base, target, parallel_map)
+    if found is None:
+        return False
+    return not analyse_residual(found.fit, target, fitted, np.random.default_rng(seed)).is_structured
 
 
 def _is_contradicted(

@@ -167,11 +167,11 @@ def assess_evidence(
     base, target = outcome.base, outcome.target
     hypothesis = remove_chance_effects(outcome.hypothesis, base, target, effects)
     hypothesis = validate_out_of_sample(hypothesis, base, target, fitted, rng)
-    rest = _analyse_residual(hypothesis, target, fitted, rng)
+    rest = analyse_residual(hypothesis.fit, target, fitted, rng)
     if rest.is_structured or target.effective_samples is not None:
         confirmed = withdraw_effects(hypothesis, target, fitted, rng)
         if confirmed is not hypothesis:
-            hypothesis, rest = confirmed, _analyse_residual(confirmed, target, fitted, rng)
+            hypothesis, rest = confirmed, analyse_residual(confirmed.fit, target, fitted, rng)
     # Under model error the noise floor is unknown: the fraction refers to the whole misfit.
     explained = explained_fraction(
         choose_reference_fit(hypothesis, base, target),
@@ -195,7 +195,7 @@ def assess_evidence(
 
 
 @dataclass(frozen=True, slots=True)
-class _ResidualAnalysis:
+class ResidualAnalysis:
     """Noise floor and structure of a residual; see `SearchOutcome`."""
 
     noise_floor: float
@@ -204,16 +204,17 @@ class _ResidualAnalysis:
     is_structured: bool
 
 
-def _analyse_residual(
-    hypothesis: Hypothesis, target: Target, fitted: int, rng: np.random.Generator
-) -> _ResidualAnalysis:
-    context, output = hypothesis.fit.simulation.context, hypothesis.fit.output[:fitted]
+def analyse_residual(
+    fit: CalibrationResult, target: Target, fitted: int, rng: np.random.Generator
+) -> ResidualAnalysis:
+    """Estimate the noise floor, and decide whether the residual of a fit has structure."""
+    context, output = fit.simulation.context, fit.output[:fitted]
     residual = target.y[:fitted] - output
     explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
     structure = find_residual_structure(residual, output, context, rng)
     mean_square = float(np.mean(residual[target.estimation_part[:fitted]] ** 2))
     measured_floor = noise_variance_from_periods(context.u[:fitted], target.y[:fitted], context.segments)
-    return _ResidualAnalysis(
+    return ResidualAnalysis(
         max(mean_square - explainable, 0.0) if measured_floor is None else measured_floor,
         measured_floor is not None,
         structure,
