@@ -148,7 +148,9 @@ def list_candidate_terms(
         signals = [*states, *(outputs if target == OUTPUT else ()), system.input]
         for text in dict.fromkeys(_list_texts(signals, rate)):
             expression = parse_expression(text)
-            if render(expression) == render(own):
+            # Calibration absorbs gains, which a simulation without equations may have anywhere.
+            is_gain = bool(system.simulated) and expression == Symbol(system.input)
+            if is_gain or render(expression) == render(own):
                 continue
             size, own_unit = _compute_size(expression, values), find_factor_unit(unit, expression, units)
             terms.append(CandidateTerm(target, text, size, unit=own_unit))

@@ -85,14 +85,17 @@ def search_jointly(
 def _list_starts(alone: SearchOutcome) -> list[Hypothesis]:
     """Return a hypothesis without each of its effects, not refitted, or a single one with a remainder.
 
-    An identified model also keeps its model-form error alone, which all other effects may imitate.
+    An identified model also has its model-form error alone, which all effects may imitate.
     """
-    found = alone.hypothesis
+    found, base = alone.hypothesis, alone.base
     if len(found.effects) == 1:
         return [found] if alone.verdict == Verdict.REMAINDER else []
-    kept = [tuple(each for each in found.effects if each is not effect) for effect in found.effects]
-    kept.append(tuple(each for each in found.effects if each.name == CORE_SHAPE))
-    return [replace(found, effects=effects) for effects in kept if effects]
+    starts = [
+        replace(found, effects=tuple(each for each in found.effects if each is not effect))
+        for effect in found.effects
+    ]
+    forms = [each for each in alone.screened if each.effect.name == CORE_SHAPE]
+    return starts + [with_effect(Hypothesis(base, base.score, ()), each) for each in forms]
 
 
 def _add_effect(
