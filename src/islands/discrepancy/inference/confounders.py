@@ -52,7 +52,10 @@ class Confounder:
 
 
 def find_confounder(fit: CalibrationResult, effect: Effect, target: Target) -> Confounder | None:
-    """Return the confounder of an effect of a fit; None if it has none or the fit includes both."""
+    """Return the confounder of an effect of a fit; None if it has none or the fit includes both.
+
+    It is also None if the simulation diverges with the confounder, as that of an identified model may.
+    """
     simulation = fit.simulation
     if effect.confounded_with is None or effect.confounded_with[0] in simulation.effects:
         return None
@@ -67,6 +70,8 @@ def find_confounder(fit: CalibrationResult, effect: Effect, target: Target) -> C
         excess = (replaced.simulate(values) - fit.output)[target.estimation_part]
         excess_mean_square += float(np.mean(excess**2)) / len(STRENGTH_FACTORS)
         expected += map_segments(_multiply_neighbours, excess, segments) / len(STRENGTH_FACTORS)
+    if not np.isfinite(excess_mean_square):
+        return None
     residual = (target.y - fit.output)[target.estimation_part]
     measured = map_segments(_multiply_neighbours, residual, segments)
     ratio = _log_likelihood_ratio(measured - measured.mean(), expected - expected.mean())

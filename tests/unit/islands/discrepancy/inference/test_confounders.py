@@ -10,8 +10,10 @@ from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.confounders import Confounder, find_confounder
 from islands.discrepancy.inference.screening import screen_effects
+from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator
+from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.systems.memory_operators import play_from, slider
 from support.simulated_records import recorded
 
@@ -53,10 +55,10 @@ def fine_u() -> Array:
     return sum(a * np.sin(2 * np.pi * f * time + f) for a, f in ((5.0, 0.31), (3.0, 0.53), (2.0, 0.83)))
 
 
-def fit_and_find(u: Array, y: Array, name: str) -> Confounder | None:
+def fit_and_find(u: Array, y: Array, name: str, simulator: Simulator = UNIT_GAIN) -> Confounder | None:
     """Fit an effect and return its confounder."""
     record = recorded(u, y)
-    simulation = ExtendedSimulator(UNIT_GAIN, (), make_context(record, UNIT_GAIN, u.size))
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, u.size))
     target = Target(y, np.ones(u.size, dtype=bool), None, {})
     base = calibrate(simulation, target, simulation.nominal)
     return find_confounder(screen_effects(base, target, [CATALOGUE[name]])[0].fit, CATALOGUE[name], target)
@@ -88,3 +90,14 @@ def test_stick_slip_below_the_noise_gives_no_evidence(fine_u: Array, seed: int) 
 
 def test_delay_has_no_confounder(fine_u: Array) -> None:
     assert fit_and_find(fine_u[::10], fine_u[7::10], "delay") is None
+
+
+def test_confounder_with_which_the_simulation_diverges_is_none(fine_u: Array) -> None:
+    def diverge_at_jumps(u: Array, _dt: float) -> Array:
+        return u if np.abs(np.diff(u)).max() < 0.2 else np.full_like(u, np.nan)
+
+    u = fine_u[:20_000:5]
+    simulator = PythonFunctionSimulator(diverge_at_jumps, "diverge_at_jumps")
+    y = play_from(u, 0.4) + 0.02 * np.random.default_rng(1).standard_normal(u.size)
+    assert fit_and_find(u, y, "backlash") is not None
+    assert fit_and_find(u, y, "backlash", simulator) is None
