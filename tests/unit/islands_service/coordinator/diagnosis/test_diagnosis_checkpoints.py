@@ -4,6 +4,7 @@ import gzip
 import json
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
 from typing import Any
@@ -13,7 +14,6 @@ import pytest
 from sqlalchemy import update
 
 from islands.discrepancy.inference import noise_floor
-from islands.discrepancy.inference.screening import StartFinder
 from islands.evolution import engine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.search_state import SearchState
@@ -57,7 +57,7 @@ class Work:
         self._last_fit, self._last_epoch = fits, epochs
 
     def fit(self, function: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
-        if isinstance(function, StartFinder):  # starting points are found again
+        if not isinstance(function, partial):  # starting points and ranks of terms are found again
             yield from map(function, arguments)
             return
         for each in arguments:
