@@ -153,11 +153,10 @@ def search_terms(
     Returns
     -------
     TermSearchResult or None
-        None if the simulator has no equations, or if no term gains enough.
+        None if no term gains enough.
     """
     equations = find_equations(base.simulation.simulator)
-    if equations is None:
-        return None
+    assert equations is not None
     context = base.simulation.context
     system = equations.system
     rate = peak_amplitude(context.take_differences(context.u)) / context.dt
