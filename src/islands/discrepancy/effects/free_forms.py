@@ -41,6 +41,7 @@ def _make_free_form(
     size: _Number = lambda _: 1.0,
     equation: MakeEquation | None = None,
     lower: float = -inf,
+    acts_between_samples: bool = False,
 ) -> Effect:
     """Return an effect with a coefficient for each label, whose typical value is a fraction of ``size``."""
 
@@ -62,6 +63,7 @@ def _make_free_form(
         source=source,
         equation=equation,
         linear_parameters=0,
+        acts_between_samples=acts_between_samples,
         is_free=True,
         special_cases=special_cases,
         similar_to=similar_to,
@@ -151,6 +153,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         lambda context: context.input_unit,
         lambda context: context.input_peak,
         lambda context: free_maps.write_added_curve(context.input_peak),
+        acts_between_samples=True,
     ),
     _make_free_form(
         "input-gain-curve",

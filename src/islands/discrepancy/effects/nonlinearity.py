@@ -123,10 +123,16 @@ DEAD_ZONE = Effect(
     form=_dead_zone_form,
     equation=lambda _: MapEquation("sign(x)*max(abs(x) - n0, 0)"),
     is_applicable=_approaches_zero,
+    acts_between_samples=True,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     similar_to="backlash, input-saturation",
     distinguished_by="flat around zero in both directions; a negative `d` is a step at zero",
 )
+
+
+#: Starting points of a saturation, as parts of the peak that it cuts off.
+_INPUT_CUTS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
+_OUTPUT_CUTS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 
 
 def _write_limit(peak: float) -> str:
@@ -143,21 +149,16 @@ def _saturation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]
     return (Parameter("cut", "", 0.0, 0.02, 0.0, 0.8),)
 
 
-def _input_saturation_starting_points(
-    _context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return tuple((cut,) for cut in (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5))
-
-
 INPUT_SATURATION = Effect(
     name="input-saturation",
     summary="Saturation of the amplifier: u is limited to (1 - cut) times its peak",
     family="shape",
     site=Site.INPUT,
     parameters=_saturation_parameters,
-    starting_points=_input_saturation_starting_points,
+    starting_points=lambda _context, _residual: tuple((cut,) for cut in _INPUT_CUTS),
     form=_input_saturation_form,
     equation=lambda context: MapEquation(_write_limit(context.input_peak)),
+    acts_between_samples=True,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     linear_parameters=0,
     similar_to="cubic-stiffness, output-saturation",
@@ -170,19 +171,13 @@ def _output_saturation_form(y: Signal, values: Signal, context: SimulationContex
     return np.clip(y, -level, level) if values[0] > 0.0 else y
 
 
-def _output_saturation_starting_points(
-    _context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return tuple((cut,) for cut in (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5))
-
-
 OUTPUT_SATURATION = Effect(
     name="output-saturation",
     summary="Saturation of the sensor: y is limited to (1 - cut) times its peak",
     family="shape",
     site=Site.OUTPUT,
     parameters=_saturation_parameters,
-    starting_points=_output_saturation_starting_points,
+    starting_points=lambda _context, _residual: tuple((cut,) for cut in _OUTPUT_CUTS),
     form=_output_saturation_form,
     equation=lambda context: MapEquation(f"where(n0, {_write_limit(context.output_peak)}, x)"),
     source="Doebelin, Measurement Systems, section 3",

@@ -61,6 +61,9 @@ class Effect:
     project : callable or None
         ``values -> values``: the nearest values that the form admits, if these are not given by the bounds of
         each value. Calibration moves along such a limit and not beyond it, where derivatives would be zero.
+    acts_between_samples : bool
+        Whether a map of the input acts on each value by itself. In continuous time it is then applied to the
+        interpolated input: a dead zone or a limit is not reached at a sample, but between two of them.
     is_gain : bool
         Whether the effect is a gain. Gains are searched for only if every parameter except initial states has
         a tolerance; otherwise calibration absorbs them.
@@ -93,6 +96,7 @@ class Effect:
     is_applicable: Callable[[SimulationContext], bool] = lambda _: True
     linear_parameters: int = 1
     project: Callable[[Signal], Signal] | None = None
+    acts_between_samples: bool = False
     is_gain: bool = False
     is_free: bool = False
     special_cases: tuple[str, ...] = ()

@@ -1,6 +1,6 @@
 """Interface of the simulators that are compared with a record."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
@@ -105,6 +105,7 @@ class SimulationRun:
     ----------
     values : ndarray, shape (parameters,)
     x : ndarray, shape (samples,)
+        Input before ``characteristic``.
     effect_parameters : mapping
     forces : sequence
     intersample_values : ndarray, shape (2, samples), or None
@@ -112,6 +113,10 @@ class SimulationRun:
     near : int or None
         Index of the run of the same call from which this one differs by a small change. Its output is needed
         for derivatives: a simulator that fits states may fit those of this run to first order.
+    characteristic : callable or None
+        Static map of the input that acts on the values between samples as well, ``values -> values`` of shape
+        (values,); None for none. Only simulators in continuous time have runs with one. Runs with the same
+        map have the same object.
     """
 
     values: Signal
@@ -120,6 +125,18 @@ class SimulationRun:
     forces: Forces
     intersample_values: Signal | None = None
     near: int | None = None
+    characteristic: Callable[[Signal], Signal] | None = None
+
+    @property
+    def input_key(self) -> tuple[int, int]:
+        """Key of the input and its characteristic; runs with the same objects have the same one."""
+        return id(self.x), id(self.characteristic)
+
+    def apply_characteristic(self, signal: Signal) -> Signal:
+        """Return values of the input, of any shape, after ``characteristic``."""
+        if self.characteristic is None:
+            return signal
+        return self.characteristic(signal.reshape(-1)).reshape(signal.shape)
 
 
 @runtime_checkable
@@ -185,10 +202,11 @@ def simulate_runs(
         return simulator.simulate_batch(runs, context, every)
     outputs = []
     for run in runs:
-        own = context
+        own, x = context, run.apply_characteristic(run.x)
         if run.intersample_values is not None:
-            own = replace(context, u=run.x, intersample_values=run.intersample_values)
-        output = simulator.simulate(run.values, run.x, own, run.effect_parameters, run.forces)
+            between = run.apply_characteristic(run.intersample_values)
+            own = replace(context, u=x, intersample_values=between)
+        output = simulator.simulate(run.values, x, own, run.effect_parameters, run.forces)
         outputs.append(output[::every])
     return np.stack(outputs)
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site, apply_map
+from islands.discrepancy.interfaces.mapped_input import MappedInput, map_input
 from islands.discrepancy.interfaces.simulator import (
     Forces,
     SimulationRun,
@@ -189,9 +190,7 @@ class ExtendedSimulator:
         if effect_parameters or forces:
             run = self._make_run(values, effect_parameters, forces, {})
             with np.errstate(over="ignore", invalid="ignore"):
-                y = self.simulator.simulate(
-                    run.values, run.x, self.context, run.effect_parameters, run.forces
-                )
+                y = simulate_runs(self.simulator, [run], self.context)[0]
             return self._apply_output_maps([y], values[None]).reshape(-1)
         return self.simulate_batch(values[None])[0]
 
@@ -232,7 +231,7 @@ class ExtendedSimulator:
             key: values for key, values in zip(keys, points, strict=True) if key not in known or key in needed
         }
         if missing:
-            inputs: dict[bytes, Signal] = {}
+            inputs: dict[bytes, MappedInput] = {}
             places = {key: place for place, key in enumerate(missing)}
             runs = [
                 self._make_run(values, _NONE, (), inputs, places[bases[key]] if key in bases else None)
@@ -263,22 +262,20 @@ class ExtendedSimulator:
         values: Signal,
         effect_parameters: Mapping[str, float],
         further: Forces,
-        inputs: dict[bytes, Signal],
+        inputs: dict[bytes, MappedInput],
         near: int | None = None,
     ) -> SimulationRun:
         """Return the run, without output maps. Runs with equal input maps share their input in ``inputs``."""
         forces = list(further)
-        mapped = [
+        maps = [
             (effect, values[part])
             for effect, part in zip(self.effects, self._slices[1:], strict=True)
             if effect.site == Site.INPUT
         ]
-        key = b"".join(own.tobytes() for _, own in mapped)
+        key = b"".join(own.tobytes() for _, own in maps)
         if key not in inputs:
-            x = self.context.u
-            for effect, own in mapped:
-                x = apply_map(effect, x, own, self.context)
-            inputs[key] = x
+            inputs[key] = map_input(maps, self.context, self.simulator.is_continuous_time)
+        x, characteristic = inputs[key]
         parameters = dict(effect_parameters)
         simulator_values = values[self.simulator_slice].copy()
         for effect, part in zip(self.effects, self._slices[1:], strict=True):
@@ -293,7 +290,9 @@ class ExtendedSimulator:
                 case Site.FORCE:
                     assert isinstance(effect.form, ForceLaw)
                     forces.append((effect.form, values[part]))
-        return SimulationRun(simulator_values, inputs[key], parameters, forces, near=near)
+        return SimulationRun(
+            simulator_values, x, parameters, forces, near=near, characteristic=characteristic
+        )
 
     def _get_parameter_index(self, effect: Effect) -> int:
         _, _, name = effect.name.partition(":")

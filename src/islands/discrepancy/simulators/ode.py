@@ -155,7 +155,9 @@ class OdeSimulator:
         else:
             outputs = self._fit_shots(self.shots, program, active, runs, context)[:, ::every]
         if not self._has_force_equation and runs[0].forces:
-            further = sum_output_forces([run.x for run in runs], context, [run.forces for run in runs])
+            inputs = {run.input_key: run.apply_characteristic(run.x) for run in runs}
+            coordinates = [inputs[run.input_key] for run in runs]
+            further = sum_output_forces(coordinates, context, [run.forces for run in runs])
             outputs = outputs + further[:, ::every]
         return outputs
 
@@ -239,7 +241,7 @@ class OdeSimulator:
         common = make_time(context.start_time, samples, context.dt) if Symbol(TIME) in program.signals else {}
         common |= sample_channels(context, self.channels, samples, is_held=not self.is_continuous_time)
         common = {name: signal.refine(steps) for name, signal in common.items()}
-        made: dict[int, SampledSignal] = {}
+        made: dict[tuple[int, int], SampledSignal] = {}
         names = [each.name for each in self.parameters]
         fixed = {each.name: each.value for each in self.system.parameters}
         lanes = []
@@ -247,15 +249,16 @@ class OdeSimulator:
             effects = run.effect_parameters
             gain = gain_over_time(effects, context)
             signals = dict(common)
-            if isinstance(gain, float) or self.system.gain:
-                if id(run.x) not in made:
-                    made[id(run.x)] = refine_input(run.x, self._get_between(run, context), steps)
-                signals[self.system.input] = made[id(run.x)]
-                if not isinstance(gain, float):
-                    signals[_GAIN] = interpolate_linearly(gain).refine(steps)
+            if run.input_key not in made:
+                refined = refine_input(run.x, self._get_between(run, context), steps)
+                made[run.input_key] = SampledSignal(run.apply_characteristic(refined.moments))
+            signals[self.system.input] = made[run.input_key]
+            if isinstance(gain, float):
+                pass
+            elif self.system.gain:
+                signals[_GAIN] = interpolate_linearly(gain).refine(steps)
             else:
-                between = self._get_between(run, context) * gain
-                signals[self.system.input] = SampledSignal.join(run.x * gain, *between).refine(steps)
+                signals[self.system.input] = made[run.input_key].scale(np.repeat(gain, steps))
             given = dict(zip(names, run.values.tolist(), strict=True))
             laws = list(enumerate(run.forces)) if self._has_force_equation else []
             calls = [law for _, law in laws if not is_term(law[0])]

@@ -80,7 +80,7 @@ class OutputEquation(SimulatorWrapper):
         keys = []
         for run in runs:
             forces = tuple((id(law), own.tobytes()) for law, own in run.forces)
-            key = (run.values[:count].tobytes(), id(run.x), tuple(run.effect_parameters.items()), forces)
+            key = (run.values[:count].tobytes(), run.input_key, tuple(run.effect_parameters.items()), forces)
             distinct.setdefault(key, replace(run, values=run.values[:count]))
             keys.append(key)
         outputs = simulate_runs(self.simulator, list(distinct.values()), context)
@@ -88,13 +88,14 @@ class OutputEquation(SimulatorWrapper):
         if not self.system.parameters:
             return np.stack([simulated[key] for key in keys])[:, ::every]
         names = [each.name for each in self.system.parameters]
-        signals: dict[int, dict[str, Signal]] = {}
+        signals: dict[tuple[int, int], dict[str, Signal]] = {}
         found = []
         for run, key in zip(runs, keys, strict=True):
-            if id(run.x) not in signals:
-                signals[id(run.x)] = {INPUT: run.x, RATE: np.gradient(run.x) / context.dt, TIME: context.time}
+            if run.input_key not in signals:
+                u = run.apply_characteristic(run.x)
+                signals[run.input_key] = {INPUT: u, RATE: np.gradient(u) / context.dt, TIME: context.time}
             own = dict(zip(names, run.values[count:].tolist(), strict=True))
-            known = {**signals[id(run.x)], SIMULATED: simulated[key], **own}
+            known = {**signals[run.input_key], SIMULATED: simulated[key], **own}
             found.append(evaluate(self.system.output, known))
         return np.stack(found)[:, ::every]
 

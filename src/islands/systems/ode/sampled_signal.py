@@ -80,6 +80,10 @@ class SampledSignal:
         moments += self.start[:, None, None]
         return SampledSignal(moments.reshape(-1, 3))
 
+    def scale(self, factors: Signal) -> "SampledSignal":
+        """Return the signal multiplied by a factor for each step, shape (samples,)."""
+        return SampledSignal(self.moments * factors[:, None])
+
     def delay(self, seconds: float, dt: float) -> "SampledSignal":
         """Return the signal delayed by linear interpolation; before the first sample it is constant.
 

@@ -60,9 +60,9 @@ static double limit_band(const double *x, size_t samples, size_t step, double pa
 """
 
 _READER = """\
-static double read_{name}(const struct record *r, size_t step, double part)
+static double read_{name}(const struct parameters *p, const struct record *r, size_t step, double part)
 {{
-    {value}
+    {lines}
 }}
 
 """
@@ -213,9 +213,12 @@ def _write_reader(name: str, given: ExtendedEquations, code: EquationCode) -> st
         value = f"hold({column}, step)"
     elif name == given.system.input and given.hold == "band-limited":
         value = f"limit_band({column}, r->samples, step, part)"
-    unused = find_unused([value], "part")
-    lines = "\n    ".join([*unused, f"return {value};"])
-    return _READER.format(name=code.identifiers[name], value=lines)
+    lines = [f"return {value};"]
+    if name == given.system.input and given.characteristic is not None:
+        mapped = code.assign([("const double mapped", given.characteristic)], {"x": "x"})
+        lines = [f"const double x = {value};", *mapped, "return mapped;"]
+    lines = [*find_unused(lines, "p", "part"), *lines]
+    return _READER.format(name=code.identifiers[name], lines="\n    ".join(lines))
 
 
 def _write_signal(source: OdeExpression, given: ExtendedEquations, code: EquationCode) -> str:
@@ -233,7 +236,7 @@ def _write_value(signal: OdeExpression, given: ExtendedEquations, code: Equation
         case Symbol(name) if name == given.gain_signal:
             return "interpolate_gain(p, r, step, part)"
         case Symbol(name):
-            value = f"read_{code.identifiers[name]}(r, step, part)"
+            value = f"read_{code.identifiers[name]}(p, r, step, part)"
             is_multiplied = name == given.system.input and given.gain is not None and not given.gain_signal
             return f"read_gain(p, step/PART_STEPS)*{value}" if is_multiplied else value
         case Operation(function, (Symbol(name), *others)):

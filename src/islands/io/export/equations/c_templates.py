@@ -143,8 +143,9 @@ static void add_forces(
     {states} states s = *initial;
     for (size_t j = 0; j < parts; ++j) {{
         const size_t before = j > 0 ? j - 1 : j, after = j + 1 < parts ? j + 1 : j;
-        const double x = read_{input}(r, j*PART_STEPS, 0.0), end = read_{input}(r, after*PART_STEPS, 0.0);
-        const double v = (end - read_{input}(r, before*PART_STEPS, 0.0))/((double)(after - before)*time);
+        const double x = read_{input}(p, r, j*PART_STEPS, 0.0);
+        const double end = read_{input}(p, r, after*PART_STEPS, 0.0);
+        const double v = (end - read_{input}(p, r, before*PART_STEPS, 0.0))/((double)(after - before)*time);
         if (j % (STEPS/PART_STEPS) == 0) y[j/(STEPS/PART_STEPS)] += sum_forces(p, &s, x, v);
 {steps}    }}
 }}

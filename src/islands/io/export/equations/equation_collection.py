@@ -70,6 +70,7 @@ class _Collection:
     terms: list[OdeEffect] = field(default_factory=list)
     clips: set[str] = field(default_factory=set)
     laws: list[tuple[str, Mapping[str, OdeExpression], ForceLaw]] = field(default_factory=list)
+    characteristic: OdeExpression | None = None
     gain: OdeExpression | None = None
 
     def collect(self) -> ExtendedEquations:
@@ -85,6 +86,8 @@ class _Collection:
         output_maps: list[SignalMap] = []
         for level in self.levels:
             inputs, outputs = self._read_level(level)
+            if level is core:
+                inputs = self._take_characteristic(inputs)
             input_maps += inputs
             output_maps = [*outputs, *output_maps]
         has_equation = system.force is not None and bool(system.force.rate)
@@ -105,6 +108,7 @@ class _Collection:
             limits=self._find_limits(),
             input_maps=tuple(input_maps),
             output_maps=tuple(output_maps),
+            characteristic=self.characteristic,
             forces=() if has_equation else tuple(self._make_force(*each) for each in self.laws),
             gain=self.gain,
             gain_signal=factor,
@@ -173,6 +177,16 @@ class _Collection:
         )
         equation = substitute(parse_law(written.equation), symbols)
         return SignalMap(effect.name, get_summary(effect.name), equation, operators)
+
+    def _take_characteristic(self, maps: list[SignalMap]) -> list[SignalMap]:
+        """Join the last maps to the characteristic if they act between samples; return the others."""
+        last = len(maps)
+        while last and CATALOGUE[maps[last - 1].effect].acts_between_samples:
+            last -= 1
+        for each in maps[last:]:
+            before = self.characteristic or Symbol("x")
+            self.characteristic = substitute(each.equation, {"x": before})
+        return maps[:last]
 
     def _find_channel(self, effect: str, thermal: bool) -> str:
         """Return the name of the channel of an effect, which is found by its unit."""

@@ -90,6 +90,8 @@ class ExtendedEquations:
         By name of the state.
     input_maps, output_maps : tuple of SignalMap
         In the order in which they act.
+    characteristic : expression or None
+        Static characteristic of the interpolated input ``x``, behind the maps of the input; None for none.
     forces : tuple of OutputForce
     gain : expression or None
         Factor of the gain over the time ``t``; None for one.
@@ -120,6 +122,7 @@ class ExtendedEquations:
     limits: Mapping[str, StateLimit] = field(default_factory=dict)
     input_maps: tuple[SignalMap, ...] = ()
     output_maps: tuple[SignalMap, ...] = ()
+    characteristic: OdeExpression | None = None
     forces: tuple[OutputForce, ...] = ()
     gain: OdeExpression | None = None
     gain_signal: str = ""

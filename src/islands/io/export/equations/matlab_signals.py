@@ -55,8 +55,8 @@ end
 """
 
 _READER = """\
-function value = read_{name}(r, step, part, c)
-  value = {value};
+function value = read_{name}(p, r, step, part, c)
+  {lines}
 end
 
 """
@@ -170,7 +170,10 @@ def _write_reader(name: str, given: ExtendedEquations, code: EquationCode) -> st
         value = f"hold_sample({column}, step, c)"
     elif name == given.system.input and given.hold == "band-limited":
         value = f"limit_band({column}, step, part, c)"
-    return _READER.format(name=code.identifiers[name], value=value)
+    lines = [f"value = {value};"]
+    if name == given.system.input and given.characteristic is not None:
+        lines = [f"x = {value};", *code.assign([("value", given.characteristic)], {"x": "x"})]
+    return _READER.format(name=code.identifiers[name], lines="\n  ".join(lines))
 
 
 def _write_value(signal: OdeExpression, given: ExtendedEquations, code: EquationCode) -> str:
@@ -181,7 +184,7 @@ def _write_value(signal: OdeExpression, given: ExtendedEquations, code: Equation
         case Symbol(name) if name == given.gain_signal:
             return "interpolate_gain(p, r, step, part, c)"
         case Symbol(name):
-            value = f"read_{code.identifiers[name]}(r, step, part, c)"
+            value = f"read_{code.identifiers[name]}(p, r, step, part, c)"
             is_multiplied = name == given.system.input and given.gain is not None and not given.gain_signal
             return f"read_gain(p, floor(step/c.part_steps), c)*{value}" if is_multiplied else value
         case Operation(function, (Symbol(name) as source, *others)):

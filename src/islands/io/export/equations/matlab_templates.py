@@ -123,9 +123,9 @@ end
   for j = 0:r.samples*times - 1
     before = max(j - 1, 0);
     after = min(j + 1, r.samples*times - 1);
-    x = read_{input}(r, j*c.part_steps, 0, c);
-    finish = read_{input}(r, after*c.part_steps, 0, c);
-    v = (finish - read_{input}(r, before*c.part_steps, 0, c))/((after - before)*time);
+    x = read_{input}(p, r, j*c.part_steps, 0, c);
+    finish = read_{input}(p, r, after*c.part_steps, 0, c);
+    v = (finish - read_{input}(p, r, before*c.part_steps, 0, c))/((after - before)*time);
     if mod(j, times) == 0
       y(j/times + 1) = y(j/times + 1) + sum_forces(p, s, x, v);
     end

@@ -1,0 +1,41 @@
+"""Input of a simulation after the maps of effects."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple
+
+from islands.discrepancy.interfaces.context import Signal, SimulationContext
+from islands.discrepancy.interfaces.effect import Effect, apply_map
+
+
+class MappedInput(NamedTuple):
+    """Input of a simulation, as in `SimulationRun`.
+
+    Attributes
+    ----------
+    x : ndarray, shape (samples,)
+    characteristic : callable or None
+        Static map that acts on the values between samples as well.
+    """
+
+    x: Signal
+    characteristic: Callable[[Signal], Signal] | None
+
+
+def map_input(
+    maps: Sequence[tuple[Effect, Signal]], context: SimulationContext, is_continuous_time: bool
+) -> MappedInput:
+    """Apply maps of the input, each with its values, in their order.
+
+    In continuous time, the last ones form the characteristic if they act between samples.
+    """
+    last = len(maps)
+    while is_continuous_time and last and maps[last - 1][0].acts_between_samples:
+        last -= 1
+
+    def apply(part: Sequence[tuple[Effect, Signal]], signal: Signal) -> Signal:
+        for effect, values in part:
+            signal = apply_map(effect, signal, values, context)
+        return signal
+
+    return MappedInput(apply(maps[:last], context.u), partial(apply, maps[last:]) if maps[last:] else None)
