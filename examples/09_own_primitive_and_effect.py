@@ -75,9 +75,9 @@ print(law.equation)
 # %%
 # ## A record with an unknown cause
 #
-# A stage follows a voltage with a small lag. Its encoder has a periodic error with the pitch of its scale,
-# 2 um, and an amplitude of 0.05 um. Noise has a standard deviation of 0.02 um.
-PITCH, DT = 2.0, 0.01
+# A stage follows a voltage with a small lag. The sensitivity of its sensor changes by 0.4 % per kelvin, and
+# the temperature is recorded as well. Noise has a standard deviation of 0.02 um.
+DT = 0.01
 
 
 def stage(u, dt, gain=1.0, tau=0.05):
@@ -93,73 +93,71 @@ u = sum(
     for size, frequency, phase in ((6, 0.37, 1), (5, 1.1, 2), (4, 1.9, 3))
 )
 position = stage(u, DT, gain=1.05, tau=0.06)
-encoder = position + 0.05 * np.sin(2 * np.pi * position / PITCH)
-measured = encoder + 0.02 * rng.standard_normal(u.size)
-record = islands.Dataset(u, measured, DT, ("u_V",), "y_um", ("V",), "um")
+temperature = 24.0 + 3.0 * np.sin(2 * np.pi * 0.17 * time + 1.0) + 1.5 * np.sin(2 * np.pi * 0.45 * time)
+measured = position * (1.0 + 0.004 * (temperature - temperature[0])) + 0.02 * rng.standard_normal(u.size)
+record = islands.Dataset(
+    *(np.column_stack([u, temperature]), measured, DT, ("u_V", "T_degC"), "y_um", ("V", "degC"), "um")
+)
 
 # %%
-# The catalogue has no encoder error. The verdict is `unknown`: the simulation is wrong, but by none of the
-# effects of the catalogue. `residual_structure` lists the quantities on which the residual depends, here
-# the output above all, and how far that is from chance, in standard deviations.
+# The catalogue has a drift with the temperature, but no gain that depends on it. The verdict is `unknown`:
+# the simulation is wrong, but by no effect of the catalogue. The first candidate is the nearest one,
+# here a gain that changes over time.
 simulator = islands.function_simulator(stage)
 diagnosis = islands.diagnose(record, simulator)
 print(diagnosis.verdict, [effect.name for effect in diagnosis.effects])
-print({name: round(distance, 1) for name, distance in diagnosis.residual_structure.items()})
+print([candidate.name for candidate in diagnosis.candidates[:3]])
 
 # %%
 # ## An effect
 #
-# This hint leads to a hypothesis, a sine and a cosine of the output. An `Effect` has
+# This hint leads to a hypothesis, a gain that follows the temperature. An `Effect` has
 #
 # * a site: here the output, so `form` maps the simulated output to the measured one;
 # * parameters with unit, nominal value (no effect), and the scale of a typical change;
 # * starting points for the calibration;
-# * `linear_parameters`: the number of leading parameters to which the response is proportional.
+# * `linear_parameters`: the number of leading parameters to which the response is proportional, by default
+#   one;
+# * `is_applicable`: whether a record can show the effect.
 
 
-def parameters(context):
-    """Return the amplitudes, in the unit of the output."""
-    unit = context.output_unit
-    return (islands.Parameter("sine", unit, 0.0, 0.01), islands.Parameter("cosine", unit, 0.0, 0.01))
+def form(y, values, context):
+    """Multiply the output by the sensitivity at the temperature of each sample."""
+    temperature = context.channels["T_degC"]
+    return y * (1.0 + values[0] * (temperature - temperature[0]))
 
 
-def form(y, values, _context):
-    """Add the periodic error to the output."""
-    phase = 2 * np.pi * y / PITCH
-    return y + values[0] * np.sin(phase) + values[1] * np.cos(phase)
-
-
-encoder_error = islands.Effect(
-    name="encoder-error",
-    summary="The encoder errs periodically: y + a sin(2 pi y / p) + b cos(2 pi y / p), p = 2 um",
-    family="sensor",
+thermal_gain = islands.Effect(
+    name="thermal-gain",
+    summary="The sensitivity of the sensor changes with the temperature: y (1 + k (T - T(0)))",
+    family="change",
     site=islands.Site.OUTPUT,
-    parameters=parameters,
-    starting_points=lambda _context, _residual: ((0.02, 0.0),),
+    parameters=lambda _context: (islands.Parameter("k", "1/K", 0.0, 0.001),),
+    starting_points=lambda _context, _residual: ((0.005,),),
     form=form,
-    linear_parameters=2,
-    source="Birch, Optical fringe subdivision with nanometric accuracy, 1990",
+    is_applicable=lambda context: "T_degC" in context.channels,
+    source="Doebelin, Measurement Systems, section 3",
 )
 
 # %%
 # Search for it together with the catalogue:
-better = islands.diagnose(record, simulator, effects=(*islands.EFFECTS, encoder_error))
+better = islands.diagnose(record, simulator, effects=(*islands.EFFECTS, thermal_gain))
 print(better.verdict)
 for effect in better.effects:
     for name, value in effect.parameters.items():
         low, high = value.ci95
         print(
-            f"{effect.name}: {name} = {value.value:.3f} {value.unit}, 95 % interval {low:.3f} to {high:.3f}"
+            f"{effect.name}: {name} = {value.value:.5f} {value.unit}, 95 % interval {low:.5f} to {high:.5f}"
         )
 print(
     f"RMSE on samples that were kept back: {better.gain.before.rmse:.3f} -> {better.gain.after.rmse:.3f} um"
 )
 
 # %%
-# The intervals contain the true amplitudes, 0.05 um and 0, and the error falls to that of the noise. In the
+# The interval contains the true value, 0.004 per kelvin, and the error falls to that of the noise. In the
 # figure each point is the residual of a sample, over the output.
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
-residuals = {"calibrated": better.base.output, "with encoder error": better.best.output}
+residuals = {"calibrated": better.base.output, "with thermal gain": better.best.output}
 for (name, output), colour in zip(residuals.items(), ("#d55e00", "#0072b2"), strict=True):
     axes.plot(output, record.y - output, ".", markersize=3, color=colour, label=name)
 axes.set(xlabel="output (um)", ylabel="residual (um)")
@@ -179,13 +177,11 @@ assert islands.read_model(out / "soft.json", table) == model
 assert {item.text for item in law.model.regressors} == {"y(k-1)", "soften(u1(k-1))"}
 assert diagnosis.verdict == "unknown"
 assert not diagnosis.effects
-assert diagnosis.residual_structure["output"] == max(diagnosis.residual_structure.values())
+assert diagnosis.candidates[0].name == "input-gain-curve"
 assert better.verdict == "named"
-assert [effect.name for effect in better.effects] == ["encoder-error"]
-found = better.effects[0].parameters
-for name, true in (("sine", 0.05), ("cosine", 0.0)):
-    low, high = found[name].ci95
-    assert low < true < high, (name, low, high)
+assert [effect.name for effect in better.effects] == ["thermal-gain"]
+low, high = better.effects[0].parameters["k"].ci95
+assert low < 0.004 < high, (low, high)
 assert better.gain.before.rmse > 0.035
 assert 0.018 < better.gain.after.rmse < 0.022
 print(f"results in {out}")

@@ -88,7 +88,7 @@ HIDDEN: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "hidden: a delay of 20 ms": lambda u: simulate(shift(u, 0.02)),
     "hidden: damping that grows with x^2": lambda u: simulate(u, "x**2*v", -40.0),
     "hidden: an irregular sensor": lambda u: simulate(u) + shape(simulate(u)),
-    "hidden: a ripple of the encoder": lambda u: simulate(u) + 0.006 * np.sin(2 * np.pi * simulate(u) / 0.7),
+    "hidden: a random force": lambda u: simulate(u + 0.5 * np.random.default_rng(3).standard_normal(SAMPLES)),
 }
 
 

@@ -126,7 +126,7 @@ def test_most_injected_effects_are_found(
     tmp_path: Path, core: str, first: float, within: float, pairs: float, false_names: float
 ) -> None:
     succeed(
-        *("trials", "--core", core, "--count", 2, "--clean", 10, "--pairs", 8, "--open-set", 2),
+        *("trials", "--core", core, "--count", 1, "--clean", 4, "--pairs", 4, "--open-set", 0),
         *("--seed", 910_100, "--json", tmp_path / "trials.json"),
     )
     found = percentages(json.loads((tmp_path / "trials.json").read_text())["cores"][core])

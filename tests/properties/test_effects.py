@@ -1,7 +1,5 @@
 """Properties of every effect in the catalogue: no response at rest, and correct declarations."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -17,8 +15,8 @@ def context() -> SimulationContext:
     time = np.arange(1500) * 0.01
     u = 40 * np.sin(2 * np.pi * 0.7 * time) * np.sin(2 * np.pi * 0.11 * time)
     channels = {"T_K": np.cumsum(rng.normal(size=time.size)), "w_V": rng.normal(size=time.size)}
-    context = SimulationContext(u, 0.01, channels, {"T_K": "K", "w_V": "V"}, 40.0, 33.0, "V", "um", 11.0)
-    return replace(context, force_coordinate=replace(context.force_coordinate, measured=u))
+    units = {"T_K": "K", "w_V": "V"}
+    return SimulationContext(u, 0.01, channels, units, 40.0, 33.0, "V", "um", 11.0, measured=u)
 
 
 @pytest.fixture(scope="module")

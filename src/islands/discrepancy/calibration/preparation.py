@@ -210,6 +210,7 @@ def make_context(record: Dataset, simulator: Simulator, fitted: int) -> Simulati
         output_unit=record.output_unit or "1",
         fit_end_time=fitted * record.dt,
         segments=record.segments,
+        measured=fill_gaps(record.y),
     )
     simulation = ExtendedSimulator(simulator, (), context)
     nominal = simulation.simulate(simulation.nominal)
@@ -222,7 +223,4 @@ def make_context(record: Dataset, simulator: Simulator, fitted: int) -> Simulati
     if is_resting(nominal[:fitted]):  # it may rest at zero, while the measured output creeps
         peak = max(float(np.max(np.abs(nominal))), peak_amplitude(record.y[~np.isnan(record.y)]))
     scaled = replace(context, output_peak=peak)
-    coordinate = simulator.make_force_coordinate(scaled, nominal)
-    if coordinate.is_output:
-        coordinate = replace(coordinate, measured=fill_gaps(record.y))
-    return replace(scaled, force_coordinate=coordinate)
+    return replace(scaled, force_coordinate=simulator.make_force_coordinate(scaled, nominal))

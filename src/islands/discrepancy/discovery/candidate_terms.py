@@ -138,7 +138,7 @@ def list_candidate_terms(
     states = [name for name, _ in system.derivatives]
     # Only the output can depend on the output of an FMU or of another simulation.
     outputs = [f"{FMU}({name})" for name in system.of_fmu if name not in states]
-    outputs += filter(None, (system.simulated,))
+    outputs += system.simulated
     rate = f"rate({system.input})"
     values, units = {**sizes, TIME: duration}, {**units, TIME: "s"}
     terms = []

@@ -37,6 +37,7 @@ from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.systems.ode.ode_expression import render
 from islands.systems.ode.ode_system import OUTPUT, OdeSystem
+from islands.systems.ode.output_system import SYMBOL_MEANINGS
 
 #: Maximum number of terms.
 MAX_TERMS = 3
@@ -122,8 +123,7 @@ class TermSearchResult:
             for parameter, value in zip(self.fit.simulation.parameters, self.fit.values, strict=True)
         }
         new = [values[name] for each in self.terms for name in each.parameters]
-        meaning = f"{system.simulated} is the simulated output, {system.input} the input"
-        return "; ".join([*lines, ", ".join(new), *([meaning] if system.simulated else [])])
+        return "; ".join([*lines, ", ".join(new), *([SYMBOL_MEANINGS] if system.simulated else [])])
 
 
 def search_terms(
@@ -163,7 +163,7 @@ def search_terms(
     sizes = {**equations.sizes, system.input: context.input_peak, f"rate({system.input})": rate}
     units = {each.name: each.unit for each in system.states}
     units |= {system.input: context.input_unit, OUTPUT: context.output_unit}
-    units |= dict.fromkeys(filter(None, (system.simulated,)), context.output_unit)
+    units |= dict.fromkeys(system.simulated, context.output_unit)
     candidates = list_candidate_terms(system, sizes, context.duration, units)
     target_sizes = {
         OUTPUT: context.output_peak,

@@ -6,7 +6,6 @@ To add an effect, define it in the file of its family and add it to `EFFECTS`.
 from collections.abc import Iterable, Mapping
 
 from islands.discrepancy.effects.baseline import INPUT_OFFSET, JUMP, LINEAR_DRIFT, OFFSET, THERMAL_DRIFT
-from islands.discrepancy.effects.cogging import COGGING
 from islands.discrepancy.effects.creep import EXPONENTIAL_CREEP, LOGARITHMIC_CREEP
 from islands.discrepancy.effects.disturbance import CROSS_COUPLING, PERIODIC_DISTURBANCE
 from islands.discrepancy.effects.free_forms import FREE_FORMS
@@ -36,6 +35,7 @@ from islands.discrepancy.effects.nonlinearity import (
     STATE_CLIP,
 )
 from islands.discrepancy.effects.scale import INPUT_GAIN, SENSOR_GAIN, WRONG_PARAMETER
+from islands.discrepancy.effects.spatial_period import COGGING, CYCLIC_ERROR
 from islands.discrepancy.effects.time_variation import AGEING, GAIN_STEP
 from islands.discrepancy.effects.timing import CLOCK_SKEW, DELAY, RATE_LIMIT, RESONANCE, SENSOR_LAG
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
@@ -69,6 +69,7 @@ EFFECTS: tuple[Effect, ...] = (
     SENSOR_LAG,
     RESONANCE,
     ABSOLUTE_VALUE_SENSOR,
+    CYCLIC_ERROR,
     OUTPUT_SATURATION,
     SENSOR_GAIN,
     OFFSET,

@@ -1,7 +1,7 @@
 """Input of a simulation, scales of its record, and parameters."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -38,8 +38,6 @@ class ForceCoordinate:
         Width of the smoothed sign change of dry friction, relative to the typical rate.
     is_output : bool
         Whether the output is the coordinate.
-    measured : ndarray, shape (samples,), or None
-        Coordinate in the record, without gaps. None if it is not measured.
     """
 
     unit: str
@@ -51,7 +49,6 @@ class ForceCoordinate:
     is_dissipative: bool = False
     friction_smoothing: float = 0.005
     is_output: bool = False
-    measured: Signal | None = field(default=None, compare=False)
 
     @property
     def lower_bound(self) -> float:
@@ -91,6 +88,8 @@ class SimulationContext:
     start_time : float
         Time of the first sample. A record starts at zero, and time runs on from one recording to the next
         without a pause, since a drift, a jump or a change of the system outlasts a recording.
+    measured : ndarray, shape (samples of all recordings,), or None
+        Output in the record, without gaps. None for a simulation without a record.
     whole : SimulationContext or None
         Context of all recordings, if this is the context of one of several.
     """
@@ -109,6 +108,7 @@ class SimulationContext:
     force_coordinate: ForceCoordinate = None  # type: ignore[assignment]
     segments: tuple[int, ...] = ()
     start_time: float = 0.0
+    measured: Signal | None = None
     whole: "SimulationContext | None" = None
 
     def __post_init__(self) -> None:

@@ -13,6 +13,7 @@ from islands.io.export.equations.matlab_equations import matlab_equations
 from islands.io.simulator_spec.ode_spec import OdeParameterSpec, OdeSpec
 from islands.io.simulator_spec.spec_base import ValueSpec
 from islands.io.simulator_spec.specification import LocalExtendedSpec, PhysicalSpec, innermost
+from islands.systems.ode.output_system import SYMBOL_MEANINGS
 
 
 def as_text(spec: LocalExtendedSpec) -> str:
@@ -27,7 +28,7 @@ def as_text(spec: LocalExtendedSpec) -> str:
     if spec.times > 1 or spec.hold != "first-order":
         lines.append(f"solved with {spec.times} steps per sample; input between samples: {spec.hold}")
     if (added := spec.output_equation) is not None:
-        lines.append(f"output = {added.equation}, where y_sim is the simulated output and u the input")
+        lines.append(f"output = {added.equation}, where {SYMBOL_MEANINGS}")
         lines += [f"    {line}" for line in _describe_values(added.parameters)]
     for effect in spec.effects:
         values = ", ".join(_describe_values(effect.parameters))

@@ -63,8 +63,8 @@ class OdeSystem:
         States whose derivatives, and outputs whose values, an FMU computes: ``fmu(NAME)`` in the equations.
     definitions : tuple of str
         States whose derivatives by the FMU are merely other states.
-    simulated : str
-        Output of another simulation, which the equation of the output reads; empty if there is none.
+    simulated : tuple of str
+        Outputs of other simulations, which the equation of the output reads.
     """
 
     name: str
@@ -87,7 +87,7 @@ class OdeSystem:
     is_built_in: bool = False
     of_fmu: tuple[str, ...] = ()
     definitions: tuple[str, ...] = ()
-    simulated: str = ""
+    simulated: tuple[str, ...] = ()
 
     @property
     def balances(self) -> tuple[str, ...]:
@@ -190,7 +190,7 @@ class OdeSystem:
             **({FORCE: "the sum of the forces"} if self.force and self.force.rate else {}),
             self.input: "the input",
             **dict.fromkeys(self.channels, "a channel"),
-            **dict.fromkeys(filter(None, (self.simulated,)), "the simulated output"),
+            **dict.fromkeys(self.simulated, "the simulated output"),
             **dict.fromkeys((name for name, _ in self.derivatives), "a state"),
             **dict.fromkeys((name for name, _ in self.variables), "a variable"),
             **{each.name: "a parameter" for each in self.parameters},

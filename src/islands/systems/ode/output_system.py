@@ -10,6 +10,9 @@ from islands.systems.ode.system_document import make_parameter
 #: Names in the equation: the input, and the output of the simulation.
 INPUT, SIMULATED = "u", "y_sim"
 
+#: Their meaning, for texts that contain the equation.
+SYMBOL_MEANINGS = f"{SIMULATED} is the simulated output, {INPUT} the input"
+
 
 def make_output_system(
     name: str, equation: str = SIMULATED, parameters: Mapping[str, Any] | None = None
@@ -38,7 +41,7 @@ def make_output_system(
         output=parse_expression(equation),
         parameters=tuple(make_parameter(*each) for each in (parameters or {}).items()),
         states=(),
-        simulated=SIMULATED,
+        simulated=(SIMULATED,),
     )
     check_symbols(system.output, system, f"output, {equation!r}")
     return system

@@ -10,59 +10,59 @@ import islands
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 from support import own_primitive
 
-PITCH = 2.0
+
+def _multiply(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    temperature = context.channels["T_degC"]
+    return y * (1.0 + values[0] * (temperature - temperature[0]))
 
 
-def _error(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
-    return y + values[0] * np.sin(2 * np.pi * y / PITCH)
-
-
-def _amplitude(context: SimulationContext) -> tuple[islands.Parameter, ...]:
-    return (islands.Parameter("a", context.output_unit, 0.0, 0.01),)
+def _coefficient(_context: SimulationContext) -> tuple[islands.Parameter, ...]:
+    return (islands.Parameter("k", "1/K", 0.0, 0.001),)
 
 
 def _start(_context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.1,),)
+    return ((0.005,),)
 
 
-ENCODER_ERROR = islands.Effect(
-    name="encoder-error",
-    summary="The encoder errs periodically: y + a sin(2 pi y / p)",
-    family="sensor",
+THERMAL_GAIN = islands.Effect(
+    name="thermal-gain",
+    summary="The sensitivity of the sensor changes with the temperature: y (1 + k (T - T(0)))",
+    family="change",
     site=islands.Site.OUTPUT,
-    parameters=_amplitude,
+    parameters=_coefficient,
     starting_points=_start,
-    form=_error,
-    source="Birch, Optical fringe subdivision with nanometric accuracy, 1990",
+    form=_multiply,
+    source="Doebelin, Measurement Systems, section 3",
 )
 
 
 @pytest.fixture(scope="module")
 def record() -> tuple[islands.Dataset, Signal]:
-    """Record of an encoder with a periodic error, and the simulation without it."""
+    """Record of a sensor that is sensitive to the temperature, and the simulation without that."""
     rng = np.random.default_rng(3)
     time = 0.01 * np.arange(800)
     u = 6 * np.sin(2 * np.pi * 0.7 * time) * np.sin(2 * np.pi * 0.17 * time + 1)
     simulated = 0.8 * u
-    y = simulated + 0.15 * np.sin(2 * np.pi * simulated / PITCH) + 0.02 * rng.standard_normal(time.size)
-    return islands.Dataset(u, y, 0.01, ("u_V",), "y_um"), simulated
+    temperature = 21.0 + 3.0 * np.sin(2 * np.pi * 0.3 * time)
+    y = simulated * (1.0 + 0.01 * (temperature - 21.0)) + 0.02 * rng.standard_normal(time.size)
+    return islands.Dataset(np.column_stack([u, temperature]), y, 0.01, ("u_V", "T_degC"), "y_um"), simulated
 
 
 def test_user_defined_effect_is_named(record: tuple[islands.Dataset, Signal]) -> None:
     data, simulated = record
     found = islands.diagnose(
-        data, "column:theirs", columns={"theirs": simulated}, effects=(*islands.EFFECTS, ENCODER_ERROR)
+        data, "column:theirs", columns={"theirs": simulated}, effects=(*islands.EFFECTS, THERMAL_GAIN)
     )
     (finding,) = found.effects
-    assert finding.name == "encoder-error"
-    assert finding.parameters["a"].value == pytest.approx(0.15, rel=0.05)
+    assert finding.name == "thermal-gain"
+    assert finding.parameters["k"].value == pytest.approx(0.01, rel=0.05)
 
 
 @pytest.mark.ci
 def test_catalogue_is_the_default_and_is_not_changed(record: tuple[islands.Dataset, Signal]) -> None:
     data, simulated = record
     found = islands.diagnose(data, "column:theirs", columns={"theirs": simulated})
-    assert "encoder-error" not in {each.name for each in found.candidates}
+    assert "thermal-gain" not in {each.name for each in found.candidates}
     assert len(islands.EFFECTS) == len({effect.name for effect in islands.EFFECTS})
 
 
@@ -77,9 +77,9 @@ def test_function_simulator_is_diagnosed_like_the_function_of_a_file(
     data, _ = record
     file = tmp_path / "stage.py"
     file.write_text("def proportional(u, dt, gain=0.8):\n    return gain * u\n")
-    found = islands.diagnose(data, islands.function_simulator(_proportional), effects=(ENCODER_ERROR,))
-    same = islands.diagnose(data, f"python:{file}:proportional", effects=(ENCODER_ERROR,))
-    assert [each.name for each in found.effects] == ["encoder-error"]
+    found = islands.diagnose(data, islands.function_simulator(_proportional), effects=(THERMAL_GAIN,))
+    same = islands.diagnose(data, f"python:{file}:proportional", effects=(THERMAL_GAIN,))
+    assert [each.name for each in found.effects] == ["thermal-gain"]
     assert found.best.values.tolist() == same.best.values.tolist()
 
 

@@ -154,6 +154,7 @@ OSCILLATOR = Rig(
         Fault("cogging", 0.002, 0.2, (add_force(force_faults.cogging),)),
         Fault("input-saturation", 0.04, 0.5, (before_plant(signal_faults.input_saturation),)),
         Fault("rate-limit", 0.4, 5.0, (before_plant(signal_faults.rate_limit),)),
+        Fault("cyclic-error", 0.003, 0.03, (after_plant(signal_faults.cyclic_error(1.0, 3.0)),)),
         Fault("output-saturation", 0.03, 0.5, (after_plant(signal_faults.output_saturation),)),
         Fault("dead-zone", 0.05, 2.5, (before_plant(signal_faults.dead_zone),)),
         Fault("gain-step", 0.005, 0.15, (gain_step,)),
@@ -167,6 +168,5 @@ OSCILLATOR = Rig(
         **NAMELESS_FORCES,
         **NAMELESS_MAPS,
         "uneven-lag": Fault("", 2e-4, 0.01, (before_plant(signal_faults.uneven_lag),)),
-        "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(2.0, 5.0)),)),
     },
 )

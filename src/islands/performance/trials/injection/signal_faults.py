@@ -222,7 +222,7 @@ def uneven_lag(_rng: np.random.Generator, strength: float) -> Map:
     return follow
 
 
-def ripple(lower: float, upper: float) -> Make:
+def cyclic_error(lower: float, upper: float) -> Make:
     """Sinusoidal error as a function of the output, with a period from a range, in units of the output."""
 
     def make(rng: np.random.Generator, strength: float) -> Map:

@@ -206,6 +206,7 @@ TANKS = Rig(
         Fault("linear-drift", 0.005, 0.2, (after_plant(signal_faults.linear_drift),)),
         Fault("jump", 0.005, 0.2, (after_plant(signal_faults.jump),)),
         Fault("thermal-drift", 0.005, 0.2, (after_plant(signal_faults.thermal_drift),)),
+        Fault("cyclic-error", 0.003, 0.03, (after_plant(signal_faults.cyclic_error(0.2, 0.6)),)),
         Fault("output-saturation", 0.03, 0.5, (after_plant(signal_faults.output_saturation),)),
         Fault("input-saturation", 0.03, 0.5, (before_plant(signal_faults.input_saturation),)),
         Fault("rate-limit", 0.4, 5.0, (before_plant(signal_faults.rate_limit),)),
@@ -222,6 +223,5 @@ TANKS = Rig(
     unknown={
         **NAMELESS_MAPS,
         "uneven-lag": Fault("", 0.5, 40.0, (before_plant(signal_faults.uneven_lag),)),
-        "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(1.0, 3.0)),)),
     },
 )

@@ -31,7 +31,9 @@ def make_context() -> SimulationContext:
     u = 40 * np.sin(0.044 * np.arange(SAMPLES)) * np.sin(0.007 * np.arange(SAMPLES))
     channels = {"T_K": np.cumsum(rng.normal(size=SAMPLES)), "w_V": rng.normal(size=SAMPLES)}
     units = {"T_K": "K", "w_V": "V"}
-    return SimulationContext(u, 0.01, channels, units, 38.0, 33.0, "V", "um", 3.0, reference_duration=4.0)
+    return SimulationContext(
+        u, 0.01, channels, units, 38.0, 33.0, "V", "um", 3.0, reference_duration=4.0, measured=u
+    )
 
 
 def resonate(signal: Array, context: SimulationContext, period: float, zeta: float) -> Array:
