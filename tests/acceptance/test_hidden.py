@@ -140,8 +140,8 @@ PAIRS = [
     ("delay", "coulomb-friction"),
 ]
 
-#: Other seeds of some pairs. With the first seed, a third effect is named; how often that happens is measured by
-#: `islands trials --pairs`.
+#: Other seeds of some pairs. With the first seed, a third effect is named; `islands trials --pairs` measures
+#: how often that happens.
 PAIR_SEEDS = {("delay", "coulomb-friction"): SEED + 1}
 
 
