@@ -159,6 +159,24 @@ class BatchSimulator(Protocol):
         """
 
 
+class BatchSimulation:
+    """Base class of simulators that compute several runs at once."""
+
+    __slots__ = ()
+
+    def simulate(
+        self: BatchSimulator,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        forces: Forces,
+    ) -> Signal:
+        """Simulate one run; see `Simulator.simulate`."""
+        run = SimulationRun(values, x, effect_parameters, forces)
+        return self.simulate_batch([run], context)[0].copy()
+
+
 @runtime_checkable
 class WrappingSimulator(Protocol):
     """Simulator that runs another one."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.simulator import (
-    Forces,
+    BatchSimulation,
     SimulationRun,
     Simulator,
     get_tolerances,
@@ -86,7 +86,7 @@ class InterSample(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResampledSimulator(SimulatorWrapper):
+class ResampledSimulator(BatchSimulation, SimulatorWrapper):
     """Simulator with ``oversampling`` steps per sample.
 
     Attributes
@@ -104,19 +104,6 @@ class ResampledSimulator(SimulatorWrapper):
     def for_samples(self, first: int, last: int) -> "ResampledSimulator":
         """Return the resampled simulator of one recording."""
         return replace(self, simulator=take_recording(self.simulator, first, last))
-
-    def simulate(
-        self,
-        values: Signal,
-        x: Signal,
-        context: SimulationContext,
-        effect_parameters: Mapping[str, float],
-        forces: Forces,
-    ) -> Signal:
-        """Simulate the output; see `Simulator.simulate`."""
-        u, between = self._resample(x)
-        resampled = replace(context, u=u, dt=context.dt / self.oversampling, intersample_values=between)
-        return self.simulator.simulate(values, u, resampled, effect_parameters, forces)[:: self.oversampling]
 
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1

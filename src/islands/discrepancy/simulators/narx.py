@@ -11,7 +11,7 @@ from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, S
 from islands.discrepancy.interfaces.coordinates import input_coordinate
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import sum_output_forces
-from islands.discrepancy.interfaces.simulator import Forces, SimulationRun
+from islands.discrepancy.interfaces.simulator import BatchSimulation, SimulationRun
 from islands.errors import ModelError
 from islands.model.model import Model, make_model
 from islands.model.regressor import Regressor
@@ -22,7 +22,7 @@ _SCALE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NarxSimulator:
+class NarxSimulator(BatchSimulation):
     """Free run of a model, started from the first measured samples; its parameters are calibrated.
 
     Parameters of terms with a single factor that reads the output alone, such as y(k-1), are fixed, so that a
@@ -113,20 +113,6 @@ class NarxSimulator:
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """Return the input as the coordinate."""
         return input_coordinate(context, output)
-
-    def simulate(
-        self,
-        values: Signal,
-        x: Signal,
-        context: SimulationContext,
-        effect_parameters: Mapping[str, float],
-        forces: Forces,
-    ) -> Signal:
-        """Simulate the output; see `Simulator.simulate`."""
-        output: Signal = self.simulate_batch([SimulationRun(values, x, effect_parameters, forces)], context)[
-            0
-        ]
-        return output
 
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1

@@ -11,7 +11,7 @@ from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, S
 from islands.discrepancy.interfaces.coordinates import input_coordinate, output_coordinate, peak_amplitude
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import ForceLaw, pack_force_laws, sum_output_forces
-from islands.discrepancy.interfaces.simulator import Forces, SimulationRun
+from islands.discrepancy.interfaces.simulator import BatchSimulation, SimulationRun
 from islands.discrepancy.simulators.ode_effects import (
     extend_system,
     find_effects,
@@ -37,7 +37,7 @@ _GAIN = "gain(t)"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OdeSimulator:
+class OdeSimulator(BatchSimulation):
     """``dx/dt = f(x, u, parameters, t)`` by RK4.
 
     Attributes
@@ -127,17 +127,6 @@ class OdeSimulator:
             force=peak_amplitude(drive),
             is_output=self.system.output == Symbol(force.coordinate),
         )
-
-    def simulate(
-        self,
-        values: Signal,
-        x: Signal,
-        context: SimulationContext,
-        effect_parameters: Mapping[str, float],
-        forces: Forces,
-    ) -> Signal:
-        """Simulate the output; see `Simulator.simulate`."""
-        return self.simulate_batch([SimulationRun(values, x, effect_parameters, forces)], context)[0].copy()
 
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1

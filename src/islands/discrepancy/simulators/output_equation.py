@@ -7,7 +7,7 @@ import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.simulator import (
-    Forces,
+    BatchSimulation,
     SimulationRun,
     Simulator,
     simulate_runs,
@@ -25,7 +25,7 @@ RATE = f"rate({INPUT})"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OutputEquation(SimulatorWrapper):
+class OutputEquation(BatchSimulation, SimulatorWrapper):
     """Simulation whose output is an expression of that of another one, of its input, and of the time.
 
     Attributes
@@ -56,20 +56,6 @@ class OutputEquation(SimulatorWrapper):
     def for_samples(self, first: int, last: int) -> "OutputEquation":
         """Return the equation around the simulation of one recording."""
         return replace(self, simulator=take_recording(self.simulator, first, last))
-
-    def simulate(
-        self,
-        values: Signal,
-        x: Signal,
-        context: SimulationContext,
-        effect_parameters: Mapping[str, float],
-        forces: Forces,
-    ) -> Signal:
-        """Simulate the output; see `Simulator.simulate`."""
-        output: Signal = self.simulate_batch([SimulationRun(values, x, effect_parameters, forces)], context)[
-            0
-        ]
-        return output
 
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
