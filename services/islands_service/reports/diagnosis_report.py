@@ -2,12 +2,13 @@
 
 import base64
 import io
+from math import ceil, log10
 from typing import Any
 
 from islands.discrepancy.detectability import NOTHING, SelfTest
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
-from islands.discrepancy.inference.finding import Finding
+from islands.discrepancy.inference.finding import Finding, Value
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.surrogates import STRENGTHS
 from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
@@ -90,12 +91,20 @@ def _floor(found: Diagnosis) -> str:
     )
 
 
+def _write_value(given: Value) -> str:
+    """Write a value with its unit and interval, with as many digits as the width of the interval needs."""
+    unit = f" {given.unit}" if given.unit else ""
+    if given.ci95 is None:
+        return f"{given.value:.4g}{unit}"
+    low, high = given.ci95
+    digits = 4
+    if given.value and low < high:
+        digits = max(4, ceil(log10(abs(given.value) / (high - low))) + 3)
+    return f"{given.value:.{digits}g}{unit} ({low:.{digits}g} to {high:.{digits}g})"
+
+
 def _finding(finding: Finding) -> str:
-    values = ", ".join(
-        f"{name} = {each.value:.4g}{f' {each.unit}' if each.unit else ''}"
-        + ("" if each.ci95 is None else f" ({each.ci95[0]:.4g} to {each.ci95[1]:.4g})")
-        for name, each in finding.parameters.items()
-    )
+    values = ", ".join(f"{name} = {_write_value(each)}" for name, each in finding.parameters.items())
     share = (
         ""
         if finding.explained_fraction is None

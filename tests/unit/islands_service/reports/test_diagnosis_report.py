@@ -10,6 +10,7 @@ import islands
 from islands.discrepancy.detectability import SelfTest, estimate_rate
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.discovery.discovery import Discovery
+from islands.discrepancy.inference.finding import Value
 from islands.discrepancy.inference.verdict import Verdict
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
@@ -50,3 +51,21 @@ def test_report_says_which_effects_are_not_claimed_as_causes(diagnosis: Diagnosi
     effects = (diagnosis.effects[0], replace(diagnosis.effects[0], name="jump", is_claimed=False))
     lines = summarise(replace(diagnosis, effects=effects)).splitlines()
     assert ["not claimed as a cause" in line for line in lines if line.startswith("  ")] == [False, True]
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("value", "written"),
+    [
+        (Value(0.123456, "V", (0.1, 0.15)), "0.1235 V (0.1 to 0.15)"),
+        (Value(2.0, "1/mm", (1.99998, 2.00001)), "2 1/mm (1.99998 to 2.00001)"),
+        (Value(-51234.5, "", (-51234.7, -51234.3)), "-51234.5 (-51234.7 to -51234.3)"),
+        (Value(0.0, "V", (0.0, 0.0)), "0 V (0 to 0)"),
+        (Value(0.25, "", None), "0.25"),
+    ],
+)
+def test_a_value_has_the_digits_that_its_interval_needs(
+    diagnosis: Diagnosis, value: Value, written: str
+) -> None:
+    finding = replace(diagnosis.effects[0], parameters={"a": value})
+    assert f"a = {written};" in summarise(replace(diagnosis, effects=(finding,))).replace("\n    ", " ")
