@@ -103,6 +103,8 @@ def _list_starting_points(
     """
     x = _take_fitted(context)
     span = float(np.ptp(x))
+    if not span > 0.0:
+        return ()
     found: list[float] = []
     for order, count in lines.items():
         frequencies, spectrum = _compute_spatial_spectrum(x, _take_differences(residual[: x.size], order))

@@ -81,7 +81,7 @@ class Experiment:
         """Return the experiment with another input, sampled at the same times.
 
         The scales of effects, such as the peak of the input and the duration, remain those of this
-        experiment, so that the same values mean the same physics.
+        experiment, so that the same values mean the same physics. The measured output is the simulated one.
         """
         fitted = round(self.estimation_samples / self.context.u.size * u.size)
         channels = []
@@ -97,6 +97,8 @@ class Experiment:
                 reference_duration=old.duration,
                 segments=(),
             )
+            simulation = ExtendedSimulator(channel.simulator, (), context)
+            context = replace(context, measured=simulation.simulate(simulation.nominal))
             channels.append(replace(channel, context=context))
         return replace(self, channels=tuple(channels), estimation_samples=fitted)
 
