@@ -40,8 +40,9 @@ from islands.discrepancy.effects.time_variation import AGEING, GAIN_STEP
 from islands.discrepancy.effects.timing import CLOCK_SKEW, DELAY, RATE_LIMIT, RESONANCE, SENSOR_LAG
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
 
-#: All effects and free forms, in the order in which maps act on a signal. The order also breaks ties between
-#: scores: another order changes results.
+#: All effects and free forms, in the order in which maps act on a signal. Drifts and disturbances move the
+#: scale of an encoder, so that they act before its cyclic error. The order also breaks ties between scores:
+#: another order changes results.
 EFFECTS: tuple[Effect, ...] = (
     DELAY,
     CLOCK_SKEW,
@@ -69,15 +70,15 @@ EFFECTS: tuple[Effect, ...] = (
     SENSOR_LAG,
     RESONANCE,
     ABSOLUTE_VALUE_SENSOR,
-    CYCLIC_ERROR,
     OUTPUT_SATURATION,
-    SENSOR_GAIN,
     OFFSET,
     LINEAR_DRIFT,
     JUMP,
     THERMAL_DRIFT,
     CROSS_COUPLING,
     PERIODIC_DISTURBANCE,
+    CYCLIC_ERROR,
+    SENSOR_GAIN,
     *FREE_FORMS,
 )
 
