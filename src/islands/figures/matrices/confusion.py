@@ -45,8 +45,8 @@ def draw_confusion(counts: Mapping[tuple[str, str], int], names: Sequence[str], 
         Number of trials by (injected, named). "" means no fault or no effect; "unknown" means detected but
         not named.
     names : sequence of str
-        Names of the catalogue, in the order in which they are drawn. For injected faults that are not in the
-        catalogue, "unknown" is correct.
+        Names of the effects that can be injected, in the order in which they are drawn. For other faults,
+        "unknown" is correct, and so are names that are none of these: missing terms and free forms.
     title : str
     """
     rows, columns = _order(counts, names)
@@ -89,8 +89,8 @@ def _order(
 
 
 def _colour(hidden: str, called: str, names: Sequence[str]) -> str:
-    right = called == hidden or (called == UNKNOWN and hidden not in names and hidden != "")
-    if right:
+    is_outside = hidden not in names and hidden != ""
+    if called == hidden or (is_outside and called not in (*names, "")):
         return RESIDUAL
     return FRAME if called in ("", UNKNOWN) else SIMULATED
 

@@ -21,6 +21,7 @@ COUNTS: Mapping[tuple[str, str], int] = {
     ("offset", "offset"): 6,
     ("offset", ""): 2,
     ("ripple", "unknown"): 3,
+    ("ripple", "missing-term"): 2,
     ("ripple", "delay"): 1,
     ("", ""): 20,
 }
@@ -42,7 +43,7 @@ def figure() -> "Figure":
 
 def test_names_follow_the_catalogue_with_unnamed_entries_last(figure: "Figure") -> None:
     assert rows(figure) == ["offset", "delay", "ripple", "nothing"]
-    assert columns(figure) == ["offset", "delay", "unknown", "nothing"]
+    assert columns(figure) == ["offset", "delay", "missing-term", "unknown", "nothing"]
 
 
 def test_counts_are_written_in_their_cells(figure: "Figure") -> None:
@@ -64,8 +65,9 @@ def test_counts_are_written_in_their_cells(figure: "Figure") -> None:
         (("delay", "delay"), RESIDUAL, 0.5),
         (("delay", "offset"), SIMULATED, 0.5),
         (("offset", "nothing"), FRAME, 0.25),
-        (("ripple", "unknown"), RESIDUAL, 0.75),
-        (("ripple", "delay"), SIMULATED, 0.25),
+        (("ripple", "unknown"), RESIDUAL, 1 / 2),
+        (("ripple", "missing-term"), RESIDUAL, 1 / 3),
+        (("ripple", "delay"), SIMULATED, 1 / 6),
         (("nothing", "nothing"), RESIDUAL, 1.0),
     ],
 )
