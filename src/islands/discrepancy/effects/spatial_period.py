@@ -23,6 +23,9 @@ BINS = 2048
 #: Half width of a line in the spectrum of a record with the Hann window, in periods over the range.
 LINE_WIDTH = 2.0
 
+#: Wave over the position, in the values of an effect.
+_WAVE = f"n0*cos({2 * pi}*n2*x) + n1*sin({2 * pi}*n2*x)"
+
 #: Number of spatial frequencies of cogging that the calibration starts from, by the order of the differences
 #: of the residual. The residual of a spring is proportional to the force, as is the second difference of a
 #: mass's.
@@ -145,7 +148,7 @@ COGGING = Effect(
     site=Site.FORCE,
     parameters=_cogging_parameters,
     starting_points=_cogging_starting_points,
-    form=ForceLaw(_cogging_force, equation=f"n0*cos({2 * pi}*n2*x) + n1*sin({2 * pi}*n2*x)"),
+    form=ForceLaw(_cogging_force, equation=_WAVE),
     source="Jahns and Soong, Pulsating torque minimization techniques for AC motor drives, 1996",
     is_applicable=lambda context: context.force_coordinate.is_output and _has_range(context),
     linear_parameters=2,
@@ -183,7 +186,7 @@ CYCLIC_ERROR = Effect(
     parameters=_cyclic_error_parameters,
     starting_points=_cyclic_error_starting_points,
     form=_cyclic_error_form,
-    equation=lambda _: MapEquation(f"x + n0*cos({2 * pi}*n2*x) + n1*sin({2 * pi}*n2*x)"),
+    equation=lambda _: MapEquation(f"x + {_WAVE}"),
     source="Birch, Optical fringe subdivision with nanometric accuracy, 1990",
     is_applicable=_has_range,
     linear_parameters=2,

@@ -22,6 +22,15 @@ class MappedInput(NamedTuple):
     characteristic: Callable[[Signal], Signal] | None
 
 
+def count_sampled_maps(effects: Sequence[Effect]) -> int:
+    """Return how many maps of the input act on its samples in continuous time.
+
+    They are the maps up to the last one that does not act between samples.
+    """
+    places = [place for place, effect in enumerate(effects, start=1) if not effect.acts_between_samples]
+    return max(places, default=0)
+
+
 def map_input(
     maps: Sequence[tuple[Effect, Signal]], context: SimulationContext, is_continuous_time: bool
 ) -> MappedInput:
@@ -29,9 +38,7 @@ def map_input(
 
     In continuous time, the last ones form the characteristic if they act between samples.
     """
-    last = len(maps)
-    while is_continuous_time and last and maps[last - 1][0].acts_between_samples:
-        last -= 1
+    last = count_sampled_maps([effect for effect, _ in maps]) if is_continuous_time else len(maps)
 
     def apply(part: Sequence[tuple[Effect, Signal]], signal: Signal) -> Signal:
         for effect, values in part:

@@ -16,7 +16,7 @@ from islands.discrepancy.inference.screening import screen_effects
 from islands.discrepancy.inference.verdict import explained_fraction
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.simulator import (
-    Forces,
+    BatchSimulation,
     SimulationRun,
     Simulator,
     simulate_runs,
@@ -29,7 +29,7 @@ from islands.discrepancy.simulators.intersample import SimulatorWrapper
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CentredSimulator(SimulatorWrapper):
+class CentredSimulator(BatchSimulation, SimulatorWrapper):
     """Simulator whose nominal values are the means of undisturbed records, the means of their prior.
 
     Attributes
@@ -53,17 +53,6 @@ class CentredSimulator(SimulatorWrapper):
     def for_samples(self, first: int, last: int) -> "CentredSimulator":
         """Return the simulator of one recording."""
         return replace(self, simulator=take_recording(self.simulator, first, last))
-
-    def simulate(
-        self,
-        values: Signal,
-        x: Signal,
-        context: SimulationContext,
-        effect_parameters: Mapping[str, float],
-        forces: Forces,
-    ) -> Signal:
-        """Simulate the output; see `Simulator.simulate`."""
-        return self.simulator.simulate(values, x, context, effect_parameters, forces)
 
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1

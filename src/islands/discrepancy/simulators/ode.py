@@ -241,13 +241,13 @@ class OdeSimulator(BatchSimulation):
             if run.input_key not in made:
                 refined = refine_input(run.x, self._get_between(run, context), steps)
                 made[run.input_key] = SampledSignal(run.apply_characteristic(refined.moments))
-            signals[self.system.input] = made[run.input_key]
-            if isinstance(gain, float):
-                pass
-            elif self.system.gain:
-                signals[_GAIN] = interpolate_linearly(gain).refine(steps)
-            else:
-                signals[self.system.input] = made[run.input_key].scale(np.repeat(gain, steps))
+            driving = made[run.input_key]
+            if not isinstance(gain, float):
+                if self.system.gain:
+                    signals[_GAIN] = interpolate_linearly(gain).refine(steps)
+                else:
+                    driving = driving.scale(np.repeat(gain, steps))
+            signals[self.system.input] = driving
             given = dict(zip(names, run.values.tolist(), strict=True))
             laws = list(enumerate(run.forces)) if self._has_force_equation else []
             calls = [law for _, law in laws if not is_term(law[0])]

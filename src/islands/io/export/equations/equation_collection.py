@@ -11,6 +11,7 @@ from islands.discrepancy.effects import CATALOGUE, get_summary
 from islands.discrepancy.effects.channels import TEMPERATURES
 from islands.discrepancy.effects.time_variation import GAIN_EFFECTS
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, SimulationContext, Site
+from islands.discrepancy.interfaces.mapped_input import count_sampled_maps
 from islands.discrepancy.simulators.ode_effects import (
     LAW_STATE,
     extend_system,
@@ -180,9 +181,7 @@ class _Collection:
 
     def _take_characteristic(self, maps: list[SignalMap]) -> list[SignalMap]:
         """Join the last maps to the characteristic if they act between samples; return the others."""
-        last = len(maps)
-        while last and CATALOGUE[maps[last - 1].effect].acts_between_samples:
-            last -= 1
+        last = count_sampled_maps([CATALOGUE[each.effect] for each in maps])
         for each in maps[last:]:
             before = self.characteristic or Symbol("x")
             self.characteristic = substitute(each.equation, {"x": before})
