@@ -49,6 +49,9 @@ MIN_ERROR = 0.1
 #: Largest relative error of a corrected simulation.
 MAX_CORRECTED_ERROR = 0.3
 
+#: The same if another channel is the output. A simulation often resembles its own input.
+MAX_EXCHANGED_ERROR = 0.1
+
 #: Largest error of a corrected simulation, relative to that of the calibrated simulation as given.
 MAX_ERROR_RATIO = 0.3
 
@@ -107,7 +110,8 @@ def find_gross_errors(
             fit = limit_to_tolerances(calibrate(simulation, corrected, start), corrected)
             error = relative_error(fit, corrected)
             before = error_before if correction.is_discrete else min(error_before, free_error)
-            if error < min(MAX_CORRECTED_ERROR, MAX_ERROR_RATIO * before):
+            largest = MAX_EXCHANGED_ERROR if correction.has_other_output else MAX_CORRECTED_ERROR
+            if error < min(largest, MAX_ERROR_RATIO * before):
                 found.append((correction, fit, corrected, error))
     if not found:
         return ()

@@ -12,6 +12,7 @@ from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.gross_errors.gross_error_search import limit_to_tolerances
 from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError
 from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
 from islands.io.diagnosis_json import as_json, diagnosis_document
@@ -161,6 +162,13 @@ def test_free_parameters_absorb_a_unit_but_not_the_sign() -> None:
 @pytest.mark.ci
 def test_short_delay_is_an_effect_and_no_gross_error() -> None:
     assert run(move(RECORD, 5)).verdict != Verdict.GROSS_ERROR
+
+
+def test_simulation_that_resembles_its_input_is_not_compared_with_it() -> None:
+    nominal = U + 0.2 * np.std(U) * np.sin(np.arange(U.size))
+    clipped = replace(RECORD, y=np.clip(nominal, -0.1 * np.std(U), 0.1 * np.std(U)) + NOISE)
+    found = diagnose(clipped, RecordedOutput("column", nominal), {}, catalogue=())
+    assert found.verdict != Verdict.GROSS_ERROR
 
 
 @pytest.mark.ci
