@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -80,17 +81,22 @@ def extend(
     return LocalExtendedSpec.model_validate(extended_document(fit, record)), simulation.simulate(values)
 
 
-def read_columns(spec: LocalExtendedSpec, record: Dataset) -> list[Array]:
+def read_columns(spec: LocalExtendedSpec, record: Dataset, further: Mapping[str, Array]) -> list[Array]:
     """Return the columns that a program reads, in the order of its arguments."""
-    names = list(record.input_names)
-    columns = collect_equations(spec).columns.values()
-    return [np.ascontiguousarray(record.u[:, names.index(each)]) for each in columns]
+    columns = dict(zip(record.input_names, record.u.T, strict=True)) | {record.output_name: record.y}
+    columns |= further
+    return [np.ascontiguousarray(columns[each]) for each in collect_equations(spec).columns.values()]
 
 
-def run_c(spec: LocalExtendedSpec, record: Dataset, folder: Path) -> Array:
-    """Compile the program in C and simulate a record."""
+def run_c(
+    spec: LocalExtendedSpec,
+    record: Dataset,
+    folder: Path,
+    further: Mapping[str, Array] = MappingProxyType({}),
+) -> Array:
+    """Compile the program in C and simulate a record, which may have further columns."""
     library = compile_model(export_extended(spec, "c"), FLAGS, folder)
-    columns = read_columns(spec, record)
+    columns = read_columns(spec, record, further)
     members = (ctypes.c_size_t * (1 + len(columns)))(record.samples, *(each.ctypes.data for each in columns))
     y = np.full(record.samples, np.nan)
     defaults = [(ctypes.c_char * 1).in_dll(library, name) for name in ("PARAMETERS", "INITIAL_STATES")]
@@ -101,7 +107,11 @@ def run_c(spec: LocalExtendedSpec, record: Dataset, folder: Path) -> Array:
     return y
 
 
-def run_matlab(programs: Sequence[tuple[LocalExtendedSpec, Dataset]], folder: Path) -> list[Array]:
+def run_matlab(
+    programs: Sequence[tuple[LocalExtendedSpec, Dataset]],
+    folder: Path,
+    further: Mapping[str, Array] = MappingProxyType({}),
+) -> list[Array]:
     """Simulate records with programs in Octave, in one process. Warnings are errors."""
     runs = []
     for index, (spec, record) in enumerate(programs):
@@ -109,7 +119,7 @@ def run_matlab(programs: Sequence[tuple[LocalExtendedSpec, Dataset]], folder: Pa
         own.mkdir()
         text = export_extended(spec, "matlab")
         (own / "extended_simulation.m").write_text(text, encoding="ascii")
-        columns = read_columns(spec, record)
+        columns = read_columns(spec, record, further)
         for place, column in enumerate(columns):
             column.tofile(own / f"u{place}")
         arguments = ", ".join(f"read_numbers('u{place}')" for place in range(len(columns)))

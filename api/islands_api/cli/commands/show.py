@@ -32,8 +32,8 @@ def show(
 
     Equations: plain text, LaTeX, MathML. Programs: Python, C, MATLAB. Blocks: FMU of
     FMI 3.0 and 2.0, Simulink S-function, MATLAB System, Modelica. An extended
-    simulation of differential equations is a program in C or MATLAB; one with a closed
-    form is exported like a model, a model of several outputs as one program or block.
+    simulation is a program in C or MATLAB; one with a closed form is exported like a
+    model, a model of several outputs as one program or block.
     """
     coupled, extended = read_coupled(model), options.extended(model)
     if kind is None and out is None and coupled is None and extended is None:

@@ -84,14 +84,14 @@ class LinearSimulator:
         delayed = np.concatenate([np.full(self.delay, x[0]), x[: x.size - self.delay]])
         level, state = values[2 * order + 1], values[2 * order + 2 :]
         # The input is constant before the first sample; the state is a deviation from that equilibrium.
-        state = state + (x[0] - self.reference_input) * self._state_at_rest
+        state = state + (x[0] - self.reference_input) * self.state_at_rest
         filtered, _ = scipy.signal.lfilter(
             numerator, np.concatenate([[1.0], -denominator]), delayed - self.reference_input, zi=state
         )
         return level + filtered + add_output_forces(x, context, forces)
 
     @property
-    def _state_at_rest(self) -> Signal:
+    def state_at_rest(self) -> Signal:
         """State of the filter at rest at an input of one, shape (order,); zero without such an equilibrium.
 
         It is that of the nominal coefficients, so that it remains finite while a pole passes through one.

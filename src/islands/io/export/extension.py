@@ -5,14 +5,16 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from islands.discrepancy.effects import get_summary
+from islands.errors import ModelError
 from islands.io.export import export
 from islands.io.export.closed_form import closed_form
-from islands.io.export.equations.c_equations import c_equations
+from islands.io.export.equations.c.c_equations import c_equations
 from islands.io.export.equations.equation_collection import collect_equations
-from islands.io.export.equations.matlab_equations import matlab_equations
+from islands.io.export.equations.matlab.matlab_equations import matlab_equations
 from islands.io.simulator_spec.ode_spec import OdeParameterSpec, OdeSpec
 from islands.io.simulator_spec.spec_base import ValueSpec
-from islands.io.simulator_spec.specification import LocalExtendedSpec, PhysicalSpec, innermost
+from islands.io.simulator_spec.specification import LocalExtendedSpec
+from islands.model.model import Model
 from islands.systems.ode.output_system import SYMBOL_MEANINGS
 
 
@@ -79,19 +81,22 @@ if __name__ == "__main__":
 
 def as_c(spec: LocalExtendedSpec) -> str:
     """Return C99 source; see `export_extended`."""
-    return c_equations(collect_equations(spec)) if _has_equations(spec) else export(closed_form(spec), "c")
+    model = _find_closed_form(spec)
+    return c_equations(collect_equations(spec)) if model is None else export(model, "c")
 
 
 def as_matlab(spec: LocalExtendedSpec) -> str:
     """Return a MATLAB function; see `export_extended`."""
-    if _has_equations(spec):
-        return matlab_equations(collect_equations(spec))
-    return export(closed_form(spec), "matlab")
+    model = _find_closed_form(spec)
+    return matlab_equations(collect_equations(spec)) if model is None else export(model, "matlab")
 
 
-def _has_equations(spec: LocalExtendedSpec) -> bool:
-    """Return whether the simulator is a system of differential equations."""
-    return isinstance(innermost(spec), OdeSpec | PhysicalSpec)
+def _find_closed_form(spec: LocalExtendedSpec) -> Model | None:
+    """Return the simulation as one difference equation; None if it is not one."""
+    try:
+        return closed_form(spec)
+    except ModelError:
+        return None
 
 
 #: Export formats of an extended simulation by name.
@@ -104,7 +109,8 @@ def export_extended(spec: LocalExtendedSpec, kind: str) -> str:
     """Return an extended simulation as text.
 
     Differential equations are exported as programs that integrate them. A model or a linear simulation whose
-    effects have a closed form is exported as a model, in every text format of models.
+    effects have a closed form is exported as a model, in every text format of models. With other effects it
+    is a program in C or MATLAB that applies them to the whole record, as is a column of the record.
 
     Raises
     ------

@@ -22,6 +22,7 @@ from islands.systems.ode.ode_expression import (
     substitute,
 )
 from islands.systems.ode.ode_system import sort_variables
+from islands.systems.ode.output_system import SIMULATED
 
 #: Functions that are not functions of every language, and the names of their definitions in programs.
 DEFINED = {
@@ -73,6 +74,12 @@ class EquationCode:
             for each in _find_signals(right, {*system.signals, TIME}):
                 found.setdefault(render(each), each)
         return tuple(found.values())
+
+    @property
+    def read_signals(self) -> tuple[OdeExpression, ...]:
+        """Signals that are read from the record: all but the simulated output."""
+        is_sampled = self.equations.core is not None
+        return tuple(each for each in self.signals if not (is_sampled and each == Symbol(SIMULATED)))
 
     @cached_property
     def identifiers(self) -> Mapping[str, str]:
@@ -149,16 +156,21 @@ class EquationCode:
         """Return the equations and the settings of the integration as lines of a comment, in ASCII."""
         given, own = self.equations, self.identifiers
         symbols: dict[str, OdeExpression] = {name: Symbol(text) for name, text in own.items()}
-        system = given.system
+        system, core = given.system, given.core
         renamed = [(own[name], substitute(right, symbols)) for name, right in system.derivatives]
         lines = [f"Extended simulation: {system.name}, {quote_name(given.output)} from"]
         lines += [f"    {own[name]} = {quote_name(column)}" for name, column in given.columns.items()]
+        if core is not None:
+            lines += ["", f"    {SIMULATED} = {core.summary}"]
         lines += ["", *(f"    d{name}/dt = {render(right)}" for name, right in renamed)]
         lines += [
             f"    {own[name]} = {render(substitute(right, symbols))}" for name, right in system.variables
         ]
         lines += [f"    output = {render(substitute(system.output, symbols))}", ""]
         lines += [f"Effect {each}." for each in given.effects]
+        if core is not None:
+            lines.append(f"Sampling time {given.dt!r} s.")
+            return _wrap(lines)
         count = given.steps * given.times
         lines += [
             f"Sampling time {given.dt!r} s; input between samples: {given.hold}.",
@@ -169,11 +181,7 @@ class EquationCode:
                 "This is a free run. The simulation of the package restarts every "
                 f"{system.shooting:g} s from states that are fitted to the measured output."
             )
-        return [
-            _to_ascii(part)
-            for line in lines
-            for part in textwrap.wrap(line, 100, subsequent_indent="        ", break_long_words=False) or [""]
-        ]
+        return _wrap(lines)
 
     def list_parameters(self) -> list[tuple[str, str, str]]:
         """Return identifier, value and comment of each parameter."""
@@ -202,6 +210,15 @@ def make_step(code: EquationCode, access: str, names: Iterable[str], time: str) 
 def simplify(unit: str) -> str:
     """Return a unit as the text of a comment."""
     return "1" if unit in ("", "1") else unit
+
+
+def _wrap(lines: Iterable[str]) -> list[str]:
+    """Return lines of a comment."""
+    return [
+        _to_ascii(part)
+        for line in lines
+        for part in textwrap.wrap(line, 100, subsequent_indent="        ", break_long_words=False) or [""]
+    ]
 
 
 def _to_ascii(text: str) -> str:

@@ -24,10 +24,12 @@ from islands.io.export.equations.extended_equations import (
     ExtendedEquations,
     NamedValue,
     OutputForce,
+    SampledCore,
     SignalMap,
     StateLimit,
 )
 from islands.io.export.equations.program_system import drop_force, read_system, refuse
+from islands.io.export.equations.sampled_core import read_core, read_output_system
 from islands.io.simulator_spec.document import read_scales
 from islands.io.simulator_spec.spec_base import EffectSpec
 from islands.io.simulator_spec.specification import ExtendedSpec
@@ -43,27 +45,30 @@ CHANNEL_OPERATORS = {"temperature": True, "coupled": False}
 
 
 def collect_equations(spec: ExtendedSpec) -> ExtendedEquations:
-    """Return the equations of an extended simulation whose simulator is a system of equations.
+    """Return the equations of an extended simulation.
 
     Raises
     ------
     ModelError
-        The simulator is another one, its parameters are unknown, or an effect has no program.
+        The simulation is a function or an FMU, its parameters are unknown, or an effect has no program.
     """
     levels = [spec]
     while isinstance(levels[-1].core, ExtendedSpec):
         if (levels[-1].hold, levels[-1].times) != ("first-order", 1):
             raise refuse("an extended simulation whose input is interpolated twice")
         levels.append(levels[-1].core)
-    if any(level.output_equation is not None for level in levels):
+    core = read_core(levels[-1])
+    outer = levels if core is None else levels[:-1]
+    if any(level.output_equation is not None for level in outer):
         raise refuse("missing terms that are added to the output of an extended simulation")
-    system = read_system(levels[-1])
-    return _Collection(system, levels).collect()
+    system = read_system(levels[-1]) if core is None else read_output_system(levels[-1])
+    return _Collection(system, core, levels).collect()
 
 
 @dataclass(slots=True)
 class _Collection:
     system: OdeSystem
+    core: SampledCore | None
     levels: list[ExtendedSpec]
     values: dict[str, NamedValue] = field(default_factory=dict)
     start: dict[str, NamedValue] = field(default_factory=dict)
@@ -78,8 +83,12 @@ class _Collection:
         core, system = self.levels[-1], self.system
         self.values |= {each.name: NamedValue(each.value, each.unit) for each in system.parameters}
         self.columns[system.input] = core.inputs[0]
-        for name in system.channels:
-            self.columns[name] = self._find_column(name)
+        if self.core is None:
+            self.columns |= {name: self._find_column(name) for name in system.channels}
+        else:
+            self.columns |= self.core.columns
+            self.values |= self.core.values
+            self.start |= self.core.start
         for state in system.states:
             value = self.levels[0].start.get(state.name, state.initial or 0.0)
             self.start[state.name] = NamedValue(value, state.unit)
@@ -87,7 +96,7 @@ class _Collection:
         output_maps: list[SignalMap] = []
         for level in self.levels:
             inputs, outputs = self._read_level(level)
-            if level is core:
+            if level is core and self.core is None:
                 inputs = self._take_characteristic(inputs)
             input_maps += inputs
             output_maps = [*outputs, *output_maps]
@@ -113,6 +122,7 @@ class _Collection:
             forces=() if has_equation else tuple(self._make_force(*each) for each in self.laws),
             gain=self.gain,
             gain_signal=factor,
+            core=self.core,
             effects=tuple(
                 f"{each.name}: {get_summary(each.name)}" for level in self.levels for each in level.effects
             ),
@@ -201,7 +211,7 @@ class _Collection:
     def _add_law(self, effect: Effect, given: EffectSpec, symbols: dict[str, OdeExpression]) -> None:
         law = effect.form
         assert isinstance(law, ForceLaw)
-        if not is_term(law) or self.system.force is None:
+        if not is_term(law) or (self.system.force is None and self.core is None):
             raise refuse(f"the effect {effect.name}")
         core = self.levels[-1]
         times = core.times

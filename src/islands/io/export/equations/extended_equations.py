@@ -7,6 +7,7 @@ and the equations of maps.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from islands.model.model import Model
 from islands.systems.ode.ode_expression import OdeExpression
 from islands.systems.ode.ode_system import OdeSystem
 
@@ -71,6 +72,42 @@ class StateLimit:
 
 
 @dataclass(frozen=True, slots=True)
+class SampledCore:
+    """Assignments that compute the simulated output ``y_sim`` sample by sample.
+
+    Attributes
+    ----------
+    summary : str
+        What is computed, for the heading of a program.
+    before : tuple of (str, expression)
+        Memory before the first sample, as expressions of the first input ``x``, values and states.
+    output : expression or None
+        Output, an expression of the input ``x``, the memory and values. None for that of the model or of the
+        column.
+    after : tuple of (str, expression)
+        Memory after a sample, with the output as ``y`` in addition.
+    delay : int
+        Samples by which the input ``x`` is delayed.
+    model : Model or None
+        Identified model in free run from measured outputs.
+    columns : mapping
+        Further columns of the record, by the names that the program gives to them.
+    values, start : mapping
+        Parameters, and states at the first sample.
+    """
+
+    summary: str
+    before: tuple[tuple[str, OdeExpression], ...] = ()
+    output: OdeExpression | None = None
+    after: tuple[tuple[str, OdeExpression], ...] = ()
+    delay: int = 0
+    model: Model | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
+    values: Mapping[str, NamedValue] = field(default_factory=dict)
+    start: Mapping[str, NamedValue] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class ExtendedEquations:
     """All that a program of an extended simulation computes.
 
@@ -107,6 +144,9 @@ class ExtendedEquations:
         Samples of the estimation part of the record that was diagnosed.
     effects : tuple of str
         Effects with their equations in words.
+    core : SampledCore or None
+        Simulation in discrete time, whose output the equation of the output reads; None for a system with
+        derivatives.
     """
 
     system: OdeSystem
@@ -127,3 +167,4 @@ class ExtendedEquations:
     gain: OdeExpression | None = None
     gain_signal: str = ""
     effects: tuple[str, ...] = ()
+    core: SampledCore | None = None

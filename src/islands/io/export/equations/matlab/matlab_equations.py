@@ -6,17 +6,23 @@ from islands.discrepancy.interfaces.segments import MAX_RANGE_AT_REST
 from islands.io.export.equations.equation_code import EquationCode, make_step
 from islands.io.export.equations.equation_collection import CHANNEL_OPERATORS
 from islands.io.export.equations.extended_equations import ExtendedEquations, SignalMap
-from islands.io.export.equations.matlab_operators import MATLAB_OPERATORS
-from islands.io.export.equations.matlab_signals import write_matlab_signals
-from islands.io.export.equations.matlab_templates import (
+from islands.io.export.equations.matlab.matlab_core import write_matlab_core
+from islands.io.export.equations.matlab.matlab_operators import MATLAB_OPERATORS
+from islands.io.export.equations.matlab.matlab_signals import write_matlab_signals
+from islands.io.export.equations.matlab.matlab_templates import (
+    ADVANCE,
     DEFINITIONS,
     FILE,
     FORCE_SLOPES,
     FORCE_STEPS,
     FORCES,
+    LOOP,
     MAP,
+    MOVE,
+    SAMPLED_LOOP,
 )
 from islands.systems.ode.ode_expression import Symbol
+from islands.systems.ode.output_system import SIMULATED
 
 #: Functions that are complex outside the domain of real numbers.
 _REAL = {"sqrt": "root", "log": "logarithm", "pow": "raise"}
@@ -48,7 +54,6 @@ class _MatlabWriter:
         columns = [code.identifiers[name] for name in given.columns]
         arguments = [f"{name}_" if name in _TAKEN else name for name in columns]
         states = code.list_states()
-        own = [code.identifiers[name] for name, _ in given.system.derivatives]
         maps = [*given.input_maps, *given.output_maps]
         names = {name for each in maps for name, _ in each.operators}
         text = FILE.format(
@@ -72,16 +77,27 @@ class _MatlabWriter:
                 [f"p.{name} = {value}; % {unit}" for name, value, unit in code.list_parameters()]
             ),
             states=_indent([f"s.{name} = {value}; % {unit}" for name, value, unit in states]),
-            derivatives=_indent(self._derivatives()),
             output=_indent(self._output()),
-            moves=_indent([f"next.{name} = next.{name} + time*slope.{name};" for name, _, _ in states]),
-            advances=_indent(make_step(code, "s.", own, "c.step") + self._limits()),
+            integration=self._integration([name for name, _, _ in states]),
+            loop=SAMPLED_LOOP.format(simulated=code.identifiers[SIMULATED]) if given.core else LOOP,
         )
+        text += write_matlab_core(given.core, code) if given.core else ""
         text += write_matlab_signals(given, code) + self._forces()
         text += "".join(f"{self._map(each)}\n" for each in maps)
         text += "".join(f"{MATLAB_OPERATORS[name]}\n" for name in MATLAB_OPERATORS if name in names)
         called = [*code.find_functions(text), *(key for key, name in _REAL.items() if f"{name}(" in text)]
         return (text + "\n".join(DEFINITIONS[each] for each in called)).rstrip() + "\n"
+
+    def _integration(self, states: list[str]) -> str:
+        """Write the functions that advance the states; forces on the output may have states too."""
+        given, code = self.given, self.code
+        moves = _indent([f"next.{name} = next.{name} + time*slope.{name};" for name in states])
+        move = MOVE.format(moves=moves) if not given.core or any(each.state for each in given.forces) else ""
+        if given.core:
+            return move
+        own = [code.identifiers[name] for name, _ in given.system.derivatives]
+        steps = make_step(code, "s.", own, "c.step") + self._limits()
+        return move + ADVANCE.format(derivatives=_indent(self._derivatives()), advances=_indent(steps))
 
     def _derivatives(self) -> list[str]:
         code, given = self.code, self.given
@@ -166,10 +182,15 @@ class _MatlabWriter:
             f"{column} = apply_{each.effect.replace('-', '_')}(p, r, {column}, c);"
             for each in self.given.input_maps
         ]
+        if self.given.core:
+            lines += ["y = simulate_core(p, initial, r);", *self._add_forces()]
         return _indent([*lines, ""]) if lines else ""
 
+    def _add_forces(self) -> list[str]:
+        return ["if r.samples > 1, y = add_forces(p, initial, r, y, c); end"] if self.given.forces else []
+
     def _after(self) -> str:
-        lines = ["if r.samples > 1, y = add_forces(p, initial, r, y, c); end"] if self.given.forces else []
+        lines = [] if self.given.core else self._add_forces()
         lines += [
             f"y = apply_{each.effect.replace('-', '_')}(p, r, y, c);" for each in self.given.output_maps
         ]

@@ -124,6 +124,18 @@ static double find_held_rate(
 
 """
 
+_CENTRAL_RATE = """\
+/* Return the rate of a signal at a sample, by central differences. */
+static double find_central_rate(
+    read_signal read, const struct parameters *p, const struct record *r, size_t step)
+{
+    const size_t before = step > 0 ? step - 1 : 0, after = step + 1 < r->samples ? step + 1 : step;
+    const double change = read(p, r, after, 0.0) - read(p, r, before, 0.0);
+    return after > before ? change/((double)(after - before)*DT) : 0.0;
+}
+
+"""
+
 _DELAY = """\
 /* Return a signal delayed by linear interpolation between half steps; before its start it is constant. */
 static double delay(
@@ -159,7 +171,7 @@ _SIGNALS = """\
 static struct signals read_signals(
     const struct parameters *p, const struct record *r, size_t step, double part)
 {{
-    struct signals in;
+    struct signals in = {{0}};
     {lines}
     return in;
 }}
@@ -172,6 +184,7 @@ _SHARED = (("interpolate(", _INTERPOLATE), ("hold(", _HOLD))
 _POINTED = (
     ("find_rate(", _RATE),
     ("find_held_rate(", _HELD_RATE),
+    ("find_central_rate(", _CENTRAL_RATE),
     ("delay(", _DELAY),
     ("delay_held(", _HELD_DELAY),
 )
@@ -180,8 +193,7 @@ _POINTED = (
 def write_signals(given: ExtendedEquations, code: EquationCode) -> str:
     """Return the functions that read the signals of the equations, and those that they call."""
     names = code.identifiers
-    lines = [f"in.{names[render(each)]} = {_write_value(each, given, code)};" for each in code.signals]
-    lines = lines or ["in.none = 0.0;"]
+    lines = [f"in.{names[render(each)]} = {_write_value(each, given, code)};" for each in code.read_signals]
     unused = find_unused(lines, "p", "r", "step", "part")
     signals = _SIGNALS.format(lines="\n    ".join([*unused, *lines]))
     pointed = "".join(section for name, section in _POINTED if f" {name}" in signals)
@@ -242,6 +254,8 @@ def _write_value(signal: OdeExpression, given: ExtendedEquations, code: Equation
         case Operation(function, (Symbol(name), *others)):
             is_held = name == given.system.input and given.hold == "zero-order"
             arguments = f"signal_{code.identifiers[name]}, p, r, step"
+            if function == "rate" and given.core is not None:
+                return f"find_central_rate({arguments})"
             if function == "rate":
                 return f"find_held_rate({arguments})" if is_held else f"find_rate({arguments}, part)"
             tau = code.write(others[0])

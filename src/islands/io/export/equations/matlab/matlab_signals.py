@@ -100,6 +100,16 @@ end
 
 """
 
+_CENTRAL_RATE = """\
+function rate = find_central_rate(read, r, step, c)
+% Rate of a signal at a sample, by central differences.
+  before = max(step - 1, 0);
+  after = min(step + 1, r.samples - 1);
+  rate = (read(after, 0) - read(before, 0))/(max(after - before, 1)*c.dt);
+end
+
+"""
+
 _DELAY = """\
 function value = delay(read, r, step, part, tau, c)
 % Signal delayed by linear interpolation between half steps; before its start it is constant.
@@ -143,6 +153,7 @@ _FUNCTIONS = (
     ("hold_sample(", _HOLD),
     ("find_rate(", _RATE),
     ("find_held_rate(", _HELD_RATE),
+    ("find_central_rate(", _CENTRAL_RATE),
     ("delay(", _DELAY),
     ("delay_held(", _HELD_DELAY),
     ("interpolate_gain(", _GAIN_BETWEEN),
@@ -152,9 +163,13 @@ _FUNCTIONS = (
 def write_matlab_signals(given: ExtendedEquations, code: EquationCode) -> str:
     """Return the functions that read the signals of the equations, and those that they call."""
     names = code.identifiers
-    lines = [f"in.{names[render(each)]} = {_write_value(each, given, code)};" for each in code.signals]
+    lines = [f"in.{names[render(each)]} = {_write_value(each, given, code)};" for each in code.read_signals]
     signals = _SIGNALS.format(lines="\n  ".join(lines))
-    readers = "".join(_write_reader(name, given, code) for name in given.columns)
+    readers = "".join(
+        _write_reader(name, given, code)
+        for name in given.columns
+        if not given.core or name not in given.core.columns
+    )
     called = signals + readers
     shared = "".join(section for name, section in _FUNCTIONS if f" {name}" in called)
     if " limit_band(" in readers:
@@ -190,6 +205,8 @@ def _write_value(signal: OdeExpression, given: ExtendedEquations, code: Equation
         case Operation(function, (Symbol(name) as source, *others)):
             read = f"@(step, part) {_write_value(source, given, code)}"
             is_held = name == given.system.input and given.hold == "zero-order"
+            if function == "rate" and given.core is not None:
+                return f"find_central_rate({read}, r, step, c)"
             if function == "rate":
                 return (
                     f"find_held_rate({read}, r, step, c)" if is_held else f"find_rate({read}, step, part, c)"

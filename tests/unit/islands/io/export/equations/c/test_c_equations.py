@@ -13,9 +13,9 @@ from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.effect import Site
 from islands.discrepancy.interfaces.map_equation import OPERATORS
 from islands.discrepancy.simulators.ode import OdeSimulator
-from islands.io.export.equations.c_operators import C_OPERATORS
+from islands.io.export.equations.c.c_operators import C_OPERATORS
 from islands.io.export.equations.equation_collection import CHANNEL_OPERATORS
-from islands.io.export.equations.matlab_operators import MATLAB_OPERATORS
+from islands.io.export.equations.matlab.matlab_operators import MATLAB_OPERATORS
 from islands.io.export.extension import export_extended
 from islands.io.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.factory import make_simulator

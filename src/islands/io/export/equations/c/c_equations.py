@@ -3,21 +3,30 @@
 import re
 
 from islands.discrepancy.interfaces.segments import MAX_RANGE_AT_REST
-from islands.io.export.equations.c_operators import C_OPERATORS
-from islands.io.export.equations.c_signals import find_unused, write_signals
-from islands.io.export.equations.c_templates import (
+from islands.io.export.equations.c.c_core import write_c_core
+from islands.io.export.equations.c.c_operators import C_OPERATORS
+from islands.io.export.equations.c.c_signals import find_unused, write_signals
+from islands.io.export.equations.c.c_templates import (
+    ADVANCE,
     BODY,
     DEFINITIONS,
+    DERIVATIVES,
+    EQUATION_FUNCTIONS,
     FORCE_SLOPES,
     FORCE_STEPS,
     FORCES,
     HEAD,
     MAP,
+    MOVE,
+    SAMPLE,
+    SAMPLED_FUNCTIONS,
+    STEP,
 )
 from islands.io.export.equations.equation_code import EquationCode, make_step
 from islands.io.export.equations.equation_collection import CHANNEL_OPERATORS
 from islands.io.export.equations.extended_equations import ExtendedEquations, SignalMap
 from islands.systems.ode.ode_expression import Symbol, render
+from islands.systems.ode.output_system import SIMULATED
 
 
 def c_equations(equations: ExtendedEquations) -> str:
@@ -46,7 +55,6 @@ class _CWriter:
         names = {name for each in maps for name, _ in each.operators}
         columns = [code.identifiers[name] for name in given.columns]
         states = code.list_states() or [("none", "0.0", "there are no states")]
-        own = [code.identifiers[name] for name, _ in given.system.derivatives]
         text = BODY.format(
             parameters=_list_members(code.list_parameters()),
             states=_list_members(states),
@@ -57,18 +65,20 @@ class _CWriter:
             state_values=_list_values(states),
             reading=write_signals(given, code),
             variables=self._variables(),
-            derivatives=_indent(self._derivatives()),
+            derivatives="" if given.core else DERIVATIVES.format(derivatives=_indent(self._derivatives())),
             output=_indent(self._output()),
-            moves=_indent([f"next.{name} += time*slope->{name};" for name, _, _ in states]),
-            advances=_indent(make_step(code, "s->", own, "STEP") + self._limits() or ["(void)fourth;"]),
+            integration=self._integration([name for name, _, _ in states]),
             operators="".join(f"{C_OPERATORS[name]}\n" for name in C_OPERATORS if name in names),
             maps="".join(self._map(each) for each in maps),
             forces=self._forces(),
+            core=write_c_core(given.core, code) if given.core else "",
+            loop=SAMPLE.format(simulated=code.identifiers[SIMULATED]) if given.core else STEP,
             before=self._before(),
             after=self._after(),
         )
         head = HEAD.format(
             heading="\n".join(f" * {line}".rstrip() for line in code.describe()),
+            functions=SAMPLED_FUNCTIONS if given.core else EQUATION_FUNCTIONS,
             example=", ".join(["samples", *columns]),
             constants=self._constants(text),
             definitions="".join(f"{DEFINITIONS[each]}\n\n" for each in code.find_functions(text)),
@@ -117,6 +127,17 @@ class _CWriter:
         lines = code.assign_variables([output])
         found = code.assign([("const double y", output)])
         return [*_declare(lines), *find_unused([*lines, *found], "p", "s", "in"), *lines, *found, "return y;"]
+
+    def _integration(self, states: list[str]) -> str:
+        """Write the functions that advance the states; forces on the output may have states too."""
+        given, code = self.given, self.code
+        moves = _indent([f"next.{name} += time*slope->{name};" for name in states])
+        move = MOVE.format(moves=moves) if not given.core or any(each.state for each in given.forces) else ""
+        if given.core:
+            return move
+        own = [code.identifiers[name] for name, _ in given.system.derivatives]
+        steps = make_step(code, "s->", own, "STEP") + self._limits() or ["(void)fourth;"]
+        return move + ADVANCE.format(advances=_indent(steps))
 
     def _limits(self) -> list[str]:
         code, own, lines, clips = self.code, self.code.identifiers, [], []
@@ -216,11 +237,16 @@ class _CWriter:
                 ),
                 f"mapped.{column} = x;",
             ]
+        if given.core:
+            lines += ["if (samples > 0) simulate_core(p, initial, r, y);", *self._add_forces()]
         return _indent([*lines, ""]) if lines else ""
+
+    def _add_forces(self) -> list[str]:
+        return ["if (samples > 1) add_forces(p, initial, r, y);"] if self.given.forces else []
 
     def _after(self) -> str:
         given = self.given
-        lines = ["if (samples > 1) add_forces(p, initial, r, y);"] if given.forces else []
+        lines = [] if given.core else self._add_forces()
         lines += [
             f"if (samples > 0) apply_{_identify(each.effect)}(p, record, y, rows);"
             for each in given.output_maps

@@ -14,9 +14,7 @@ HEAD = """\
 /*
 {heading}
  *
- * simulate() computes the output of a record; differentiate(), read_output() and advance_states() are the
- * equations, their output and one step of the integration. PARAMETERS and INITIAL_STATES are those of the
- * diagnosis; change copies of them. Example:
+ * {functions}
  *
  *     struct record record = {{{example}}};
  *     simulate(&PARAMETERS, &INITIAL_STATES, &record, y);
@@ -29,6 +27,15 @@ HEAD = """\
 #include <stdlib.h>
 
 {constants}{definitions}"""
+
+#: Functions of a program, in its heading.
+EQUATION_FUNCTIONS = """\
+simulate() computes the output of a record; differentiate(), read_output() and advance_states() are the
+ * equations, their output and one step of the integration. PARAMETERS and INITIAL_STATES are those of the
+ * diagnosis; change copies of them. Example:"""
+SAMPLED_FUNCTIONS = """\
+simulate() computes the output of a record; read_output() is the equation of the output. PARAMETERS and
+ * INITIAL_STATES are those of the diagnosis; change copies of them. Example:"""
 
 BODY = """\
 /* Parameters of the equations and of the effects. */
@@ -60,7 +67,43 @@ const struct states INITIAL_STATES = {{
 {state_values}
 }};
 
-{reading}{variables}/* Return the derivatives of the states. */
+{reading}{variables}{derivatives}/* Return the output of the equations. */
+double read_output(const struct parameters *p, const struct states *s, const struct signals *in)
+{{
+    {output}
+}}
+
+{integration}{operators}{maps}{forces}{core}/*
+ * Simulate a record; write its output y. Return 0, or -1 if that is not possible, for example without memory.
+ */
+int simulate(const struct parameters *p, const struct states *initial, const struct record *record, double *y)
+{{
+    const size_t samples = record->samples;
+    struct states s = *initial;
+    struct record mapped = *record;
+    const struct record *r = &mapped;
+    {before}for (size_t step = 0; step < samples*STEPS; ++step) {{
+        {loop}
+    }}
+    {after}return 0;
+}}
+"""
+
+#: Statements of each step of the integration.
+STEP = """\
+const struct signals in[3] = {
+            read_signals(p, r, step, 0.0), read_signals(p, r, step, 0.5), read_signals(p, r, step, 1.0)};
+        if (step % STEPS == 0) y[step/STEPS] = read_output(p, &s, &in[0]);
+        advance_states(p, &s, in);"""
+
+#: Statements of each sample of a simulation in discrete time.
+SAMPLE = """\
+struct signals in = read_signals(p, r, step, 0.0);
+        in.{simulated} = y[step];
+        y[step] = read_output(p, &s, &in);"""
+
+DERIVATIVES = """\
+/* Return the derivatives of the states. */
 struct states differentiate(const struct parameters *p, const struct states *s, const struct signals *in)
 {{
     struct states slope = {{0}};
@@ -68,12 +111,9 @@ struct states differentiate(const struct parameters *p, const struct states *s, 
     return slope;
 }}
 
-/* Return the output of the equations. */
-double read_output(const struct parameters *p, const struct states *s, const struct signals *in)
-{{
-    {output}
-}}
+"""
 
+MOVE = """\
 /* Return the states after a time with given slopes. */
 static struct states move(const struct states *s, double time, const struct states *slope)
 {{
@@ -82,6 +122,9 @@ static struct states move(const struct states *s, double time, const struct stat
     return next;
 }}
 
+"""
+
+ADVANCE = """\
 /* Advance the states by one step. The signals are those at its start, in its middle and at its end. */
 void advance_states(const struct parameters *p, struct states *s, const struct signals in[3])
 {{
@@ -95,23 +138,6 @@ void advance_states(const struct parameters *p, struct states *s, const struct s
     {advances}
 }}
 
-{operators}{maps}{forces}/*
- * Simulate a record; write its output y. Return 0, or -1 if that is not possible, for example without memory.
- */
-int simulate(const struct parameters *p, const struct states *initial, const struct record *record, double *y)
-{{
-    const size_t samples = record->samples;
-    struct states s = *initial;
-    struct record mapped = *record;
-    const struct record *r = &mapped;
-    {before}for (size_t step = 0; step < samples*STEPS; ++step) {{
-        const struct signals in[3] = {{
-            read_signals(p, r, step, 0.0), read_signals(p, r, step, 0.5), read_signals(p, r, step, 1.0)}};
-        if (step % STEPS == 0) y[step/STEPS] = read_output(p, &s, &in[0]);
-        advance_states(p, &s, in);
-    }}
-    {after}return 0;
-}}
 """
 
 MAP = """\

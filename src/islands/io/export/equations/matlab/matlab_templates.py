@@ -37,16 +37,8 @@ function y = extended_simulation({columns}, initial, p)
   shape = size({first});
   {record}
   r.samples = numel({first});
-  {before}y = zeros(r.samples, 1);
-  s = initial;
-  for step = 0:r.samples*c.steps - 1
-    in = read_signals(p, r, step, 0, c);
-    if mod(step, c.steps) == 0
-      y(step/c.steps + 1) = read_output(p, s, in);
-    end
-    middle = read_signals(p, r, step, 0.5, c);
-    s = advance(p, s, in, middle, read_signals(p, r, step, 1, c), c);
-  end
+  {before}s = initial;
+  {loop}
   {after}y = reshape(y, shape);
 end
 
@@ -72,21 +64,47 @@ function s = initial_states()
   {states}
 end
 
-function slope = differentiate(p, s, in)
-% Derivatives of the states.
-  slope = s;
-  {derivatives}
-end
-
 function y = read_output(p, s, in)
 % Output of the equations.
   {output}
 end
 
+{integration}"""
+
+#: Integration over the record.
+LOOP = """\
+y = zeros(r.samples, 1);
+  for step = 0:r.samples*c.steps - 1
+    in = read_signals(p, r, step, 0, c);
+    if mod(step, c.steps) == 0
+      y(step/c.steps + 1) = read_output(p, s, in);
+    end
+    middle = read_signals(p, r, step, 0.5, c);
+    s = advance(p, s, in, middle, read_signals(p, r, step, 1, c), c);
+  end"""
+
+#: Equation of the output of a simulation in discrete time.
+SAMPLED_LOOP = """\
+for step = 0:r.samples - 1
+    in = read_signals(p, r, step, 0, c);
+    in.{simulated} = y(step + 1);
+    y(step + 1) = read_output(p, s, in);
+  end"""
+
+MOVE = """\
 function next = move(s, time, slope)
 % States after a time with given slopes.
   next = s;
   {moves}
+end
+
+"""
+
+ADVANCE = """\
+function slope = differentiate(p, s, in)
+% Derivatives of the states.
+  slope = s;
+  {derivatives}
 end
 
 function s = advance(p, s, start, middle, finish, c)

@@ -1,0 +1,1 @@
+"""Programs of extended simulations in C99."""
