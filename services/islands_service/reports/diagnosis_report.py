@@ -58,12 +58,12 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
         dependence = ", ".join(found.residual_structure) or "its own past"
         lines.append(f"  nearest: {nearest}; the residual depends on: {dependence}")
     if found.gain is not None:
-        gain, unit = found.gain, found.record.output_unit
-        low, high = gain.ci95
+        gain, (low, high) = found.gain, found.gain.ci95
+        unit = f" {found.record.output_unit}" if found.record.output_unit else ""
         lines.append(
             f"On held-out data the RMSE falls from {gain.before.rmse:.3g} to "
-            f"{gain.after.rmse:.3g} {unit}, by {gain.reduction_percent:.1f} % ({low:.1f} to {high:.1f}); "
-            f"the noise floor is {gain.noise_floor.rmse:.3g} {unit}, {_floor(found)}."
+            f"{gain.after.rmse:.3g}{unit}, by {gain.reduction_percent:.1f} % ({low:.1f} to {high:.1f}); "
+            f"the noise floor is {gain.noise_floor.rmse:.3g}{unit}, {_floor(found)}."
         )
     if found.suggested_experiment:
         lines.append(f"Suggested experiment to separate confounded effects: {found.suggested_experiment}.")

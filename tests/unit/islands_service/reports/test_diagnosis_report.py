@@ -1,5 +1,6 @@
 """Sentences of the diagnosis report."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -44,6 +45,13 @@ def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis
         assert ["explain the record as well" in text for text in texts] == [False, True, False]
         assert ["instead of the terms" in text for text in texts] == [True, False, False]
         assert [", with jump:" in text for text in texts] == [False, True, False]
+
+
+@pytest.mark.ci
+def test_errors_have_the_unit_of_the_output_if_it_has_one(diagnosis: Diagnosis) -> None:
+    named = replace(diagnosis, record=replace(diagnosis.record, output_unit="um"))
+    assert re.search(r"to 0\.\d+, by", summarise(diagnosis))
+    assert re.search(r"to 0\.\d+ um, by .* floor is 0\.\d+ um,", summarise(named))
 
 
 @pytest.mark.ci
