@@ -13,14 +13,13 @@ from types import MappingProxyType
 from islands.data.channel_names import AT_ONCE
 from islands.errors import ModelError
 from islands.io.models import model_from_json
-from islands.io.simulator_spec.ode_spec import OdeSpec
+from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.spec_base import EffectSpec, ScalesSpec
 from islands.io.simulator_spec.specification import (
     ExtendedSpec,
     LinearSpec,
     LocalSpec,
     ModelSpec,
-    PhysicalSpec,
     SimulationSpec,
 )
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
@@ -79,11 +78,8 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
             found = _make_linear_model(core, spec.inputs[0])
         case ExtendedSpec():
             found = closed_form(spec.core)
-        case PhysicalSpec() | OdeSpec():
-            raise ModelError(
-                f"the simulation {spec.kind} has no closed form as a difference equation: take the format "
-                "plain, python, json, c or matlab"
-            )
+        case FmuSpec() | ProgramSpec():
+            raise _refuse(f"the simulation {spec.kind}", "plain, python or json")
         case _:
             raise _refuse(f"the simulation {spec.kind}")
     if spec.output_equation is not None:
@@ -97,11 +93,11 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
     return replace(found, output_name=spec.output, dt=spec.scales.dt)
 
 
-def _refuse(what: str) -> ModelError:
+def _refuse(what: str, formats: str = "plain, python, json, c or matlab") -> ModelError:
     possible = ", ".join([*_INPUT_MAPS, *_OUTPUT_LINES])
     return ModelError(
-        f"{what} has no closed form as a difference equation: take the format plain, python or json. Other "
-        f"formats are possible for a model or a linear simulation with the effects {possible}"
+        f"{what} has no closed form as a difference equation: take the format {formats}. Other formats are "
+        f"possible for a model or a linear simulation with the effects {possible}"
     )
 
 
