@@ -22,7 +22,8 @@ from islands.discrepancy.calibration.preparation import (
 )
 from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.target import Target
-from islands.discrepancy.effects import catalogue_order
+from islands.discrepancy.effects import CATALOGUE, catalogue_order
+from islands.discrepancy.effects.scale import wrong_parameter
 from islands.discrepancy.inference.screening import get_starting_points, transfer_parameters
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.effect import Effect
@@ -200,15 +201,12 @@ def estimate_states(
     Raises
     ------
     RecordError
-        The record is too short, the simulation diverges on it, or an effect of the reference cannot act on
-        this record.
+        The record is too short, the simulation diverges on it, its input rests, or a channel is missing.
     """
     fit, target = calibrate_record(record, simulator, tolerance, reference.noise)
     is_monitored = np.array([not each.initial for each in fit.simulation.parameters], dtype=bool)
     covariance = estimate_covariance(fit, target)
-    effects = {
-        each.name: each for each in select_effects(simulator, fit.simulation.context, target.prior_std)
-    }
+    effects = _find_effects(fit.simulation, target)
     projection = Projection(fit, target)
     # In standard deviations of the noise of the reference, whatever the residual of this record.
     factor = float(np.std(target.residual(fit.output))) / reference.variance**0.5
@@ -217,8 +215,8 @@ def estimate_states(
     for direction in reference.directions:
         if direction.effect not in effects:
             raise RecordError(
-                f"the record cannot show {direction.effect}, which the first record could: give records with "
-                "the same channels, whose input varies"
+                f"the record cannot show {direction.effect}, which the first record could: give records "
+                "whose input varies"
             )
         response = _respond(fit, effects[direction.effect], direction.start)
         projected = projection(response)
@@ -263,6 +261,21 @@ def calibrate_record(
         raise RecordError("the simulation diverges on this record: check its units and its sampling time")
     target = whiten_target(target, fit) if noise is None else replace(target, noise=noise)
     return calibrate(simulation, target, fit.values), target
+
+
+def _find_effects(simulation: ExtendedSimulator, target: Target) -> dict[str, Effect]:
+    """Return the effects that have a response to the input of a record, by name.
+
+    A reference contains effects that its record could show. Another input of the same kind may be too slow to
+    distinguish one from others, but it has a response, unless it rests.
+    """
+    simulator = simulation.simulator
+    if simulation.context.has_resting_input:
+        found = select_effects(simulator, simulation.context, target.prior_std)
+    else:
+        wrong = (wrong_parameter(each) for each in simulator.parameters if each.name in target.prior_std)
+        found = [*CATALOGUE.values(), *simulator.state_effects, *wrong]
+    return {each.name: each for each in found}
 
 
 def _count_starts(fit: CalibrationResult, effect: Effect) -> int:

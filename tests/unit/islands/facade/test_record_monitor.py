@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+import scipy
 from benchmarks.monitor import run
 
 from islands.discrepancy.monitoring.record_follower import AlarmKind, MonitorSettings
@@ -17,7 +19,13 @@ from islands.io.checkpoints.monitor_state import (
     record_to_json,
 )
 from islands.io.result_text.monitor_text import describe_alarm_text, describe_last_record
-from support.monitored_oscillator import ONSET, TRAINING, follow, make_records, undisturbed_monitor
+from support.monitored_oscillator import (
+    ONSET,
+    TRAINING,
+    follow,
+    make_records,
+    undisturbed_monitor,
+)
 
 
 def disturb(**change):
@@ -99,6 +107,23 @@ def test_a_record_that_cannot_be_analysed_leaves_the_monitor_valid():
     with pytest.raises(RecordError, match="sampl"):
         monitor_record(saved, replace(records[1], dt=0.02), "slow")
     assert len(follow(records[1:], saved).state.records) == 2
+
+
+def test_an_input_that_cannot_distinguish_an_effect_is_followed():
+    """A single sine does not distinguish a rate limit from other effects; the monitor has its score."""
+    records = make_records(2)
+    assert "rate-limit" in follow(records).state.reference.names
+    time = records[0].dt * np.arange(records[0].samples)
+    u = 20.0 * np.sin(2 * np.pi * 2.0 * time)[:, None]
+    _, x, _ = scipy.signal.lsim(
+        ([[0.0, 1.0], [-100.0, -2.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]]), u, time
+    )
+    noise = 1e-3 * np.random.default_rng(8).standard_normal(time.size)
+    state = follow((*records, replace(records[0], u=u, y=x + noise))).state
+    assert len(state.records) == 3
+    resting = replace(records[0], u=np.ones_like(u))
+    with pytest.raises(RecordError, match="whose input varies"):
+        follow((*records, resting))
 
 
 def test_the_document_has_the_states_with_their_intervals():
