@@ -23,6 +23,7 @@ UNCERTAIN = (
 )
 
 
+@pytest.mark.timeout(2400)  # an axis takes up to 20 minutes next to other tests
 @pytest.mark.parametrize(
     ("simulator", "law"),
     [
