@@ -22,7 +22,7 @@ from islands.io.records.size_limits import RecordArchive, check_samples, check_s
 #: Exceptions that NumPy and the standard library raise for damaged archives and for Python objects in valid
 #: ones.
 UNREADABLE = (
-    *(ValueError, OSError, EOFError, RuntimeError),
+    *(ValueError, OSError, EOFError, RuntimeError, SyntaxError),
     *(struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error),
 )
 
