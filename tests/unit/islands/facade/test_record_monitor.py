@@ -19,13 +19,7 @@ from islands.io.checkpoints.monitor_state import (
     record_to_json,
 )
 from islands.io.result_text.monitor_text import describe_alarm_text, describe_last_record
-from support.monitored_oscillator import (
-    ONSET,
-    TRAINING,
-    follow,
-    make_records,
-    undisturbed_monitor,
-)
+from support.monitored_oscillator import ONSET, TRAINING, follow, make_records, undisturbed_monitor
 
 
 def disturb(**change):

@@ -26,16 +26,11 @@ def write_c_core(core: SampledCore, code: EquationCode) -> str:
         return _write_model(core, u, f"r->{names[MEASURED]}")
     if core.output is None:
         return _write([f"for (size_t k = 0; k < r->samples; ++k) y[k] = r->{names[RECORDED]}[k];"])
-    local = {name: name for name, _ in core.after}
+    local = {"x": "x", "y": "y[k]", **{name: name for name, _ in core.after}}
     delayed = f"{u}[k < {core.delay} ? 0 : k - {core.delay}]" if core.delay else f"{u}[k]"
     each = [
         f"const double x = {delayed};",
-        *code.wrap(f"y[k] = {code.write(core.output, {**local, 'x': 'x'})};"),
-        *(
-            line
-            for name, right in core.after
-            for line in code.wrap(f"{name} = {code.write(right, {**local, 'x': 'x', 'y': 'y[k]'})};")
-        ),
+        *code.assign([("y[k]", core.output), *core.after], local),
     ]
     return _write(
         [

@@ -23,15 +23,10 @@ def write_matlab_core(core: SampledCore, code: EquationCode) -> str:
         return _write_model(core, u, f"r.{names[MEASURED]}")
     if core.output is None:
         return _write([f"y = r.{names[RECORDED]};"])
-    local = {name: name for name, _ in core.after}
+    local = {"x": "x", "y": "y(k)", **{name: name for name, _ in core.after}}
     each = [
         f"x = {u}(max(k - {core.delay}, 1));" if core.delay else f"x = {u}(k);",
-        *code.wrap(f"y(k) = {code.write(core.output, {**local, 'x': 'x'})};"),
-        *(
-            line
-            for name, right in core.after
-            for line in code.wrap(f"{name} = {code.write(right, {**local, 'x': 'x', 'y': 'y(k)'})};")
-        ),
+        *code.assign([("y(k)", core.output), *core.after], local),
     ]
     before = [f"{name} = {code.write(right, {'x': f'{u}(1)'})};" for name, right in core.before]
     return _write(["y = zeros(r.samples, 1);", *before, *_loop("1", each)])
