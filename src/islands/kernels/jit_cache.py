@@ -2,8 +2,10 @@
 
 Numba compiles a kernel at its first call, which takes seconds, and can store the machine code in files. The
 files are in the user's cache folder and not next to the sources, because an installed package is often
-read-only. The folder is ``<user's cache>/islands/kernels/<islands>-<numba>-<processor>-<hash>``. It may be
-deleted at any time.
+read-only. The folder is ``<user's cache>/islands/kernels/<islands>-<numba>-<processor>-<hash>``. The hash is
+of the content of the sources, so all checkouts and installations with equal kernels share one folder. It may
+be deleted at any time. A process that compiles the kernels deletes the folders of other versions that were
+not used for `UNUSED_DAYS`.
 
 The environment variable ``ISLANDS_CACHE_DIR`` replaces ``<user's cache>/islands``. This is an exception to
 the rule that the core reads no environment variables: kernels are created while modules are imported, so
@@ -13,6 +15,7 @@ it.
 """
 
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -35,8 +38,13 @@ from platformdirs import user_cache_path
 #: File in the cache folder that marks it as complete: every kernel has been compiled.
 STAMP = "complete"
 
+#: Days after which the folder of another version is deleted if no process has used it.
+UNUSED_DAYS = 30
+
 #: Folders of the package that contain compiled functions.
 COMPILED = ("kernels", "systems", "discrepancy/effects")
+
+_PACKAGE = Path(__file__).absolute().parents[1]
 
 
 def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -93,6 +101,7 @@ def cache_folder() -> Path | None:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as probe:
             probe.write(bytes(4096))  # on a full disk an empty file can still be created
+        os.utime(folder)  # the time of its last use
     except (OSError, RuntimeError):  # RuntimeError: the user has no home folder
         return folder if folder is not None and (folder / STAMP).exists() else None
     return folder
@@ -127,6 +136,7 @@ def ready(compile_all: Callable[[], None], tell: Callable[[str], None]) -> bool:
     with _lock(folder / "compiling.lock", lambda: tell("waiting for another process to compile the kernels")):
         if (folder / STAMP).exists():
             return False
+        _delete_unused_folders(folder)
         tell(f"compiling the kernels for this processor once; they are stored in {folder}")
         compile_all()
         _stamp(folder)
@@ -134,7 +144,18 @@ def ready(compile_all: Callable[[], None], tell: Callable[[str], None]) -> bool:
 
 
 class _Locator(UserProvidedCacheLocator):
-    """Numba's locator of the chosen folder, which may be read-only."""
+    """Numba's locator of the chosen folder, which may be read-only.
+
+    Kernels of the package are found by their path in the package, wherever it is installed.
+    """
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        """Return the name of the folder for the kernels of a source file."""
+        source = Path(py_file).absolute()
+        if source.is_relative_to(_PACKAGE):
+            return "_".join(source.relative_to(_PACKAGE).parent.parts)
+        return str(super().get_suitable_cache_subpath(py_file))
 
     def ensure_cache_path(self) -> None:
         """Create the folder of a source file, without Numba's test that it can be written."""
@@ -204,6 +225,15 @@ def _stamp(folder: Path) -> None:
             draft.replace(folder / STAMP)
 
 
+def _delete_unused_folders(used: Path) -> None:
+    """Delete the folders of other versions whose last use was `UNUSED_DAYS` before that of the given one."""
+    with suppress(OSError):
+        oldest = used.stat().st_mtime - UNUSED_DAYS * 86400
+        for folder in used.parent.iterdir():
+            if folder.stat().st_mtime < oldest:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
 def _key() -> str:
     processor = get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME
     return f"{version('islands')}-{numba.__version__}-{processor}-{_hash(processor)}"
@@ -213,12 +243,10 @@ def _hash(processor: str) -> str:
     """Hash everything else that the compiled kernels depend on, so that the stamp is valid for them.
 
     Numba checks only the file of a function itself and misses a change of a function that is inlined from
-    another file. The hash also contains the Python version, the processor's features and the path of the
-    sources.
+    another file. The hash also contains the Python version and the processor's features.
     """
     features = get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES
     hashed = sha256(repr((sys.implementation.cache_tag, processor, features)).encode())
-    package = Path(__file__).parents[1]
-    for source in sorted(source for folder in COMPILED for source in (package / folder).rglob("*.py")):
-        hashed.update(repr((str(source), source.read_bytes())).encode())
+    for source in sorted(source for folder in COMPILED for source in (_PACKAGE / folder).rglob("*.py")):
+        hashed.update(repr((source.relative_to(_PACKAGE).as_posix(), source.read_bytes())).encode())
     return hashed.hexdigest()[:12]

@@ -223,12 +223,33 @@ def test_change_in_any_kernel_source_gives_another_folder(start, tmp_path):
         (package / "inlined.py").write_text(text)
         folders.append(get_output(start(FOLDER)))
     assert folders[0] == folders[2] != folders[1]
-    # The same sources in another folder: Numba caches by the path of the source.
+
+
+def test_checkouts_with_equal_sources_share_their_kernels(start, tmp_path):
+    # The toys are a module of the package here: other kernels are stored by the path of their source.
+    code = READY.replace("from toys", "from islands.kernels.toys")
+    (tmp_path / "toys.py").rename(tmp_path / "islands" / "kernels" / "toys.py")
+    first = get_output(start(code))
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
-    for name in ("islands", "toys.py"):
-        (tmp_path / name).rename(elsewhere / name)
-    assert get_output(start(FOLDER, PYTHONPATH=str(elsewhere))) not in folders
+    (tmp_path / "islands").rename(elsewhere / "islands")
+    second = get_output(start(code, "never", PYTHONPATH=str(elsewhere)))
+    assert (first["hits"], first["misses"]) == (0, 1)
+    assert (second["compiled"], second["hits"], second["misses"]) == (False, 1, 0)
+    assert second["folder"] == first["folder"]
+
+
+@pytest.mark.parametrize("days", [29, 31])
+def test_folder_of_another_version_is_deleted_after_a_month_without_use(start, tmp_path, days):
+    old = tmp_path / "cache" / "kernels" / "0.0.1-other"
+    old.mkdir(parents=True)
+    (old / "complete").touch()
+    used = time.time() - days * 86400
+    os.utime(old, (used, used))
+    get_output(start(FOLDER))
+    assert old.exists()  # only a process that compiles deletes folders
+    get_output(start(READY))
+    assert old.exists() == (days < 30)
 
 
 @pytest.mark.parametrize("users", ["", "theirs"])
