@@ -136,7 +136,8 @@ def test_the_settings_in_deployment_files_exist():
 
 
 def manifests() -> list[Path]:
-    return sorted(path for path in KUBERNETES.glob("*.yaml") if path.name != "kustomization.yaml")
+    configuration = ("kustomization.yaml", "name-references.yaml")
+    return sorted(path for path in KUBERNETES.glob("*.yaml") if path.name not in configuration)
 
 
 def pod_specs(document: dict[str, Any]) -> list[dict[str, Any]]:
