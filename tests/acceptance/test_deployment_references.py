@@ -14,7 +14,7 @@ from support.repository import ROOT
 KUBERNETES = ROOT / "deploy/kubernetes/base"
 COMPOSE = ROOT / "deploy/compose"
 
-#: Stands for the hash that kustomize appends to the name of a generated object.
+#: Substitute for the hash that kustomize appends to the name of a generated object.
 HASH = "-hash"
 
 #: Field of a kustomization that generates objects of a kind.
