@@ -1,4 +1,4 @@
-"""No deployment guide installs the project by a name from a package index, which another project could own."""
+"""No deployment guide installs the project by a name, which another project could register in an index."""
 
 import re
 
