@@ -57,7 +57,14 @@ Id = Annotated[
     form_limits={"max_files": 1, "max_fields": 200, "max_part_size": 10_000},
 )
 async def upload(
-    file: Annotated[UploadFile, File(description="Text, XLSX, NPZ, MAT, HDF5, Parquet or TDMS; also .gz")],
+    file: Annotated[
+        UploadFile,
+        File(
+            description="Text, XLSX, NPZ, MAT, HDF5, Parquet or TDMS; also .gz",
+            # The framework writes `contentMediaType` alone, which generators of clients take for text.
+            json_schema_extra={"format": "binary"},
+        ),
+    ],
     caller: Writer,
     state: AppStateDep,
     inputs: Annotated[list[Name], Form(max_length=16, description="Columns to check as inputs.")] = [],  # noqa: B006

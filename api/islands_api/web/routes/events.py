@@ -30,6 +30,7 @@ _STREAM_RESPONSES: dict[int | str, dict[str, Any]] = {
         "description": f"Events: {', '.join(_EVENT_KINDS)}.",
         "content": {
             "text/event-stream": {
+                "schema": {"type": "string"},
                 "itemSchema": {
                     "type": "object",
                     "required": ["id", "event", "data"],
