@@ -43,7 +43,7 @@ from islands.discrepancy.inference.strategies import (
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
-from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances
+from islands.discrepancy.interfaces.simulator import Simulator, find_read_channels, get_tolerances
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.output_equation import add_output_equation
 from islands.errors import RecordError
@@ -95,7 +95,7 @@ def diagnose(
     """
     prior_std = validate_prior({**get_tolerances(simulator), **(tolerance or {})}, simulator)
     fitted = count_fitted_samples(record)
-    record, record_findings = admit_channels(record, fitted)
+    record, record_findings = admit_channels(record, fitted, find_read_channels(simulator))
     record_findings += describe_gaps(record)
     try:
         context = make_context(record, simulator, fitted)

@@ -3,6 +3,7 @@
 A copy of the output explains any misfit as coupling, and a copy of the input any error of a gain.
 """
 
+from collections.abc import Set
 from dataclasses import replace
 
 import numpy as np
@@ -23,8 +24,12 @@ MAX_DIFFERENCE_OF_TEMPERATURE = 1e-6
 MAX_LAG = 2
 
 
-def admit_channels(record: Dataset, fitted: int) -> tuple[Dataset, tuple[RecordFinding, ...]]:
+def admit_channels(
+    record: Dataset, fitted: int, read: Set[str] = frozenset()
+) -> tuple[Dataset, tuple[RecordFinding, ...]]:
     """Return a record without the channels that cannot be a cause, and a finding for each of these.
+
+    Channels that the simulation reads remain.
 
     Parameters
     ----------
@@ -32,10 +37,13 @@ def admit_channels(record: Dataset, fitted: int) -> tuple[Dataset, tuple[RecordF
         The first input drives the simulation; further inputs are channels.
     fitted : int
         Number of samples used for estimation.
+    read : set of str
+        Names of the channels that the simulation reads.
     """
     kept, findings = [0], []
     for place in range(1, record.inputs):
-        finding = _examine_channel(record, place, fitted)
+        is_read = record.input_names[place] in read
+        finding = None if is_read else _examine_channel(record, place, fitted)
         if finding is None:
             kept.append(place)
         else:

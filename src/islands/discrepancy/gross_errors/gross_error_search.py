@@ -1,21 +1,21 @@
 """Search for gross errors of a record: a few discrete corrections, each compared with the record as given."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import (
-    CalibrationResult,
-    calibrate,
-    evaluate_fit,
-    prior_precision,
-)
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
-from islands.discrepancy.calibration.preparation import make_context, make_target
+from islands.discrepancy.calibration.preparation import make_target
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.gross_errors.channel_corrections import correct_swapped_channels
+from islands.discrepancy.gross_errors.corrected_simulation import (
+    CorrectedSimulation,
+    limit_to_tolerances,
+    make_corrected_simulation,
+)
 from islands.discrepancy.gross_errors.correction import Correction
 from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.gross_errors.scale_corrections import (
@@ -26,21 +26,21 @@ from islands.discrepancy.gross_errors.scale_corrections import (
 )
 from islands.discrepancy.gross_errors.time_offset import correct_time_offset
 from islands.discrepancy.interfaces.effect import Signal
-from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.interfaces.simulator import Simulator, find_read_channels
 from islands.errors import RecordError
 
-#: Makes the corrections of a record; receives the record, the simulated output and the fitted samples.
-Check = Callable[[Dataset, Signal, int], Iterable[Correction]]
+#: Makes the corrections of a record; receives the record, the names of the channels that the simulation
+#: reads, the simulated output and the fitted samples.
+Check = Callable[[Dataset, Set[str], Signal, int], Iterable[Correction]]
 
 #: Checks, in the order in which equally good corrections are listed. To add a check, add an entry.
 CHECKS: tuple[Check, ...] = (
-    lambda record, _simulated, _fitted: correct_sampling_time(record),
-    lambda record, _simulated, _fitted: correct_output_unit(record),
-    lambda record, _simulated, _fitted: correct_input_unit(record),
-    lambda record, _simulated, _fitted: correct_sign(record),
-    lambda record, _simulated, _fitted: correct_swapped_channels(record),
-    correct_time_offset,
+    lambda record, _read, _simulated, _fitted: correct_sampling_time(record),
+    lambda record, _read, _simulated, _fitted: correct_output_unit(record),
+    lambda record, read, _simulated, _fitted: correct_input_unit(record, read),
+    lambda record, read, _simulated, _fitted: correct_sign(record, read),
+    lambda record, read, _simulated, _fitted: correct_swapped_channels(record, read),
+    lambda record, _read, simulated, fitted: correct_time_offset(record, simulated, fitted),
 )
 
 #: Errors below, relative to the standard deviation of the output, are not gross.
@@ -54,12 +54,6 @@ MAX_EXCHANGED_ERROR = 0.1
 
 #: Largest error of a corrected simulation, relative to that of the calibrated simulation as given.
 MAX_ERROR_RATIO = 0.3
-
-#: Largest deviation of a parameter from its nominal value, in tolerances, without an error.
-MAX_DEVIATION = 4.0
-
-#: Steps in which initial states are fitted before corrections are compared.
-STATE_ITERATIONS = 3
 
 #: Number of corrections of each check that are calibrated.
 CALIBRATED = 3
@@ -103,11 +97,12 @@ def find_gross_errors(
         free_error = _compute_free_error(base, target)
         nominal = base.simulation.simulate(base.simulation.nominal)
     found = []
+    read = find_read_channels(simulator)
     for check in CHECKS:
-        for simulation, start, corrected, correction in _select(
-            check(record, nominal, fitted), simulator, target, nominal, fitted
-        ):
-            fit = limit_to_tolerances(calibrate(simulation, corrected, start), corrected)
+        for candidate in _select(check(record, read, nominal, fitted), simulator, target, nominal, fitted):
+            if (fit := candidate.calibrate()) is None:
+                continue
+            correction, corrected = candidate.correction, candidate.target
             error = relative_error(fit, corrected)
             before = error_before if correction.is_discrete else min(error_before, free_error)
             largest = MAX_EXCHANGED_ERROR if correction.has_other_output else MAX_CORRECTED_ERROR
@@ -153,27 +148,6 @@ def relative_error(fit: CalibrationResult, target: Target) -> float:
     return float(np.sqrt(fit.mean_square)) / deviation if deviation > 0.0 else float("inf")
 
 
-def limit_to_tolerances(fit: CalibrationResult, target: Target) -> CalibrationResult:
-    """Return a fit whose parameters deviate by at most `MAX_DEVIATION` tolerances from their nominal values.
-
-    A long record outweighs any prior. A parameter that would have to leave its tolerance by far is evidence
-    of an error.
-    """
-    inverse_std, nominal = prior_precision(fit.simulation, target.prior_std)
-    with np.errstate(divide="ignore"):
-        reach = MAX_DEVIATION / inverse_std
-    values = np.clip(fit.values, nominal - reach, nominal + reach)
-    is_limited = values != fit.values
-    if not is_limited.any():
-        return fit
-    # Their priors would move them; those of the other parameters remain.
-    limited = {fit.simulation.parameters[place].name for place in np.flatnonzero(is_limited)}
-    remaining = {name: std for name, std in target.prior_std.items() if name not in limited}
-    others = replace(target, prior_std=remaining)
-    refitted = calibrate(fit.simulation, others, values, is_fixed=is_limited)
-    return evaluate_fit(fit.simulation, target, refitted.values)
-
-
 def _explain_negative_parameters(
     record: Dataset, base: CalibrationResult, error: float
 ) -> tuple[GrossError, ...]:
@@ -193,51 +167,29 @@ def _explain_negative_parameters(
 
 def _select(
     corrections: Iterable[Correction], simulator: Simulator, target: Target, nominal: Signal, fitted: int
-) -> Sequence[tuple[ExtendedSimulator, Signal, Target, Correction]]:
-    """Return the best corrections that change something, each with its simulation, start and target.
+) -> Sequence[CorrectedSimulation]:
+    """Return the simulations of the best corrections that change something, from their fitted initial states.
 
-    They are compared at the nominal parameters; initial states are fitted.
+    They are compared at the nominal parameters.
     """
     rated = []
     for correction in corrections:
-        made = _prepare(correction, simulator, target, fitted)
-        if made is None:
+        candidate = make_corrected_simulation(correction, simulator, target, fitted)
+        if candidate is None or _changes_nothing(candidate, target, nominal):
             continue
-        simulation, start, corrected = made
-        if np.array_equal(corrected.y, target.y, equal_nan=True) and np.array_equal(
-            simulation.simulate(start), nominal
-        ):
-            continue
-        is_fixed = np.array([not parameter.initial for parameter in simulation.parameters], dtype=bool)
-        fit = (
-            evaluate_fit(simulation, corrected, start)
-            if is_fixed.all()
-            else calibrate(simulation, corrected, start, STATE_ITERATIONS, is_fixed)
-        )
-        error = relative_error(fit, corrected)
-        if error < MAX_UNCALIBRATED_ERROR:
-            rated.append((error, (simulation, fit.values, corrected, correction)))
+        fit = candidate.fit_states()
+        if fit is not None and (error := relative_error(fit, candidate.target)) < MAX_UNCALIBRATED_ERROR:
+            rated.append((error, replace(candidate, start=fit.values)))
     rated.sort(key=lambda each: each[0])
-    return [made for _, made in rated[:CALIBRATED]]
+    return [candidate for _, candidate in rated[:CALIBRATED]]
 
 
-def _prepare(
-    correction: Correction, simulator: Simulator, target: Target, fitted: int
-) -> tuple[ExtendedSimulator, Signal, Target] | None:
-    """Return simulation, starting point and target of a correction; None if the simulation diverges."""
-    record = correction.record
-    try:
-        context = make_context(record, simulator, fitted)
-    except RecordError:
-        return None
-    simulation = ExtendedSimulator(simulator, (), context)
-    # A nominal initial state may come from the record as given.
-    is_state = np.array([parameter.initial for parameter in simulation.parameters], dtype=bool)
-    start = np.where(is_state, correction.scale, 1.0) * simulation.nominal
-    is_used = np.arange(record.samples) < fitted - max(correction.shift, 0)
-    made = make_target(record, fitted, target.prior_std)
-    part = made.estimation_part & correction.is_known & is_used
-    return simulation, start, replace(made, estimation_part=part)
+def _changes_nothing(candidate: CorrectedSimulation, target: Target, nominal: Signal) -> bool:
+    """Return whether a correction changes neither the output nor the simulation."""
+    if not np.array_equal(candidate.target.y, target.y, equal_nan=True):
+        return False
+    simulated = candidate.simulate()
+    return simulated is not None and np.array_equal(simulated, nominal)
 
 
 def _compute_free_error(base: CalibrationResult, target: Target) -> float:

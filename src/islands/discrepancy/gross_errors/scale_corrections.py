@@ -1,6 +1,6 @@
 """Corrections of scales: wrong sampling time, wrong unit of the output or the input, flipped sign."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import replace
 from math import pi
 
@@ -54,19 +54,31 @@ def correct_output_unit(record: Dataset) -> Iterator[Correction]:
         )
 
 
-def correct_input_unit(record: Dataset) -> Iterator[Correction]:
-    """Yield the record with the input in other units."""
-    name = record.input_names[0]
-    for factor, words in _list_factors(name):
-        u = record.u.copy()
-        u[:, 0] /= factor
-        yield Correction(
-            "input-unit",
-            replace(record, u=u),
-            f"The input {name} seems to be in another unit than that of the simulation: {words}",
-            _advise(name, factor),
-            {"factor": (factor, "")},
-        )
+def correct_input_unit(record: Dataset, read: Set[str] = frozenset()) -> Iterator[Correction]:
+    """Yield the record with the input, or a channel that the simulation reads, in other units."""
+    for place, role, name in _list_driving_signals(record, read):
+        for factor, words in _list_factors(name):
+            yield Correction(
+                "input-unit",
+                _scale_input(record, place, 1.0 / factor),
+                f"The {role} {name} seems to be in another unit than that of the simulation: {words}",
+                _advise(name, factor),
+                {"factor": (factor, "")},
+            )
+
+
+def _list_driving_signals(record: Dataset, read: Set[str]) -> Iterator[tuple[int, str, str]]:
+    """Yield place, role and name of the input and of each channel that the simulation reads."""
+    for place, name in enumerate(record.input_names):
+        if place == 0 or name in read:
+            yield place, "channel" if place else "input", name
+
+
+def _scale_input(record: Dataset, place: int, factor: float) -> Dataset:
+    """Return the record with one of its inputs multiplied by a factor."""
+    u = record.u.copy()
+    u[:, place] *= factor
+    return replace(record, u=u)
 
 
 def _list_factors(name: str) -> Iterator[tuple[float, str]]:
@@ -85,14 +97,14 @@ def _advise(name: str, factor: float) -> str:
     return f"{change}, or give the parameters of the simulation in its unit."
 
 
-def correct_sign(record: Dataset) -> Iterator[Correction]:
-    """Yield the record with the output inverted, and with the input inverted."""
-    u = record.u.copy()
-    u[:, 0] *= -1.0
-    for role, name, corrected, scale in (
-        ("output", record.output_name, replace(record, y=-record.y), -1.0),
-        ("input", record.input_names[0], replace(record, u=u), 1.0),
-    ):
+def correct_sign(record: Dataset, read: Set[str] = frozenset()) -> Iterator[Correction]:
+    """Yield the record with the output, the input, or a channel that the simulation reads inverted."""
+    inverted = [("output", record.output_name, replace(record, y=-record.y), -1.0)]
+    inverted += [
+        (role, name, _scale_input(record, place, -1.0), 1.0)
+        for place, role, name in _list_driving_signals(record, read)
+    ]
+    for role, name, corrected, scale in inverted:
         yield Correction(
             "sign",
             corrected,

@@ -195,6 +195,15 @@ class ShootingSimulator(Protocol):
         """Shooting intervals; None for a free run."""
 
 
+@runtime_checkable
+class ChannelReadingSimulator(Protocol):
+    """Simulator that reads channels of the record by their names."""
+
+    @property
+    def channels(self) -> Mapping[str, str]:
+        """Channels of the record by the names that the simulator gives to them."""
+
+
 def _unwrap(simulator: Simulator) -> Simulator:
     while isinstance(simulator, WrappingSimulator):
         simulator = simulator.simulator
@@ -210,6 +219,12 @@ def fits_states(simulator: Simulator) -> bool:
     """Return whether a simulator, or the one that it runs, fits states to the record in each simulation."""
     inner = _unwrap(simulator)
     return isinstance(inner, ShootingSimulator) and inner.shots is not None
+
+
+def find_read_channels(simulator: Simulator) -> frozenset[str]:
+    """Return the channels of the record that a simulator, or the one that it runs, reads by their names."""
+    inner = _unwrap(simulator)
+    return frozenset(inner.channels.values()) if isinstance(inner, ChannelReadingSimulator) else frozenset()
 
 
 def simulate_runs(

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.gross_errors.gross_error_search import limit_to_tolerances
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError
@@ -180,11 +178,3 @@ def test_corrected_simulation_is_shown_in_the_unit_of_the_record() -> None:
     labels = [line.get_label() for line in DISCREPANCY_FIGURES["over-time"](found).axes[0].lines]
     assert "corrected" in labels
     assert '"gross error"' in as_json(diagnosis_document(found))
-
-
-def test_fit_within_its_tolerances_keeps_its_values() -> None:
-    found = run(RECORD)
-    target = Target(RECORD.y, np.arange(U.size) < found.estimation_samples, None, TOLERANCE)
-    assert limit_to_tolerances(found.base, target) is found.base
-    far = replace(found.base, values=found.base.values * np.array([1.5, 1.0, 1.0, 1.0, 1.0]))
-    assert limit_to_tolerances(far, target).values[0] == pytest.approx(0.5 * 1.08)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 import islands
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.preparation import make_context
+from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -109,6 +110,23 @@ def test_a_channel_drives_a_further_input() -> None:
     assert np.abs(error).max() < 1e-9
     with pytest.raises(RecordError, match=r"reads the channel w, and the channels of the record are none"):
         make_simulator(f"fmu:{oscillator(disturbance=True)}?input=u&channels=w", record)
+
+
+@pytest.mark.ci
+def test_values_of_a_channel_and_the_output_in_each_others_column_are_found() -> None:
+    record, w = oscillation(noise=1e-3), 100.0 + 20.0 * wave()[::-1]
+    y = record.y + simulate_oscillator(w, 0.5, 4.0, 200.0)
+    part = replace(
+        record,
+        u=np.column_stack([record.u[:, 0], y]),
+        y=w,
+        input_names=("u_N", "w_N"),
+        input_units=("N", "N"),
+    )
+    simulator = make_simulator(f"fmu:{oscillator(disturbance=True)}?input=u&channels=w", part)
+    found = diagnose(part, simulator, dict.fromkeys("mck", 0.02), catalogue=())
+    assert found.verdict == Verdict.GROSS_ERROR
+    assert {each.name for each in found.effects} == {"swapped-channels"}
 
 
 def test_a_simulator_is_sent_to_another_process_by_its_path() -> None:
