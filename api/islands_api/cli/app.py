@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Mapping
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -13,7 +14,7 @@ from rich.markup import escape
 from typer.core import TyperCommand, TyperGroup
 
 from islands.errors import IslandsError, SettingsError
-from islands_api.cli.console import errors
+from islands_api.cli.console import errors, exit_with_closed_output
 from islands_api.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
 from islands_service.process.process_settings import limit_threads
 
@@ -81,12 +82,20 @@ class Commands(TyperGroup):
                 return super().invoke(ctx)
             except ModuleNotFoundError as error:
                 raise explain_missing_package(error, str(ctx.invoked_subcommand)) from error
+        except BrokenPipeError:
+            exit_with_closed_output()
         except (IslandsError, OSError) as error:
             errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False)
             sys.exit(2)
         except KeyboardInterrupt:
             errors.print("stopped")
             sys.exit(130)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command of the arguments; for an unknown name, an error suggests similar ones."""
+        if args[0] not in COMMANDS and (close := get_close_matches(args[0], COMMANDS)):
+            ctx.fail(f"No such command {args[0]!r}. Did you mean {', '.join(map(repr, close))}?")
+        return super().resolve_command(ctx, args)
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
         """Return the names in the order of the table."""
@@ -181,4 +190,10 @@ def _islands(
 def main() -> None:
     """Run the command line."""
     limit_threads()
-    app()
+    try:
+        try:
+            app()
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        exit_with_closed_output()

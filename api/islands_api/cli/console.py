@@ -1,8 +1,10 @@
 """Consoles: results go to standard output, progress and errors to standard error."""
 
+import os
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import Protocol
+from typing import NoReturn, Protocol
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -17,7 +19,26 @@ from rich.progress import (
 )
 from rich.text import Text
 
-output = Console(highlight=False, soft_wrap=True)
+#: Exit code of a program whose reader has closed the pipe: 128 and the number of SIGPIPE.
+CLOSED_OUTPUT = 141
+
+
+def exit_with_closed_output() -> NoReturn:
+    """Exit quietly because the standard output is closed, as that of ``islands show result | head``."""
+    # Python writes the rest of its buffer at exit, which would fail again.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(CLOSED_OUTPUT)
+
+
+class OutputConsole(Console):
+    """Console of the standard output."""
+
+    def on_broken_pipe(self) -> None:
+        """Exit quietly."""
+        exit_with_closed_output()
+
+
+output = OutputConsole(highlight=False, soft_wrap=True)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 #: Fraction from which the time left is estimated.
