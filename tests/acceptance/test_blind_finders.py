@@ -20,7 +20,7 @@ Finder = Callable[[Trial], TrialOutcome]
 def make_outcome(trial: Trial, *names: str, verdict: str | None = None) -> TrialOutcome:
     """Return an outcome with given names and the true noise."""
     noise = ("coloured-noise",) if trial.noise == "ar" else ()
-    found = verdict or ("named" if names or noise else "nothing")
+    found = verdict or ("named" if names else "nothing")
     return TrialOutcome(
         trial, 1.0, found, names, noise, tuple(() for _ in names), names[:3], 1.0 if names else 0.0
     )

@@ -76,10 +76,8 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
 
 
 def _verdict(found: Diagnosis) -> str:
-    only_noise = found.verdict == Verdict.NAMED and all(
-        finding.explained_fraction is None for finding in found.effects
-    )
-    return _NOISE if only_noise else _VERDICTS[found.verdict]
+    has_noise = found.verdict == Verdict.NOTHING and bool(found.effects)
+    return _NOISE if has_noise else _VERDICTS[found.verdict]
 
 
 def _floor(found: Diagnosis) -> str:

@@ -163,7 +163,7 @@ def make_diagnosis(
     as_given = evaluate_fit(base.simulation, target, base.simulation.nominal)
     nominal = fit_initial_states(as_given, target, 0).output
     return Diagnosis(
-        Verdict.NAMED if noise and verdict == Verdict.NOTHING else verdict,
+        verdict,
         (*findings, *noise),
         tuple(
             Candidate(

@@ -39,8 +39,8 @@ class Diagnosis:
     ----------
     verdict : Verdict
     effects : tuple of Finding
-        The named causes, the most important first, then the properties of the noise; empty for "nothing" and
-        "unknown".
+        The named causes, the most important first, then the properties of the noise. "nothing" has properties
+        of the noise only, and "unknown" has none.
     candidates : tuple of Candidate
         All screened effects, the best first.
     gain : HoldoutGain or None
