@@ -9,13 +9,16 @@ from typing import Any
 
 from starlette.responses import JSONResponse
 
-from islands_service.domain.job import Job, JobState
+from islands_service.domain.job import TERMINAL, WAITING_PHASE, Job, JobState
 from islands_service.domain.monitoring import Monitor
 from islands_service.domain.owner import Owner
 from islands_service.domain.webhook import Delivery, Webhook
 from islands_service.store.datasets import StoredDataset
 from islands_service.store.job_rows.queue_places import QueuePlace
 from islands_service.store.tenants.keys import Key
+
+#: Parts of the progress that are valid only while a job runs.
+_OF_ATTEMPTS = ("phase", "note", "seconds_left", "evaluations_per_second")
 
 #: Seconds for which the place of a queued job is kept.
 _PLACE_SECONDS = 1.0
@@ -32,11 +35,9 @@ def job_document(job: Job, place: QueuePlace | None = None) -> dict[str, Any]:
     place : QueuePlace, optional
         Place of a queued job, if it is known.
     """
-    progress = job.progress
-    if job.state == JobState.QUEUED:
-        progress = {**(progress or {}), "phase": "queued"}
-        if place is not None:
-            progress |= {"position": place.position, **({"note": place.note} if place.note else {})}
+    progress = _select_progress(job)
+    if progress is not None and place is not None:
+        progress |= {"position": place.position, **({"note": place.note} if place.note else {})}
     return {
         "id": job.id,
         "kind": job.kind,
@@ -56,6 +57,22 @@ def job_document(job: Job, place: QueuePlace | None = None) -> dict[str, Any]:
         "problem": job.problem,
         "versions": job.versions,
     }
+
+
+def _select_progress(job: Job) -> dict[str, Any] | None:
+    """Return the progress of a job without what its last attempt reported about the time before its end.
+
+    The phase of a job that does not run is its state.
+    """
+    if job.state == JobState.RUNNING:
+        return None if job.progress is None else dict(job.progress)
+    reached = {name: value for name, value in (job.progress or {}).items() if name not in _OF_ATTEMPTS}
+    # The store gives the reason why a job has to wait for its next attempt.
+    if job.state == JobState.QUEUED and (job.progress or {}).get("phase") == WAITING_PHASE:
+        reached |= {name: value for name, value in (job.progress or {}).items() if name == "note"}
+    if job.state in TERMINAL and job.progress is None:
+        return None
+    return {**reached, "phase": job.state}
 
 
 class QueuePlaces:

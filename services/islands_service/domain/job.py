@@ -66,6 +66,9 @@ REPORT = "report.html"
 #: Artefact of a discrepancy job with the simulation extended by the effects found.
 EXTENDED = "extended.json"
 
+#: Phase of a queued job whose last attempt has ended early. The note of its progress has the reason.
+WAITING_PHASE = "waiting"
+
 #: Valid priorities.
 PRIORITIES = range(-100, 101)
 

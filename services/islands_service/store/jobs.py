@@ -28,7 +28,13 @@ from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
 from islands_service.store.job_rows.job_deletion import delete_job
-from islands_service.store.job_rows.job_events import append_event, cancel_job, job_from_row, update_job
+from islands_service.store.job_rows.job_events import (
+    append_event,
+    cancel_job,
+    job_from_row,
+    update_job,
+    without_note,
+)
 from islands_service.store.job_rows.monitor_records import count_record
 from islands_service.store.job_rows.queue_statistics import QueueStatistics, read_queue_statistics
 from islands_service.store.job_rows.submission_checks import (
@@ -224,6 +230,7 @@ class Jobs:
                 not_before=0.0,
                 problem=None,
                 finished=None,
+                progress=without_note(current.progress),
             )
             append_event(connection, row, "queued")
             record_change(connection, Action.RESUME, owner, job, by)

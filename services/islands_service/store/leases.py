@@ -13,6 +13,7 @@ from sqlalchemy import Connection, Row, case, delete, insert, select, update
 
 from islands_service.domain.job import (
     ISLANDS_VERSION,
+    WAITING_PHASE,
     Job,
     JobOutcome,
     JobState,
@@ -219,7 +220,7 @@ class Leases:
 def _release(connection: Connection, lease: Lease, attempted: bool, reason: str = "", **values: Any) -> None:
     if reason:
         reached = connection.execute(select(jobs.c.progress).where(jobs.c.id == lease.job.id)).scalar()
-        values["progress"] = to_text({**(read_document(reached) or {}), "phase": "waiting", "note": reason})
+        values["progress"] = to_text({**(read_document(reached) or {}), "phase": WAITING_PHASE, "note": reason})
     row = _update_fenced(
         connection,
         lease,

@@ -49,7 +49,7 @@ function formatProgress(job) {
   const { phase, note, generation, generations } = progress;
   if (isBetweenEpochs(job)) return note ?? phase;
   if (job.state === "queued") return formatQueue(progress);
-  if (generation === undefined) return note ?? phase ?? "";
+  if (generation === undefined) return job.state === "running" ? (note ?? phase ?? "") : "";
   return `${formatCount(generation)} / ${formatCount(generations)}`;
 }
 

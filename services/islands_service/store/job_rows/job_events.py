@@ -77,3 +77,9 @@ def job_from_row(row: Row[Any]) -> Job:
 def read_document(text: str | None) -> dict[str, Any] | None:
     """Parse a column that contains JSON."""
     return None if text is None else dict(json.loads(text))
+
+
+def without_note(progress: str | None) -> str | None:
+    """Return the text of a progress without the note of the attempt that wrote it."""
+    document = read_document(progress)
+    return None if document is None else json.dumps({k: v for k, v in document.items() if k != "note"})

@@ -3,6 +3,7 @@
 import json
 import math
 import time
+from dataclasses import replace
 from datetime import datetime
 
 import pytest
@@ -13,7 +14,8 @@ from islands_api.dataset_schemas import DatasetView
 from islands_api.schemas import JobRequest, JobView
 from islands_api.web.responses import JSONDocument, dataset_document, job_document, json_text
 from islands_service.domain.job import Job, JobState, ProgressReport
-from support.service import kept, queued
+from support.service import kept, queued, spec
+from support.stores import taken
 
 FLOATS = st.recursive(
     st.floats() | st.text() | st.integers(),
@@ -65,7 +67,7 @@ def test_a_job_document_with_all_values_round_trips_through_its_schema():
         version=9,
         attempt=2,
         cancel_requested=True,
-        progress={"generation": 7},
+        progress={"generation": 7, "phase": JobState.FAILED},
         checkpoint="c",
         summary={"equation": "y(k) = 0"},
         problem={"title": "failed"},
@@ -104,3 +106,43 @@ def test_the_examples_of_the_schemas_are_valid():
     for schema in (JobRequest, JobView):
         for example in schema.model_config["json_schema_extra"]["examples"]:
             schema.model_validate(example)
+
+
+#: Progress of a search that waits for CPUs.
+WAITING = {
+    "phase": "waiting for capacity",
+    "note": "waiting for capacity: 0 of 1 island actors are ready",
+    "seconds_left": 12.0,
+    "evaluations_per_second": 3.0,
+    "generation": 4,
+}
+
+
+@pytest.mark.parametrize("state", JobState)
+def test_the_progress_of_a_job_that_does_not_run_is_what_it_has_reached(service, state):
+    job = replace(queued(service.store), state=state, progress=WAITING)
+    reached = WAITING if state == JobState.RUNNING else {"phase": state, "generation": 4}
+    assert job_document(job)["progress"] == reached
+
+
+def test_a_queued_job_has_the_reason_of_its_wait_until_it_ends(service):
+    lease = claimed_job(service)
+    service.store.leases.postpone(lease, "the disk is full", 60.0)
+    job = service.store.jobs.get("local", lease.job.id)
+    assert job_document(job)["progress"] == {"phase": "queued", "note": "the disk is full"}
+    ended = service.store.jobs.cancel("local", job.id)
+    assert job_document(ended)["progress"] == {"phase": "cancelled"}
+    assert job_document(service.store.jobs.resume("local", job.id))["progress"] == {"phase": "queued"}
+
+
+def test_a_released_job_has_no_note_of_its_attempt(service):
+    lease = claimed_job(service)
+    service.store.leases.report(lease, ProgressReport(WAITING))
+    service.store.leases.release(lease)
+    job = service.store.jobs.get("local", lease.job.id)
+    assert job_document(job)["progress"] == {"phase": "queued", "generation": 4}
+
+
+def claimed_job(service):
+    order = spec(kept(service.store))
+    return taken(service.store, queued(service.store, priority=100, spec=order).id)
