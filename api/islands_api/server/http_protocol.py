@@ -28,6 +28,9 @@ log = structlog.get_logger()
 HEADER_TIMEOUT = 10.0
 
 
+#: Maximum number of headers of a request: each look-up reads all of them.
+_MAX_HEADERS = 200
+
 #: Maximum size in bytes of the request line and the headers of a request, and of the trailers of a body.
 _MAX_HEADER_BYTES = 65_536
 
@@ -75,7 +78,7 @@ class HTTPProtocol(HttpToolsProtocol):
     def on_header(self, name: bytes, value: bytes) -> None:
         """Add a header or a trailer."""
         self._header_bytes += len(name) + len(value)
-        if self._header_bytes > _MAX_HEADER_BYTES:
+        if self._header_bytes > _MAX_HEADER_BYTES or len(self.headers) >= _MAX_HEADERS:
             raise _headers_too_large()
         if self._in_headers:
             super().on_header(name, value)

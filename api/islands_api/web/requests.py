@@ -22,12 +22,19 @@ from starlette.exceptions import HTTPException
 from islands.errors import IslandsError, SettingsError
 from islands_api.web.auth import Principal, authenticate, check_scope
 from islands_api.web.middleware import FORM_OVERHEAD_BYTES
-from islands_api.web.problems import MalformedBodyError, UnsupportedMediaTypeError
+from islands_api.web.problems import MalformedBodyError, PayloadTooLargeError, UnsupportedMediaTypeError
 from islands_api.web.uploads.body_reader import BodyReader
 from islands_api.web.uploads.upload_request import UploadRequest
 
 #: Maximum number of digits of an integer: parsing takes time proportional to the square of the digits.
 _MAX_INTEGER_DIGITS = 400
+
+#: Maximum numbers of names, of array elements and of nested levels of a body. Validation holds the event loop
+#: for some microseconds for each name or element that is wrong.
+_MAX_NAMES, _MAX_ELEMENTS, _MAX_DEPTH = 3000, 5000, 64
+
+#: Size in bytes from which a body is parsed in a thread.
+_LARGE_BODY = 20_000
 
 #: Maximum number of characters of a name that an error message repeats.
 _MAX_QUOTED_NAME = 40
@@ -119,7 +126,11 @@ class FormRoute(BodyRoute):
 class _StrictRequest(Request):
     async def json(self) -> Any:
         if not hasattr(self, "_json"):
-            self._json = read_json(await self.body())
+            body = await self.body()
+            if len(body) < _LARGE_BODY:
+                self._json = read_json(body)
+            else:
+                self._json = await self.app.state.islands.run_blocking(read_json, body)
         return self._json
 
 
@@ -131,7 +142,15 @@ def read_json(body: bytes) -> Any:
     MalformedBodyError
         The body is not JSON, contains NaN, infinity or a huge integer, repeats a name, or is nested too
         deeply.
+    PayloadTooLargeError
+        The body has too many names or array elements.
     """
+    document = _parse_json(body)
+    _check_extent(document)
+    return document
+
+
+def _parse_json(body: bytes) -> Any:
     try:
         return json.loads(
             body,
@@ -140,13 +159,36 @@ def read_json(body: bytes) -> Any:
             parse_constant=_reject_constant,
         )
     except RecursionError:
-        raise MalformedBodyError("the body is nested too deeply: a job needs only a few levels") from None
+        raise _make_depth_error() from None
     except json.JSONDecodeError as error:
         raise MalformedBodyError(
             f"the body is not valid JSON: {error.msg} in line {error.lineno}, column {error.colno}"
         ) from error
     except ValueError as error:
         raise MalformedBodyError(f"the body is not valid JSON: {error}") from error
+
+
+def _check_extent(document: Any) -> None:
+    """Refuse a document whose validation would take long."""
+    names = elements = 0
+    level, depth = [document], 0
+    while level := [each for each in level if isinstance(each, dict | list)]:
+        depth += 1
+        if depth > _MAX_DEPTH:
+            raise _make_depth_error()
+        names += sum(len(each) for each in level if isinstance(each, dict))
+        elements += sum(len(each) for each in level if isinstance(each, list))
+        for count, most, what in ((names, _MAX_NAMES, "names"), (elements, _MAX_ELEMENTS, "array elements")):
+            if count > most:
+                raise PayloadTooLargeError(
+                    f"the body has {count} {what} or more, and {most} is the most: send only the documented "
+                    "fields, and upload data as a data set"
+                )
+        level = [value for each in level for value in (each.values() if isinstance(each, dict) else each)]
+
+
+def _make_depth_error() -> MalformedBodyError:
+    return MalformedBodyError("the body is nested too deeply: a job needs only a few levels")
 
 
 def _reject_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -220,7 +220,9 @@ class Leases:
 def _release(connection: Connection, lease: Lease, attempted: bool, reason: str = "", **values: Any) -> None:
     if reason:
         reached = connection.execute(select(jobs.c.progress).where(jobs.c.id == lease.job.id)).scalar()
-        values["progress"] = to_text({**(read_document(reached) or {}), "phase": WAITING_PHASE, "note": reason})
+        values["progress"] = to_text(
+            {**(read_document(reached) or {}), "phase": WAITING_PHASE, "note": reason}
+        )
     row = _update_fenced(
         connection,
         lease,
