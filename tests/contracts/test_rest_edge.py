@@ -4,6 +4,7 @@ import errno
 import threading
 
 import pytest
+from sqlalchemy import event
 
 from islands.errors import SettingsError
 from islands_api.web.routes import service as routes
@@ -157,7 +158,7 @@ def test_a_full_disk_is_not_ready(service, monkeypatch):
 def test_a_database_that_hangs_is_not_ready_within_the_deadline(service, monkeypatch):
     released = threading.Event()
     monkeypatch.setattr(routes, "_READY_SECONDS", 0.1)
-    monkeypatch.setattr(service.store.jobs, "versions", lambda _: released.wait(20.0))
+    monkeypatch.setattr(service.store, "check_ready", lambda: released.wait(20.0))
     try:
         for _ in range(3):
             answer = service.client.get("/readyz", timeout=5.0)
@@ -166,3 +167,34 @@ def test_a_database_that_hangs_is_not_ready_within_the_deadline(service, monkeyp
         assert service.client.get("/healthz").status_code == 200
     finally:
         released.set()
+
+
+def damage_pages(store, path):
+    for number in range(40):
+        queued(store, name=f"{number}" * 50)
+    with store.database.engine.connect() as connection:
+        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+    with path.open("r+b") as file:
+        file.seek(4096)
+        file.write(b"\xaa" * (path.stat().st_size - 4096))
+
+
+def drop_table(store, _path):
+    store.database.write(lambda connection: connection.exec_driver_sql("DROP TABLE models"))
+
+
+def refuse_writes(store, _path):
+    @event.listens_for(store.database.engine, "checkout")
+    def _configure(connection, *_):
+        connection.execute("PRAGMA query_only=ON")
+
+
+@pytest.mark.parametrize("damage", [damage_pages, drop_table, refuse_writes])
+def test_a_database_that_cannot_accept_a_job_is_not_ready(serve, damage):
+    with serve() as running:
+        assert running.client.get("/readyz").status_code == 200
+        damage(running.store, running.settings.data_dir / "islands.db")
+        answer = running.client.get("/readyz")
+        problem_of(answer, 503, "store-unavailable")
+        assert str(running.settings.data_dir) not in answer.text
+        assert running.client.get("/healthz").status_code == 200

@@ -9,6 +9,7 @@ from islands_service.store.jobs import Jobs
 from islands_service.store.leases import Leases
 from islands_service.store.migrations.upgrade import prepare
 from islands_service.store.monitor_states import Monitors
+from islands_service.store.readiness import check_database
 from islands_service.store.results import Results
 from islands_service.store.retention import Retention
 from islands_service.store.tenants.deliveries import Deliveries
@@ -60,6 +61,10 @@ class Store:
         self.deliveries = Deliveries(self.database)
         self.retention = Retention(self.database)
         self.audit = AuditTrail(self.database)
+
+    def check_ready(self) -> None:
+        """Check that the database can accept a job; see `check_database` for the errors."""
+        check_database(self.database)
 
     def close(self) -> None:
         """Write the queued operations and close all connections."""

@@ -28,7 +28,8 @@ async def healthz() -> Any:
 async def readyz(state: AppStateDep) -> Any:
     """Return 200 if the database answers and data can be written, so that jobs are accepted.
 
-    Ray may still be starting. If the database, the disk or the object store hangs, the status is 503 after
+    Ray may still be starting. A database that has damaged pages, lacks tables or is read-only is not ready.
+    If the database, the disk or the object store hangs, the status is 503 after
     two seconds.
     """
     check = asyncio.ensure_future(state.run_blocking(_check_ready, state))
@@ -44,7 +45,7 @@ async def readyz(state: AppStateDep) -> Any:
 
 
 def _check_ready(state: AppState) -> None:
-    state.store.jobs.versions([])
+    state.store.check_ready()
     state.blobs.check_writable()
 
 
