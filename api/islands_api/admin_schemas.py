@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from islands_api.schemas import ResponseModel
+from islands_api.schemas import JobView, ResponseModel
 from islands_service.domain.owner import DEFAULT_WEIGHT, MAX_QUOTA, WEIGHTS
 from islands_service.store.tenants.keys import SCOPES
 
@@ -123,3 +123,16 @@ class OwnerPage(ResponseModel):
     """All owners by name."""
 
     items: tuple[OwnerView, ...]
+
+
+class OwnedJobView(JobView):
+    """Job with its owner."""
+
+    owner: str = Field(description="Owner of the job.")
+
+
+class OwnedJobPage(ResponseModel):
+    """Page of the jobs of all owners, newest first."""
+
+    items: tuple[OwnedJobView, ...]
+    next: str | None = Field(default=None, description="Cursor of the next page. None on the last page.")

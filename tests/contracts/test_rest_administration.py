@@ -167,3 +167,22 @@ def test_figures_of_an_owner_without_a_quota_of_drawings_are_refused(service, mi
     blob = service.app.state.islands.blobs.write(b"<svg/>")
     service.store.results.keep(job, {"1/free-run.svg": blob})
     assert service.client.get(path, headers=mine).status_code == 200
+
+
+def test_an_administrator_lists_and_cancels_the_jobs_of_all_owners(service, admin, mine):
+    jobs = {queued(service.store, owner).id: owner for owner in ("me", "lab")}
+    path = "/v1/admin/jobs"
+    problem_of(service.client.get(path, headers=mine), 403, "scope-missing")
+    listed = service.client.get(path, headers=admin).json()["items"]
+    assert {item["id"]: item["owner"] for item in listed} == jobs
+    found = service.client.get(path, params={"owner": "lab", "state": "queued"}, headers=admin).json()
+    (job,) = (item["id"] for item in found["items"])
+    assert jobs[job] == "lab"
+    problem_of(service.client.post(f"{path}/{job}/cancel", headers=mine), 403, "scope-missing")
+    answer = service.client.post(f"{path}/{job}/cancel", headers=admin)
+    assert (answer.status_code, answer.json()["state"], answer.json()["owner"]) == (202, "cancelled", "lab")
+    (entry,) = (e for e in service.store.audit.entries() if e.action == "cancel-job-as-administrator")
+    keys = {key.id: key.owner for key in service.store.keys.all()}
+    assert (entry.owner, entry.subject, keys[entry.key_id]) == ("lab", job, "operator")
+    problem_of(service.client.post(f"{path}/{job}/cancel", headers=admin), 409, "wrong-state")
+    problem_of(service.client.post(f"{path}/nothing/cancel", headers=admin), 404, "no-such-job")

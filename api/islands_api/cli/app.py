@@ -46,7 +46,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "jobs": "Jobs of a service: submit, diagnose, list, show, watch, cancel, resume, result.",
         "monitors": "Monitors of a service: create, add records, list, show, delete.",
         "keys": "API keys of a service: create, list, revoke.",
-        "admin": "Operation of a service: audit, owners, backup, restore.",
+        "admin": "Operation of a service: audit, owners, jobs, backup, restore.",
     }
 )
 

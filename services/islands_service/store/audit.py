@@ -20,6 +20,7 @@ class Action(StrEnum):
 
     SUBMIT = "submit-job"
     CANCEL = "cancel-job"
+    CANCEL_AS_ADMINISTRATOR = "cancel-job-as-administrator"
     RESUME = "resume-job"
     DELETE = "delete-job"
     UPLOAD = "upload-dataset"

@@ -50,6 +50,7 @@ MAX_PAGE_SIZE = 200
 
 # Built once, since building a statement takes as long as executing it.
 _OWNED_JOB = select(jobs).where(jobs.c.id == bindparam("id"), jobs.c.owner == bindparam("owner"))
+_ANY_JOB = select(jobs).where(jobs.c.id == bindparam("id"))
 _INSERT_JOB = (
     insert(jobs)
     .values(state=JobState.QUEUED, created=now(), updated=now(), islands_version=ISLANDS_VERSION)
@@ -156,13 +157,13 @@ class Jobs:
 
     def page(
         self,
-        owner: str,
+        owner: str | None,
         state: JobState | None = None,
         after: tuple[float, str] | None = None,
         limit: int = 50,
     ) -> JobRows:
-        """Return the jobs of an owner, newest first, that follow a position."""
-        query = select(jobs).where(jobs.c.owner == owner)
+        """Return the jobs of an owner, or of all for None, newest first, that follow a position."""
+        query = select(jobs) if owner is None else select(jobs).where(jobs.c.owner == owner)
         if state is not None:
             query = query.where(jobs.c.state == state)
         if after is not None:
@@ -174,8 +175,13 @@ class Jobs:
         found = found[: min(limit, MAX_PAGE_SIZE)]
         return JobRows(tuple(found), (found[-1].created, found[-1].id) if more else None)
 
-    def cancel(self, owner: str, job: str, by: Requester | None = None) -> Job:
+    def cancel(self, owner: str | None, job: str, by: Requester | None = None) -> Job:
         """Cancel a queued job, or request cancellation of a running one; a repeated request has no effect.
+
+        Parameters
+        ----------
+        owner : str or None
+            Owner of the job; None for an administrator, who may cancel the jobs of all owners.
 
         Raises
         ------
@@ -191,7 +197,8 @@ class Jobs:
             if current.cancel_requested:
                 return job_from_row(current)
             row = cancel_job(connection, current)
-            record_change(connection, Action.CANCEL, owner, job, by)
+            action = Action.CANCEL if owner is not None else Action.CANCEL_AS_ADMINISTRATOR
+            record_change(connection, action, row.owner, job, by)
             return job_from_row(row)
 
         return self._database.write(operation)
@@ -281,9 +288,13 @@ class Jobs:
             return read_queue_statistics(connection)
 
 
-def _read_owned(connection: Connection, owner: str, job: str, locked: bool = False) -> Row[Any]:
-    query = _OWNED_JOB.with_for_update() if locked else _OWNED_JOB
-    row = connection.execute(query, {"id": job, "owner": owner}).one_or_none()
+def _read_owned(connection: Connection, owner: str | None, job: str, locked: bool = False) -> Row[Any]:
+    """Return the row of a job of an owner, or of any owner for None."""
+    query = _OWNED_JOB if owner is not None else _ANY_JOB
+    query = query.with_for_update() if locked else query
+    row = connection.execute(
+        query, {"id": job} if owner is None else {"id": job, "owner": owner}
+    ).one_or_none()
     if row is None:
         raise JobNotFoundError(f"there is no job {job!r}")
     return row

@@ -1,4 +1,4 @@
-"""``islands admin``: operation of a service, in its database: audit trail, owners, backup, restoration."""
+"""``islands admin``: operation of a service, in its database: audit trail, owners, jobs, backups."""
 
 import json
 from contextlib import closing
@@ -12,6 +12,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from islands_api.cli.console import errors, output
+from islands_api.cli.service.admin_job_commands import jobs
 from islands_api.cli.service.owner_commands import owners
 from islands_api.cli.service.store_options import Database, DataDir, open_store
 from islands_service.settings import service_settings
@@ -20,18 +21,19 @@ from islands_service.store.database import Database as StoreDatabase
 from islands_service.supervisor import folder_lock
 
 admin = typer.Typer(
-    help="Operation of a service: audit, owners, backup, restore.",
+    help="Operation of a service: audit, owners, jobs, backup, restore.",
     no_args_is_help=True,
     add_completion=False,
 )
 admin.add_typer(owners, name="owners")
+admin.add_typer(jobs, name="jobs")
 
 Folder = Annotated[Path, typer.Argument(help="Folder of the backup.")]
 
 
 @admin.callback()
 def _admin() -> None:
-    """Operation of a service: audit, owners, backup, restore."""
+    """Operation of a service: audit, owners, jobs, backup, restore."""
 
 
 @admin.command()

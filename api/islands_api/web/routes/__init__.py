@@ -6,6 +6,7 @@ To add a file, add its router to `ROUTERS`.
 from fastapi import APIRouter
 
 from islands_api.web.routes import (
+    administered_jobs,
     datasets,
     diagnoses,
     events,
@@ -32,6 +33,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     monitors.router,
     keys.router,
     owners.router,
+    administered_jobs.router,
     webhooks.router,
     service.router,
     page.router,

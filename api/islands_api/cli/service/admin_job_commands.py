@@ -1,0 +1,52 @@
+"""``islands admin jobs``: the jobs of all owners, in the database of a service."""
+
+from typing import Annotated
+
+import typer
+from rich.table import Column, Table
+from rich.text import Text
+
+from islands.errors import SettingsError
+from islands_api.cli.console import output
+from islands_api.cli.service.store_options import COMMAND_LINE, Database, DataDir, open_store
+from islands_service.domain.job import JobState
+
+jobs = typer.Typer(help="Jobs of all owners: list, cancel.", no_args_is_help=True, add_completion=False)
+
+
+@jobs.command("list")
+def list_jobs(
+    owner: Annotated[str | None, typer.Option("--owner", help="Only jobs of this owner.")] = None,
+    state: Annotated[str | None, typer.Option("--state", help=", ".join(JobState))] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, max=200, help="Largest number of jobs.")] = 50,
+    data_dir: DataDir = None,
+    database: Database = None,
+) -> None:
+    """List the jobs of all owners, newest first."""
+    if state is not None and state not in list(JobState):
+        raise SettingsError(f"--state {state} is no state of a job: take one of {', '.join(JobState)}")
+    wanted = None if state is None else JobState(state)
+    with open_store(data_dir, database) as store:
+        found = store.jobs.page(owner, wanted, None, limit).jobs
+    table = Table(
+        Column("job", no_wrap=True),
+        *(Column(name, overflow="fold") for name in ("owner", "state", "seconds")),
+    )
+    for job in found:
+        seconds = "-" if job.started is None else f"{(job.finished or job.updated) - job.started:.0f}"
+        # Names may contain characters that Rich takes for markup.
+        table.add_row(job.id, Text(job.owner), str(job.state), seconds)
+    output.print(table)
+
+
+@jobs.command()
+def cancel(
+    job: Annotated[str, typer.Argument(help="The job's id, from the list.")],
+    data_dir: DataDir = None,
+    database: Database = None,
+) -> None:
+    """Cancel a job of any owner; the audit trail records it."""
+    with open_store(data_dir, database) as store:
+        cancelled = store.jobs.cancel(None, job, COMMAND_LINE)
+    done = "is cancelled" if cancelled.state == JobState.CANCELLED else "is being cancelled"
+    output.print(f"job {job} of owner {cancelled.owner} {done}", markup=False)
