@@ -128,6 +128,9 @@ class OwnerPage(ResponseModel):
 class OwnedJobView(JobView):
     """Job with its owner."""
 
+    # The examples of a job have no owner.
+    model_config = ConfigDict(frozen=True, extra="allow", json_schema_extra={"examples": []})
+
     owner: str = Field(description="Owner of the job.")
 
 

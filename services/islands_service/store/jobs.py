@@ -181,7 +181,7 @@ class Jobs:
         Parameters
         ----------
         owner : str or None
-            Owner of the job; None for an administrator, who may cancel the jobs of all owners.
+            Owner of the job; None for an administrator, to cancel a job of any owner.
 
         Raises
         ------

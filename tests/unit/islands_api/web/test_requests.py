@@ -90,7 +90,7 @@ def test_a_problem_lists_at_most_twenty_invalid_fields(service):
     assert len(answer.content) < 5000
 
 
-#: Bodies below a megabyte whose validation would take long, and what they have too many of.
+#: Bodies below a megabyte whose validation would take long, and the values of which there are too many.
 EXTENSIVE = {
     "unknown names": ({f"k{index}": 1 for index in range(60_000)}, "60000 names"),
     "unknown settings": ({"settings": {f"k{index}": 1 for index in range(60_000)}}, "60001 names"),

@@ -119,7 +119,7 @@ WAITING = {
 
 
 @pytest.mark.parametrize("state", JobState)
-def test_the_progress_of_a_job_that_does_not_run_is_what_it_has_reached(service, state):
+def test_the_progress_of_a_job_that_does_not_run_has_only_reached_values(service, state):
     job = replace(queued(service.store), state=state, progress=WAITING)
     reached = WAITING if state == JobState.RUNNING else {"phase": state, "generation": 4}
     assert job_document(job)["progress"] == reached
