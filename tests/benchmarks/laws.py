@@ -25,7 +25,7 @@ from islands.evolution.search_result import RankedModel, SearchResult
 from islands.facade.results.fitted_model import FittedModel
 from islands.simulation.predictors import free_run
 from islands.validation.metrics import metrics
-from islands.validation.recommendation import ROUNDING, is_sound
+from islands.validation.recommendation import ROUNDING, compare_blocks, is_sound
 from support.laws import LAWS, Law
 
 #: Noise as a fraction of the standard deviation of the output.
@@ -71,7 +71,7 @@ class Case:
 
 def sound(found: SearchResult) -> list[int]:
     """Return the positions of the models that every rule may choose."""
-    bounded = [at for at, entry in enumerate(found.models) if entry.assessment.block_errors]
+    bounded = [at for at, entry in enumerate(found.models) if entry.assessment.squared_errors.size]
     checked = [
         at for at in bounded if is_sound(found.models[at].assessment.physics, found.requires_property_1)
     ]
@@ -80,8 +80,8 @@ def sound(found: SearchResult) -> list[int]:
 
 def error(entry: RankedModel) -> float:
     """Return the RMSE of the free run on the validation data as a fraction of the output range."""
-    blocks = entry.assessment.block_errors
-    return sqrt(np.mean(blocks)) if blocks else inf
+    squared = entry.assessment.squared_errors
+    return sqrt(np.mean(compare_blocks(squared, squared)[0])) if squared.size else inf
 
 
 def least_error(found: SearchResult) -> int:
@@ -91,7 +91,8 @@ def least_error(found: SearchResult) -> int:
 
 def one_standard_error(found: SearchResult) -> int:
     """Choose the smallest model within one standard error of the least error (Breiman)."""
-    blocks = np.array(found.models[least_error(found)].assessment.block_errors)
+    squared = found.models[least_error(found)].assessment.squared_errors
+    blocks = compare_blocks(squared, squared)[0]
     limit = max(ROUNDING**2, blocks.mean() + blocks.std(ddof=1) / sqrt(len(blocks)))
     return min(
         (at for at in sound(found) if error(found.models[at]) ** 2 <= limit),
@@ -104,10 +105,11 @@ def paired(standard_errors: float) -> Rule:
 
     def choose(found: SearchResult) -> int:
         best = least_error(found)
-        least = np.array(found.models[best].assessment.block_errors)
+        least = found.models[best].assessment.squared_errors
         equal = []
         for at in sound(found):
-            excess = np.array(found.models[at].assessment.block_errors) - least
+            blocks = compare_blocks(found.models[at].assessment.squared_errors, least)
+            excess = blocks[0] - blocks[1]
             limit = standard_errors * excess.std(ddof=1) / sqrt(len(excess))
             if excess.mean() <= max(limit, 0.0) or error(found.models[at]) <= ROUNDING:
                 equal.append(at)

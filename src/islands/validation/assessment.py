@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from math import nan
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
@@ -27,9 +28,6 @@ MODES = ("one_step_ahead", "multiple_shooting", "free_run")
 
 #: Metrics of a diverged simulation.
 _UNDEFINED = Metrics(nan, nan, nan, nan)
-
-#: Number of blocks of the validation data whose errors are compared between models.
-BLOCKS = 20
 
 #: Minimum number of residuals for a test at one lag.
 _MIN_RESIDUALS = 3
@@ -56,9 +54,9 @@ class Assessment:
     physics : PhysicsChecks
     warm_up : int
         Number of samples before the first prediction of these simulations. The errors depend on it.
-    block_errors : tuple of float
-        Mean squared error of the free run on each of 20 consecutive blocks of the validation data (fewer if
-        there are fewer predictions), as a fraction of the squared output range. Empty if it diverged.
+    squared_errors : ndarray, shape (samples,)
+        Squared error of the free run at every sample of the validation data, as a fraction of the squared
+        output range. NaN in the warm-up. Empty if the free run diverged.
     constraints : tuple of ConstraintCheck
         The constraints, each with its target and the value of the model.
     recordings : mapping
@@ -73,7 +71,7 @@ class Assessment:
     residual_structure: ResidualStructure
     physics: PhysicsChecks
     warm_up: int
-    block_errors: tuple[float, ...]
+    squared_errors: NDArray[np.float64]
     constraints: tuple[ConstraintCheck, ...] = ()
     recordings: Mapping[str, Mapping[str, Metrics]] = field(default_factory=dict)
 
@@ -125,7 +123,7 @@ def assess(
         check_physics(model, split.estimation),
         model.maximum_lag if warm_up is None else warm_up,
         # The loop ends with the validation data.
-        _compute_block_errors(split.validation, runs["free_run"]),
+        _compute_squared_errors(split.validation, runs["free_run"]),
         check_constraints(model, constraints),
         recordings,
     )
@@ -138,15 +136,12 @@ def _compute_recording_metrics(record: Dataset, run: Simulation) -> dict[str, Me
     return {name: metrics(record.y[each], run.y[each], record.output_range) for name, each in rows.items()}
 
 
-def _compute_block_errors(record: Dataset, run: Simulation) -> tuple[float, ...]:
+def _compute_squared_errors(record: Dataset, run: Simulation) -> NDArray[np.float64]:
     if not run.outcome:
-        return ()
-    predicted = ~np.isnan(run.y)
+        return np.empty(0)
     # Dividing by the range first keeps the squares in the range of numbers.
-    error = (record.y - run.y)[predicted] / (np.ptp(record.y[predicted]) or 1.0)
     with np.errstate(over="ignore"):
-        blocks = np.array_split(error**2, min(BLOCKS, len(error)))
-        return tuple(float(np.add.reduce(block)) / len(block) for block in blocks)
+        return ((record.y - run.y) / (record.output_range or 1.0)) ** 2
 
 
 def _compute_information(

@@ -3,8 +3,8 @@
 The model with the least validation error is rarely the right one: with noise, larger models of the same
 structure are better or worse by chance. The rule is a one-sided form of the one-standard-error rule (Breiman,
 Friedman, Olshen & Stone, "Classification and Regression Trees", Wadsworth 1984, section 3.4.3) on paired
-differences. Blocks of the validation data take the correlation of the errors into account. Decision 0017
-compares rules.
+differences. Blocks of the validation data take the correlation of the errors into account. Models with
+different warm-ups are compared over the samples that both predict. Decision 0017 compares rules.
 """
 
 from collections.abc import Sequence
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.validation.assessment import Assessment
 from islands.validation.physics import PhysicsChecks
@@ -27,6 +28,9 @@ NEGLIGIBLE_EXCESS = 0.01
 
 #: RMSE as a fraction of the output range below which errors count as equal.
 ROUNDING = 1e-6
+
+#: Largest number of consecutive blocks of the validation data whose errors are compared between models.
+BLOCKS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,13 +100,45 @@ def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:
 
 
 def _is_as_good(entry: Assessment, reference: Assessment) -> bool:
-    squared, least = np.array(entry.block_errors), np.array(reference.block_errors)
-    error, smallest = sqrt(squared.mean()), sqrt(least.mean())
-    if error <= max(ROUNDING, (1.0 + NEGLIGIBLE_EXCESS) * smallest):
-        return True
-    excess = squared - least
-    uncertainty = STANDARD_ERRORS * excess.std(ddof=1) / sqrt(len(excess)) if len(excess) > 1 else 0.0
-    return bool(error <= (1.0 + LARGEST_EXCESS) * smallest and excess.mean() <= uncertainty)
+    blocks = compare_blocks(entry.squared_errors, reference.squared_errors)
+    if not blocks.size:
+        return False
+    # The square of a large error may be infinite.
+    with np.errstate(invalid="ignore", over="ignore"):
+        error, smallest = np.sqrt(blocks.mean(axis=1))
+        if error <= max(ROUNDING, (1.0 + NEGLIGIBLE_EXCESS) * smallest):
+            return True
+        excess = blocks[0] - blocks[1]
+        uncertainty = STANDARD_ERRORS * excess.std(ddof=1) / sqrt(len(excess)) if len(excess) > 1 else 0.0
+        return bool(error <= (1.0 + LARGEST_EXCESS) * smallest and excess.mean() <= uncertainty)
+
+
+def compare_blocks(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean squared errors of two models on blocks of the samples that both predict.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (samples,)
+        `Assessment.squared_errors` on the same validation data. The numbers of samples differ if the samples
+        are means of different numbers of samples; samples at the same part of the data are then compared.
+
+    Returns
+    -------
+    ndarray, shape (2, blocks)
+        At most `BLOCKS` consecutive blocks; none if no sample is predicted by both.
+    """
+    common = [_select_common(one, other), _select_common(other, one)]
+    count = min(BLOCKS, *map(len, common))
+    blocks = [np.array_split(errors, count) if count else [] for errors in common]
+    return np.array([[np.add.reduce(block) / len(block) for block in each] for each in blocks])
+
+
+def _select_common(errors: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the errors at the samples that both models predict."""
+    if not (len(errors) and len(others)):
+        return np.empty(0)
+    at = (2 * np.arange(len(errors)) + 1) * len(others) // (2 * len(errors))  # middle of the sample
+    return errors[~(np.isnan(errors) | np.isnan(others[at]))]
 
 
 def _describe_choice(chosen: int, best: int, count: int, assessments: Sequence[Assessment], unit: str) -> str:

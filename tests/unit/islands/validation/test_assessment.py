@@ -227,18 +227,17 @@ def test_constant_validation_output_has_an_rmse_but_no_mape_or_r2():
     assert math.isnan(found.r2)
 
 
-# Errors by block.
+# Errors of every sample.
 
 
-def test_block_errors_are_mean_squares_over_consecutive_blocks():
+def test_squared_errors_are_fractions_of_the_output_range():
     data = record(90)
-    found = assess(LINEAR, Split(record(200), data), SHOOTING).block_errors
-    error = (data.y - free_run(LINEAR, data).y)[2:] / np.ptp(data.y[2:])
-    assert len(found) == 20
-    assert found[:2] == pytest.approx([np.mean(error[:5] ** 2), np.mean(error[5:10] ** 2)])
-    assert found[-1] == pytest.approx(np.mean(error[-4:] ** 2))
+    found = assess(LINEAR, Split(record(200), data), SHOOTING, warm_up=5).squared_errors
+    error = (data.y - free_run(LINEAR, data, 5).y) / np.ptp(data.y)
+    assert np.isnan(found[:5]).all()
+    assert found[5:] == pytest.approx(error[5:] ** 2)
 
 
-def test_block_errors_of_a_short_or_diverged_free_run():
-    assert len(assess(LINEAR, Split(record(200), record(9)), SHOOTING).block_errors) == 7
-    assert assess(EXPLOSIVE, Split(record(200), record(90, seed=1, size=3.0)), 200).block_errors == ()
+def test_a_diverged_free_run_has_no_squared_errors():
+    found = assess(EXPLOSIVE, Split(record(200), record(90, seed=1, size=3.0)), 200)
+    assert found.squared_errors.size == 0

@@ -10,7 +10,7 @@ from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 from islands.validation.physics import ClusterSum, ExcursionTest, HoldTest, PhysicsChecks
-from islands.validation.recommendation import recommend
+from islands.validation.recommendation import compare_blocks, recommend
 
 LOST = EvaluationOutcome(Status.DIVERGED, "at sample 3")
 
@@ -41,7 +41,7 @@ class Candidate:
             None,
             physics,
             0,
-            tuple(map(float, self.blocks)),
+            np.asarray(self.blocks, dtype=float),
         )
 
 
@@ -123,3 +123,35 @@ def test_the_best_model_is_not_compared_with_itself():
 
 def test_a_single_block_has_no_standard_error():
     assert chosen(Candidate(3, NOISE[:1] * 1.03), Candidate(9, NOISE[:1])) == 9
+
+
+def from_sample(first, errors):
+    """Return squared errors of which the first samples are the warm-up."""
+    return np.where(np.arange(len(errors)) < first, np.nan, errors)
+
+
+@pytest.mark.parametrize("samples", [9, 11, 200])
+def test_models_with_different_warm_ups_are_compared_over_common_samples(samples):
+    errors = np.arange(1.0, samples + 1.0)
+    blocks = compare_blocks(from_sample(2, errors), from_sample(4, 2.0 * errors))
+    expected = [block.mean() for block in np.array_split(errors[4:], min(20, samples - 4))]
+    assert blocks[0] == pytest.approx(expected)
+    assert blocks[1] == pytest.approx(2.0 * blocks[0])
+
+
+def test_a_model_that_only_warms_up_over_difficult_samples_is_not_better():
+    errors = np.append(np.full(4, 1.0), np.full(7, 1e-2))
+    short, long = from_sample(2, errors), from_sample(4, errors)
+    assert compare_blocks(short, long)[0] == pytest.approx(compare_blocks(short, long)[1])
+
+
+@pytest.mark.parametrize("count", [2, 3, 10])
+def test_means_of_samples_are_compared_with_the_samples_of_the_same_part_of_the_data(count):
+    errors = np.repeat(np.arange(1.0, 24.0), 3 * count)
+    means = errors.reshape(-1, count).mean(axis=1)
+    blocks = compare_blocks(from_sample(9 * count, errors), from_sample(3, means))
+    assert blocks[0] == pytest.approx(blocks[1])
+
+
+def test_infinite_errors_are_compared_without_a_warning():
+    assert chosen(Candidate(3, np.full(20, np.inf)), Candidate(5, NOISE)) == 5
