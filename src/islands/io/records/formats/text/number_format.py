@@ -10,8 +10,9 @@ from islands.io.records.table import RowRange
 #: Characters that only separate thousands: blanks, also those that do not break a line, and apostrophes.
 _SPACES = " \N{NO-BREAK SPACE}\N{THIN SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
 
+# A run of digits must match in one way only: otherwise the time grows with the square of its length.
 _EXPONENT = r"(?:[eE][+-]?\d+)?"
-_PLAIN = re.compile(rf"\s*[+-]?(?:\d+([.,])?\d*|([.,])\d+){_EXPONENT}\s*")
+_PLAIN = re.compile(rf"\s*[+-]?(?:\d+(?:([.,])\d*)?|([.,])\d+){_EXPONENT}\s*")
 
 #: Thousands: the first group does not begin with zero, all others have three digits.
 _GROUPED = re.compile(
