@@ -17,8 +17,8 @@ from statistics import median
 from time import perf_counter
 
 import islands
-from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
+from islands.data.signal_map import match_rate
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.result import Result
 from islands.io.records import read_record

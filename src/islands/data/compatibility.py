@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from islands.data.averaging import average_samples
 from islands.data.channel_names import (
     AT_ONCE,
     ChannelName,
@@ -122,34 +121,8 @@ def match_record(
         u=record.u[:, order],
         input_names=tuple(record.input_names[place] for place in order),
         input_units=tuple(record.input_units[place] for place in order),
+        preprocessing=record.preprocessing and record.preprocessing.select_inputs(order),
     )
-
-
-class AveragedReference(Protocol):
-    """Model of a record or of means of its samples."""
-
-    @property
-    def dt(self) -> float | None:
-        """Sampling time in seconds. None if any is allowed."""
-
-    @property
-    def average(self) -> int:
-        """Number of samples of a mean."""
-
-
-def match_rate(model: AveragedReference, record: Dataset) -> Dataset:
-    """Return a record at the sampling time of a model.
-
-    The samples of a record are averaged if the model describes means of samples, and the sampling time of the
-    model is that multiple of the record's.
-
-    Raises
-    ------
-    RecordError
-        A recording has fewer samples than a mean, or an input is read one sample early.
-    """
-    averaged = model.average > 1 and model.dt is not None and same_dt(model.dt, record.dt * model.average)
-    return average_samples(record, model.average) if averaged else record
 
 
 def check_dt(expected: float | None, dt: float, reference_title: str, title: str) -> None:

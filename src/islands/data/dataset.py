@@ -171,6 +171,7 @@ class Dataset:
             u=self.u[:, :count],
             input_names=self.input_names[:count],
             input_units=self.input_units[:count],
+            preprocessing=self.preprocessing and self.preprocessing.select_inputs(range(count)),
         )
 
     def __getitem__(self, rows: slice) -> "Dataset":

@@ -112,6 +112,23 @@ def apply_preprocessing(record: Dataset, preprocessing: Preprocessing) -> Datase
     return _subtract(_reduce(record, preprocessing.steps), preprocessing)
 
 
+def reduce_record(record: Dataset, preprocessing: Preprocessing) -> Dataset:
+    """Filter and decimate a record as another one of the same system, without its offsets.
+
+    Inputs that are read one sample early are advanced afterwards (see `match_record`): the record has them as
+    measured.
+
+    Raises
+    ------
+    RecordError
+        A segment is too short for a filter, or an input of the record is read one sample early.
+    """
+    done = Preprocessing(
+        preprocessing.without_offsets.steps, preprocessing.dt, (0.0,) * record.inputs, 0.0, 0.0
+    )
+    return replace(_reduce(record, preprocessing.steps), preprocessing=done)
+
+
 def _subtract(record: Dataset, found: Preprocessing) -> Dataset:
     return replace(
         record,

@@ -1,7 +1,7 @@
 """Preprocessing of a record as a value: what was done, and with which offsets."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from typing import Any
 
@@ -73,6 +73,21 @@ class Preprocessing:
     input_offsets: tuple[float, ...]
     output_offset: float
     output_slope: float
+
+    @property
+    def has_rate_steps(self) -> bool:
+        """Whether the record was filtered or decimated."""
+        return self.steps.lowpass is not None or self.steps.decimate > 1
+
+    @property
+    def without_offsets(self) -> "Preprocessing":
+        """The filter and the decimation alone: signals as measured, at the rate of the model."""
+        steps = replace(self.steps, detrend="none")
+        return Preprocessing(steps, self.dt, (0.0,) * len(self.input_offsets), 0.0, 0.0)
+
+    def select_inputs(self, places: Iterable[int]) -> "Preprocessing":
+        """Return the preprocessing of some inputs, in another order."""
+        return replace(self, input_offsets=tuple(self.input_offsets[place] for place in places))
 
     def as_document(self) -> dict[str, Any]:
         """Return the preprocessing as JSON values."""

@@ -1,7 +1,7 @@
 """Parameter estimation of a structure: constraint, regressor matrix, constrained least squares."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -106,6 +106,7 @@ def _estimate_constrained(
     constrained: Constrained, record: Dataset, warm_up: int | None, standard_errors: bool
 ) -> FittedStructure | EvaluationOutcome:
     structure = Model(constrained.regressors, None, record.input_names, record.output_name, record.dt)
+    structure = replace(structure, preprocessing=record.preprocessing)
     first = structure.maximum_lag if warm_up is None else warm_up
     *psi, y = regressor_matrix([*structure.regressors, Lagged(0, 0)], record, first)
     found = constrained_least_squares(np.array(psi), y, constrained.S, constrained.c, standard_errors)

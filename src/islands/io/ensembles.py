@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -93,7 +94,7 @@ def _structure(
     parameters = np.array(document.parameters, dtype=np.float64)
     if parameters.shape[1] != len(terms):
         raise ValueError(f"{parameters.shape[1]} parameters for {len(terms)} terms")
-    found = Model(terms, None, model.input_names, model.output_name, model.dt)
+    found = replace(model, regressors=terms, theta=None, standard_errors=None)
     return EnsembleStructure(found, document.weight, parameters)
 
 

@@ -1,13 +1,16 @@
 """Model files: JSON with a schema version and exact floats."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
+from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
+from islands.io.result_models import read_preprocessing
 from islands.model.equations import equation, latex_equation
 from islands.model.expression import Primitive
 from islands.model.model import Model, canonical_order
@@ -39,6 +42,7 @@ class ModelDocument(BaseModel):
     output: str
     dt: Annotated[FiniteFloat, Field(gt=0)] | None = None
     average: Annotated[int, Field(ge=1)] = 1
+    preprocessing: Preprocessing | None = None
     equation: str = ""
     latex: str = ""
     terms: Annotated[tuple[TermDocument, ...], Field(min_length=1)]
@@ -67,6 +71,7 @@ def model_json(model: Model) -> str:
         "output": model.output_name,
         "dt": model.dt,
         "average": model.average,
+        "preprocessing": model.preprocessing,
         "equation": equation(model),
         "latex": latex_equation(model),
         "terms": terms_document(model),
@@ -75,7 +80,9 @@ def model_json(model: Model) -> str:
         document = ModelDocument.model_validate(fields)
     except ValidationError as error:
         raise ModelError(f"the model cannot be written: {_first_problem(error)}") from error
-    return document.model_dump_json(by_alias=True, indent=2) + "\n"
+    # Models of measured signals have the files of earlier versions.
+    left_out = {"preprocessing"} if model.preprocessing is None else None
+    return document.model_dump_json(by_alias=True, indent=2, exclude=left_out) + "\n"
 
 
 def write_model(model: Model, path: str | Path) -> None:
@@ -120,7 +127,9 @@ def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVE
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ModelError(f"cannot read the model file {path}: {error}") from error
-    return model_from_json(text, str(path), primitives)
+    model = model_from_json(text, str(path), primitives)
+    # Earlier versions wrote the preprocessing to result.json alone.
+    return model if model.preprocessing else replace(model, preprocessing=read_preprocessing(path))
 
 
 def model_from_json(
@@ -154,7 +163,9 @@ def model_from_json(
     errors = _all_or_none([terms[item][1] for item in ordered], f"{name}: standard_error")
     try:
         return Model(
-            tuple(ordered), theta, document.inputs, document.output, document.dt, errors, document.average
+            *(tuple(ordered), theta, document.inputs, document.output, document.dt, errors),
+            document.average,
+            document.preprocessing,
         )
     except ModelError as error:
         raise ModelError(f"{name}: inputs: {error}") from error

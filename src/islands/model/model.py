@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from islands.data.channel_names import AT_ONCE
+from islands.data.channel_names import parse_channel_name
+from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.model.expression import Expression
 from islands.model.regressor import Regressor, regressor
@@ -29,6 +30,8 @@ class Model:
     average : int
         Number of consecutive samples of a recording whose mean is one sample of the model. ``dt`` is the
         sampling time of the means.
+    preprocessing : Preprocessing or None
+        Steps before the means; the regressors read deviations from its offsets. None if there were none.
 
     Raises
     ------
@@ -44,6 +47,7 @@ class Model:
     dt: float | None = None
     standard_errors: tuple[float, ...] | None = None
     average: int = 1
+    preprocessing: Preprocessing | None = None
 
     def __post_init__(self) -> None:
         if not self.regressors:
@@ -78,12 +82,12 @@ class Model:
     @property
     def leads(self) -> tuple[int, ...]:
         """Number of samples that the output and each input are read early: 0, or 1 for ``u_V+1``."""
-        return (0, *(int(name.endswith(AT_ONCE)) for name in self.input_names))
+        return (0, *(int(parse_channel_name(name).at_once) for name in self.input_names))
 
     @property
     def column_names(self) -> tuple[str, ...]:
         """Names of the inputs without the suffix ``+1``."""
-        return tuple(name.removesuffix(AT_ONCE) for name in self.input_names)
+        return tuple(parse_channel_name(name).base for name in self.input_names)
 
     @property
     def maximum_lag(self) -> int:

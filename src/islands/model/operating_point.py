@@ -26,6 +26,7 @@ from islands.model.expression import (
     value,
     walk,
 )
+from islands.model.measured_units import measured_model
 from islands.model.model import Model
 
 #: Sums of parameters below this fraction of their absolute sum are zero except for rounding.
@@ -86,6 +87,7 @@ def differentiate_model(model: Model, u: ArrayLike, y: float | None = None) -> L
         The model has no unique stable equilibrium at these inputs and no output is given, or it has a kink or
         a step at the operating point, such as that of ``sign(u(k-1) - u(k-2))`` at rest.
     """
+    model = measured_model(model)
     levels = _read_levels(model, u)
     if y is None:
         y = find_equilibrium(model, levels)
@@ -124,6 +126,7 @@ def static_characteristic(model: Model, inputs: ArrayLike) -> NDArray[np.float64
     ModelError
         A point has no stable equilibrium, several of them, or a continuum.
     """
+    model = measured_model(model)
     points = np.atleast_1d(np.asarray(inputs, dtype=np.float64))
     rows = points[:, None] if points.ndim == 1 else points
     return np.array([find_equilibrium(model, _read_levels(model, row)) for row in rows])
@@ -141,6 +144,7 @@ def find_equilibrium(model: Model, u: Sequence[float]) -> float:
         There is no stable equilibrium, there are several, or every output in a range is one, as in models of
         hysteresis.
     """
+    model = measured_model(model)
     where = ", ".join(f"{name} = {level:g}" for name, level in zip(signal_names(model)[1:], u, strict=True))
     roots = _find_roots(model, u, where)
     stable = []

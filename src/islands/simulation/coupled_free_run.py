@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.compatibility import ColumnReference, match_rate, match_record
+from islands.data.compatibility import ColumnReference, match_record
 from islands.data.coupled_record import CoupledRecord
+from islands.data.signal_map import match_rate
 from islands.errors import RecordError, SettingsError
 from islands.kernels.interpreter import Program
 from islands.kernels.simulation.simulate_coupled import LANES, simulate_coupled

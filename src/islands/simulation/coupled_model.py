@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.model.expression import Apply, Expression, Lagged
 from islands.model.model import Model
@@ -66,6 +67,11 @@ class CoupledModel:
     def average(self) -> int:
         """Number of samples of a record whose mean is one sample of the model."""
         return self.models[0].average
+
+    @property
+    def preprocessing(self) -> Preprocessing | None:
+        """None: the equations of several outputs describe signals as measured."""
+        return None
 
     @property
     def maximum_lag(self) -> int:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
+from islands.data.signal_map import map_signals
 from islands.errors import SettingsError
 from islands.kernels.simulation.simulate import Layout, simulate
 from islands.kernels.summation import total
@@ -26,7 +26,9 @@ class Simulation:
     Attributes
     ----------
     y : ndarray, shape (samples,)
-        NaN during the warm-up of every segment, and from a divergence to the end of its interval.
+        One value for each sample at the rate of the model, in the unit of the record: as measured, or as
+        deviations if the record is preprocessed. NaN during the warm-up of every segment, and from a
+        divergence to the end of its interval.
     mean_squared_error : float
         Mean over all predicted samples. Infinite after a divergence, NaN if a measured output is missing.
     outcome : EvaluationOutcome
@@ -80,7 +82,7 @@ def multiple_shooting(
     SettingsError
         The warm-up is shorter than the model's largest lag, or the interval is less than 1.
     """
-    record = match_record(model, record)
+    record, offset = map_signals(model, record)
     if warm_up is None:
         warm_up = model.maximum_lag
     if warm_up < model.maximum_lag:
@@ -93,6 +95,8 @@ def multiple_shooting(
     predicted = np.full(record.samples, np.nan)
     simulate(link(model.regressors), theta, cut, bound, np.inf, True, squared_error, diverged, predicted)
     failed = _remove_diverged(predicted, cut, diverged)
+    if offset:
+        predicted += offset
     if failed.size:
         sample = int((cut.start + diverged)[failed].min())
         reason = f"|y| left {bound:.3g} at sample {sample}"
@@ -125,14 +129,14 @@ def free_runs(
     RecordError
         The record does not match the model, is too short, or its output is missing in a warm-up.
     """
-    record = match_record(model, record)
+    record, offset = map_signals(model, record)
     program, cut, bound = link(model.regressors), layout(record, warm_up), divergence_bound(record)
     squared_error, diverged = np.empty(len(cut.start)), np.empty(len(cut.start), np.int64)
     predicted = np.full((len(thetas), record.samples), np.nan)
     for theta, run in zip(thetas, predicted, strict=True):
         simulate(program, theta, cut, bound, np.inf, True, squared_error, diverged, run)
         _remove_diverged(run, cut, diverged)
-    return predicted
+    return predicted + offset if offset else predicted
 
 
 def _remove_diverged(

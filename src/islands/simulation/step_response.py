@@ -113,7 +113,9 @@ def _simulate(
     y[: model.maximum_lag] = rest
     dt = 1.0 if model.dt is None else model.dt
     # The columns are those that were measured: inputs that are read one sample early are advanced.
-    record = Dataset(u, y, dt, model.column_names, model.output_name)
+    # The signals are at the rate of the model.
+    done = model.preprocessing and model.preprocessing.without_offsets
+    record = Dataset(u, y, dt, model.column_names, model.output_name, preprocessing=done)
     scale = max(1.0, abs(rest), float(np.abs(u).max()))
     simulated = free_run(model, record, bound=BOUND * scale).y
     simulated[: model.maximum_lag] = rest

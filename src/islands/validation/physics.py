@@ -242,7 +242,10 @@ def _simulate(
         y = np.full(len(u), np.nan)
         y[:warm_up] = record.y[nearest]
         recordings.append(
-            Dataset(u, y, record.dt, record.input_names, record.output_name, record.input_units)
+            Dataset(
+                *(u, y, record.dt, record.input_names, record.output_name, record.input_units),
+                preprocessing=record.preprocessing,
+            )
         )
     joined = join(tuple(recordings))
     simulated = free_run(model, joined, bound=divergence_bound(record)).y

@@ -1,6 +1,5 @@
 """``islands simulate``: prediction of a record by a model."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -8,11 +7,9 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
-from islands.data.preprocessing import apply_preprocessing
 from islands.data.preprocessing_steps import Preprocessing
+from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
 from islands.facade.library_fit import SHOOTING
 from islands.facade.results.model_simulation import simulate as run
@@ -24,7 +21,6 @@ from islands.io.result_models import (
     ErrorMeasurement,
     find_model_file,
     read_error_measurement,
-    read_preprocessing,
 )
 from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.factory import simulate_spec
@@ -102,11 +98,9 @@ def simulate(
         _simulate_extended(extended, record, mode, out, inputs, output_column, dt, rows, reading)
         return
     chosen = options.model(model)
-    # A model of means reads an input one mean early, not one sample.
-    names = [parse_channel_name(name).base if chosen.average > 1 else name for name in chosen.input_names]
     recorded = read_dataset(
         record,
-        options.columns(inputs or names),
+        options.columns(inputs or list(chosen.column_names)),
         output_column or chosen.output_name,
         dt,
         parse_rows(rows),
@@ -115,13 +109,14 @@ def simulate(
     )
     for step in recorded.reading:
         output.print(step, markup=False)
-    done = read_preprocessing(find_model_file(model))
-    prepared = recorded if done is None else apply_preprocessing(recorded, done)
+    done = chosen.preprocessing
     if done is not None:
         output.print(_describe_steps(done), markup=False)
-    data = match_rate(chosen, prepared)
-    if data is not prepared:
-        output.print(f"averaged {chosen.average} samples of {prepared.dt:g} s each: dt {data.dt:g} s")
+    data = match_rate(chosen, recorded)
+    if chosen.average > 1 and data is not recorded:
+        output.print(
+            f"averaged {chosen.average} samples of {data.dt / chosen.average:g} s each: dt {data.dt:g} s"
+        )
     compile_kernels()
     reported = read_error_measurement(find_model_file(model)) or ErrorMeasurement(None, SHOOTING)
     interval = reported.shooting if shooting is None else shooting
@@ -130,13 +125,9 @@ def simulate(
     if bands is not None:
         band = read_bands(find_model_file(model), chosen).predict(chosen, data, bands, first)
     simulation = run(chosen, data, mode, interval, warm_up=first)
-    y, offset = simulation.y, 0.0 if done is None else done.output_offset
-    if offset:
-        data, y = replace(data, y=data.y + offset), y + offset
-        if band is not None:
-            moved = (band.y + offset, band.lower + offset, band.upper + offset)
-            band = PredictionBand(band.level, *moved)
-    _print_metrics(data, y, f"{mode} after a warm-up of {first} samples: {simulation.outcome}", out, band)
+    _print_metrics(
+        data, simulation.y, f"{mode} after a warm-up of {first} samples: {simulation.outcome}", out, band
+    )
 
 
 def _describe_steps(done: Preprocessing) -> str:

@@ -7,10 +7,9 @@ from typing import Any
 
 import islands
 from islands.data.averaging import AUTO
-from islands.data.channel_names import parse_channel_name
-from islands.data.compatibility import match_rate
 from islands.data.coupled_record import CoupledRecord, check_outputs, couple
 from islands.data.dataset import Dataset
+from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.io.export.coupled.coupled_document import is_coupled
@@ -121,8 +120,7 @@ def simulate_coupled(
         raise SettingsError(
             f"the model has the outputs {', '.join(model.output_names)}: give as many --output, or none"
         )
-    # A model of means reads an input one mean early, not one sample.
-    names = [parse_channel_name(name).base if model.average > 1 else name for name in model.input_names]
+    names = model.models[0].column_names[: len(model.input_names)]
     recorded = CoupledRecord(
         tuple(
             read_dataset(record, inputs or names, name, dt, rows, missing_output=True, options=reading)

@@ -11,8 +11,9 @@ from time import monotonic, perf_counter
 from typing import Any
 
 import islands
-from islands.data.compatibility import match_rate, match_record
+from islands.data.compatibility import match_record
 from islands.data.preprocessing_steps import PreprocessingSteps
+from islands.data.signal_map import match_rate
 from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings

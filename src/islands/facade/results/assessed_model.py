@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
+from islands.data.signal_map import match_rate
 from islands.errors import ModelError
 from islands.facade.results.model_analysis import AnalysedModel
 from islands.facade.results.model_simulation import predict, record_of_model, simulate

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset, join
+from islands.data.signal_map import match_rate
 from islands.errors import RecordError, SettingsError, lookup
 from islands.io.data_frames import as_record, column_names, states_time
 from islands.io.records.column_names import find_column
@@ -113,7 +113,8 @@ def record_of_model(
 def predict(model: Model, record: Dataset, warm_up: int | None = None) -> NDArray[np.float64]:
     """Return the free run of a model with one value for every sample of a record.
 
-    Each sample of a model of means has the prediction of its mean.
+    Each sample of a model of means has the prediction of its mean. Behind a decimation, a prediction is held
+    until the next sample of the model.
 
     Parameters
     ----------
@@ -138,7 +139,8 @@ def predict(model: Model, record: Dataset, warm_up: int | None = None) -> NDArra
     if data is record:
         return simulated
     predicted = np.full(record.samples, np.nan)
-    for (begin, _), (first, last) in zip(record.bounds, data.bounds, strict=True):
-        means = simulated[first:last]
-        predicted[begin : begin + len(means) * model.average] = np.repeat(means, model.average)
+    every = round(data.dt / record.dt)
+    for (begin, end), (first, last) in zip(record.bounds, data.bounds, strict=True):
+        held = np.repeat(simulated[first:last], every)[: end - begin]
+        predicted[begin : begin + len(held)] = held
     return predicted

@@ -6,7 +6,7 @@ from html import escape
 from math import isfinite, nan
 from typing import TYPE_CHECKING
 
-from islands.data.compatibility import match_rate
+from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
 from islands.facade.results.assessed_model import AssessedModel
 from islands.facade.results.model_simulation import record_of_model

@@ -19,6 +19,7 @@ from islands.io.export.python import python_source
 from islands.io.export.s_function import s_function_source
 from islands.io.models import model_json
 from islands.model.equations import equation, latex_equation, mathml_equation
+from islands.model.measured_units import measured_model
 from islands.model.model import Model
 from islands.simulation.coupled_model import CoupledModel
 
@@ -57,7 +58,8 @@ def export(model: Model | CoupledModel, kind: str) -> str:
     if isinstance(model, CoupledModel):
         return export_coupled(model, kind)
     lookup({**EXPORTS, **FILE_EXPORTS}, kind, "format")
-    return EXPORTS[kind](model)
+    # A model file has the offsets as values; all other formats have them in the equation.
+    return EXPORTS[kind](model if kind == "json" else measured_model(model))
 
 
 def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> None:
@@ -69,6 +71,7 @@ def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> No
         The format is unknown.
     """
     if kind in FILE_EXPORTS:
-        Path(path).write_bytes(FILE_EXPORTS[kind](model))
+        written = model if isinstance(model, CoupledModel) else measured_model(model)
+        Path(path).write_bytes(FILE_EXPORTS[kind](written))
         return
     Path(path).write_text(f"{export(model, kind).rstrip()}\n", encoding="utf-8")

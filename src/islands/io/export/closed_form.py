@@ -23,6 +23,7 @@ from islands.io.simulator_spec.specification import (
     SimulationSpec,
 )
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
+from islands.model.measured_units import measured_model
 from islands.model.model import Model, make_model
 from islands.model.primitives import MUL, PRIMITIVES, SUB
 
@@ -73,7 +74,7 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
     """
     match spec:
         case ModelSpec():
-            return model_from_json(json.dumps(spec.model), spec.name)
+            return measured_model(model_from_json(json.dumps(spec.model), spec.name))
         case ExtendedSpec(core=LinearSpec(numerator=tuple()) as core):
             found = _make_linear_model(core, spec.inputs[0])
         case ExtendedSpec():

@@ -6,6 +6,7 @@ import re
 import textwrap
 from collections.abc import Callable
 
+from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.io.export.infix import OPERATORS, infix
 from islands.model.equations import equation
@@ -100,7 +101,19 @@ def description(model: Model, quote: Callable[[str], str]) -> str:
     inputs = ", ".join(f"{signal} = {quote(name)}" for signal, name in names)
     dt = "any" if model.dt is None else f"{float(model.dt)!r} s"
     means = f", means of {model.average} samples" if model.average > 1 else ""
-    return f"Inputs {inputs}; output y = {quote(model.output_name)}; sampling time {dt}{means}."
+    rate = describe_steps(model.preprocessing)
+    return f"Inputs {inputs}; output y = {quote(model.output_name)}; sampling time {dt}{means}{rate}."
+
+
+def describe_steps(preprocessing: Preprocessing | None) -> str:
+    """Describe the filter and the decimation of the signals that a program reads, empty for none."""
+    if preprocessing is None:
+        return ""
+    steps = preprocessing.steps
+    text = "" if steps.lowpass is None else f", behind a zero-phase low-pass filter of {steps.lowpass:g} Hz"
+    if steps.decimate > 1:
+        text += f", every sample number {steps.decimate} of {preprocessing.dt:g} s behind a low-pass filter"
+    return text
 
 
 def heading(model: Model, mark: str) -> str:

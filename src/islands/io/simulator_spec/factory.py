@@ -46,6 +46,7 @@ from islands.io.simulator_spec.specification import (
     SimulationSpec,
     parse_spec,
 )
+from islands.model.measured_units import measured_model
 from islands.model.model import Model
 from islands.systems.ode.output_system import SIMULATED
 
@@ -238,6 +239,14 @@ def make_model_simulator(model: Model, name: str, record: Dataset) -> Simulator:
     """
     if model.theta is None:
         raise ModelError(f"{name} has no parameters: estimate them first")
+    done = model.preprocessing
+    if done is not None and record.preprocessing is None:
+        if done.has_rate_steps:
+            raise RecordError(
+                f"{name} describes a filtered or decimated record, and a diagnosis reads the record as it "
+                "is: identify the model without --lowpass and --decimate"
+            )
+        model = measured_model(model)
     simulator = NarxSimulator(model, name, fill_gaps(record.y))
     # Further columns of the record are channels, which the model does not read.
     match_record(model, record.first_inputs(1), name, advance=False)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from islands.data.averaging import average_samples, check_average, count_means
-from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
+from islands.data.signal_map import match_rate
 from islands.data.split import Split, average_split
 from islands.errors import RecordError, SettingsError
 from islands.model.model import make_model

@@ -11,6 +11,7 @@ from islands.io.export.equations.program_system import refuse
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.specification import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
 from islands.model.equations import equation
+from islands.model.measured_units import measured_model
 from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol
 from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.output_system import INPUT, SIMULATED, make_output_system
@@ -46,7 +47,8 @@ def read_output_system(spec: ExtendedSpec) -> OdeSystem:
 
 def _make_model(spec: ModelSpec, output: str) -> SampledCore:
     # The program reads the same column as the simulation, which may be one sample early.
-    model = replace(model_from_json(json.dumps(spec.model), spec.name), input_names=(INPUT,))
+    model = measured_model(model_from_json(json.dumps(spec.model), spec.name))
+    model = replace(model, input_names=(INPUT,))
     return SampledCore(
         f"free run of the model {equation(model)} from {model.maximum_lag} measured outputs",
         model=model,
