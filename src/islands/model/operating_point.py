@@ -26,8 +26,7 @@ from islands.model.expression import (
     value,
     walk,
 )
-from islands.model.measured_units import measured_model
-from islands.model.model import Model
+from islands.model.model import Model, measured_model
 
 #: Sums of parameters below this fraction of their absolute sum are zero except for rounding.
 _ROUNDING = 1e-9

@@ -19,8 +19,7 @@ from islands.io.export.python import python_source
 from islands.io.export.s_function import s_function_source
 from islands.io.models import model_json
 from islands.model.equations import equation, latex_equation, mathml_equation
-from islands.model.measured_units import measured_model
-from islands.model.model import Model
+from islands.model.model import Model, measured_model
 from islands.simulation.coupled_model import CoupledModel
 
 EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(

@@ -23,8 +23,7 @@ from islands.io.simulator_spec.specification import (
     SimulationSpec,
 )
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
-from islands.model.measured_units import measured_model
-from islands.model.model import Model, make_model
+from islands.model.model import Model, make_model, measured_model
 from islands.model.primitives import MUL, PRIMITIVES, SUB
 
 _Terms = list[tuple[Expression, float]]

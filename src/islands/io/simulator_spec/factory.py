@@ -46,8 +46,7 @@ from islands.io.simulator_spec.specification import (
     SimulationSpec,
     parse_spec,
 )
-from islands.model.measured_units import measured_model
-from islands.model.model import Model
+from islands.model.model import Model, measured_model
 from islands.systems.ode.output_system import SIMULATED
 
 #: Smallest number of samples from which parameters and the initial state are estimated.

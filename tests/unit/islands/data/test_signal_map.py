@@ -13,8 +13,7 @@ from islands.data.signal_map import map_signals, match_rate
 from islands.facade.results.model_simulation import predict, simulate
 from islands.io.export import export
 from islands.io.models import model_from_json, model_json
-from islands.model.measured_units import measured_model
-from islands.model.model import make_model
+from islands.model.model import make_model, measured_model
 from islands.model.operating_point import static_characteristic
 from islands.model.parsing import parse
 from islands.simulation.predictors import free_run

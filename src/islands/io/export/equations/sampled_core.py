@@ -11,7 +11,7 @@ from islands.io.export.equations.program_system import refuse
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.specification import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
 from islands.model.equations import equation
-from islands.model.measured_units import measured_model
+from islands.model.model import measured_model
 from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol
 from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.output_system import INPUT, SIMULATED, make_output_system
