@@ -5,6 +5,7 @@ import os
 import secrets
 import shutil
 import socket
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -41,8 +42,13 @@ _PREFIX = "islands-ray-"
 #: Lock file in such a folder, held while the instance runs.
 _LOCK = "lock"
 
-#: Longest path of the parent folder: a socket path has at most 107 characters, and Ray appends about seventy.
-_MAX_PARENT_LENGTH = 30
+#: Folder of Ray in such a folder. Ray gives the folder that it is told to use to everyone (mode 0777), so it
+#: lies in one that only the user of this process may enter.
+_SESSIONS = "r"
+
+#: Longest path of the parent folder: a socket path has at most 107 bytes. ``/islands-ray-`` and eight
+#: characters, ``/r``, ``/session_`` with date, time and process id, and ``/sockets/plasma_store`` take 87.
+_MAX_PARENT_LENGTH = 20
 
 
 #: Errors of a failed machine or process rather than of the search. The computation is repeated.
@@ -124,8 +130,19 @@ def _remote_cluster(address: str) -> Iterator[None]:
 def _remove_stale_folders(parent: Path) -> None:
     """Remove the folders of killed runs: their locks were released when the processes ended."""
     for folder in parent.glob(f"{_PREFIX}*"):
-        with suppress(Timeout, OSError), FileLock(folder / _LOCK, timeout=0):
-            shutil.rmtree(folder, ignore_errors=True)
+        with suppress(Timeout, OSError):
+            if _is_private(folder):
+                with FileLock(folder / _LOCK, timeout=0):
+                    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _is_private(folder: Path) -> bool:
+    """Return whether a folder belongs to the user of this process, and no other user may enter it.
+
+    A link or a folder of another user could make this process open, or remove, files elsewhere.
+    """
+    found = folder.lstat()
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & 0o077
 
 
 def _check_reachable(address: str) -> None:
@@ -150,7 +167,7 @@ def _local_ray(cpus: int) -> Iterator[None]:
     # Ray's processes listen on all interfaces: the token keeps other users out.
     os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(16))
     parent = Path(tempfile.gettempdir())
-    if len(str(parent)) > _MAX_PARENT_LENGTH:
+    if len(os.fsencode(parent)) > _MAX_PARENT_LENGTH:
         parent = Path("/tmp")
     _remove_stale_folders(parent)
     folder = tempfile.mkdtemp(prefix=_PREFIX, dir=parent)
@@ -166,7 +183,7 @@ def _local_ray(cpus: int) -> Iterator[None]:
                 include_dashboard=False,
                 log_to_driver=False,
                 configure_logging=False,
-                _temp_dir=folder,
+                _temp_dir=str(Path(folder) / _SESSIONS),
             )
         except Exception as error:  # Ray raises plain exceptions, too, for example after a timeout
             raise ClusterError(
