@@ -107,8 +107,9 @@ def test_run_stopped_by_ctrl_c_resumes_to_the_same_models(folder: Path) -> None:
         printed, complaints = running.communicate(timeout=60)
     finally:
         running.kill()
-    assert running.returncode == 0, complaints
-    assert f"stopped: the result is the best so far; continue with --resume {out}" in complaints
+    assert running.returncode == 130, complaints
+    assert f"stopped: {out} has the best models so far" in complaints
+    assert f"continue with --resume {out}" in complaints
     assert "Traceback" not in complaints
     assert "MAPE val. %" in printed
     result, document = stored(out), json.loads((out / "checkpoint.json").read_text())

@@ -14,8 +14,10 @@ from rich.markup import escape
 from typer.core import TyperCommand, TyperGroup
 
 from islands.errors import IslandsError, SettingsError
+from islands.evolution.progress import StoppedError
 from islands_api.cli.console import errors, exit_with_closed_output
 from islands_api.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
+from islands_api.cli.stop_requests import INTERRUPTED
 from islands_service.process.process_settings import limit_threads
 
 #: Commands and their descriptions, in the order of the help. Each is a file with a function or a group of the
@@ -84,12 +86,15 @@ class Commands(TyperGroup):
                 raise explain_missing_package(error, str(ctx.invoked_subcommand)) from error
         except BrokenPipeError:
             exit_with_closed_output()
+        except StoppedError as stopped:
+            errors.print(str(stopped), markup=False)
+            sys.exit(INTERRUPTED)
         except (IslandsError, OSError) as error:
             errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False)
             sys.exit(2)
         except KeyboardInterrupt:
             errors.print("stopped")
-            sys.exit(130)
+            sys.exit(INTERRUPTED)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command of the arguments; for an unknown name, an error suggests similar ones."""

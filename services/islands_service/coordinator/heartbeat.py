@@ -19,8 +19,9 @@ from islands_service.store.database import StoreError
 
 if TYPE_CHECKING:
     from islands.evolution.archipelago import Archipelago
-    from islands.evolution.engine import ArchipelagoEpoch, Engine, Stop
+    from islands.evolution.engine import ArchipelagoEpoch, Engine
     from islands.evolution.problem import Problem
+    from islands.evolution.progress import Stop
 
 log = structlog.get_logger()
 

@@ -5,9 +5,9 @@ from collections.abc import Callable, Generator, Mapping
 from ray.exceptions import RayError
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch, Stop
+from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.problem import Problem
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.progress import ProgressCallback, Stop, ignore_progress
 from islands.model.expression import Primitive
 from islands_service.runtime.actor_pool import IslandActorPool, ignore_placement
 from islands_service.runtime.cluster import cluster_cpus

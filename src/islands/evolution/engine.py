@@ -1,6 +1,6 @@
 """Engines: they run the epochs of a search. All engines yield the same archipelagos, bit for bit."""
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -10,9 +10,7 @@ from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.island import StepInfo
 from islands.evolution.migration.topology import Topology, parse_topology
 from islands.evolution.problem import Problem
-
-#: Returns true if the search must end.
-Stop = Callable[[], bool]
+from islands.evolution.progress import Stop
 
 #: Bytes in use and byte limit of each cache, by name.
 Caches = Mapping[str, tuple[int, int]]

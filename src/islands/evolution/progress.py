@@ -1,6 +1,15 @@
-"""Progress callbacks of long computations."""
+"""Progress callbacks of long computations, and requests to stop them."""
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol
+
+from islands.errors import IslandsError
+
+if TYPE_CHECKING:
+    from islands.evolution.search_result import SearchResult
+
+#: Returns true if the computation must end.
+Stop = Callable[[], bool]
 
 
 class ProgressCallback(Protocol):
@@ -20,3 +29,37 @@ class ProgressCallback(Protocol):
 
 def ignore_progress(_message: str, _fraction: float | None = None, /) -> None:
     """Ignore progress."""
+
+
+def never_stop() -> bool:
+    """Return that the computation may continue."""
+    return False
+
+
+class StoppedError(IslandsError):
+    """A computation was stopped before it had its result.
+
+    Attributes
+    ----------
+    found : SearchResult or None
+        Models found so far; None if there are none.
+    """
+
+    def __init__(self, step: str, found: "SearchResult | None" = None) -> None:
+        super().__init__(f"stopped before the first models were found ({step}): there is no model to keep")
+        self.step, self.found = step, found
+
+
+def stop_between_steps(progress: ProgressCallback, stop: Stop) -> ProgressCallback:
+    """Return a progress callback that raises `StoppedError` once a stop is requested.
+
+    Long computations report progress at the start of every step. Those with results so far catch the error
+    and return them.
+    """
+
+    def report(message: str, fraction: float | None = None, /) -> None:
+        if stop():
+            raise StoppedError(message)
+        progress(message, fraction)
+
+    return report

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -14,6 +15,7 @@ from islands.data.loops import has_loops
 from islands.data.split import Split
 from islands.estimation.structure_selection.certificate import Certificate
 from islands.evolution.history import HistoryPoint
+from islands.evolution.progress import ProgressCallback, StoppedError, ignore_progress
 from islands.model.equations import equation
 from islands.model.model import Model
 from islands.validation.assessment import Assessment
@@ -66,7 +68,8 @@ class SearchStatistics:
     caches : mapping
         Bytes in use at the end of an evolution and byte limit of each cache, by name.
     ended_by : str or None
-        Budget that an evolution used up, or ``stopped``; None if the search is not an evolution.
+        Budget that an evolution used up, or ``stopped`` if a request ended the computation; None for a
+        complete search that is not an evolution.
     certificates : mapping
         Certificate of the candidate library by number of terms; empty if none was computed.
     """
@@ -165,10 +168,22 @@ class SearchResult:
 
 
 def with_bands(
-    found: SearchResult, candidates: Sequence[ValidatedModel], constraints: str, warm_up: int
+    found: SearchResult,
+    candidates: Sequence[ValidatedModel],
+    constraints: str,
+    warm_up: int,
+    progress: ProgressCallback = ignore_progress,
 ) -> SearchResult:
-    """Return a search result with the ensemble of the candidates and with calibrated bands of its models."""
-    ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed)
+    """Return a search result with the ensemble of the candidates and with calibrated bands of its models.
+
+    If ``progress`` raises `StoppedError`, the result has neither and is marked as stopped.
+    """
+    report = partial(progress, "prediction bands", 1.0)
+    try:
+        ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed, report)
+        report()
+    except StoppedError:
+        return replace(found, search=replace(found.search, ended_by="stopped"))
     if ensemble is None:
         return found
     calibrated = calibrate_bands([entry.model for entry in found.models], ensemble, found.split, warm_up)

@@ -10,7 +10,8 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
-from islands.evolution.engine import Engine, Stop
+from islands.evolution.engine import Engine
+from islands.evolution.progress import Stop, never_stop
 from islands.evolution.search_state import SearchState
 from islands.facade.engine_choice import Ray
 from islands.facade.identify import SearchCallback, identify
@@ -52,7 +53,7 @@ def explain_residual(
     seed: int = 0,
     engine: Engine | Ray | str | None = None,
     progress: SearchCallback | None = None,
-    stop: Stop | None = None,
+    stop: Stop = never_stop,
     start: SearchState | None = None,
 ) -> ResidualFormula | None:
     """Search for a formula of the residual of the best simulation of a diagnosis.

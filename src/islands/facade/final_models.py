@@ -18,7 +18,7 @@ from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.individual import Individual, unique_structures
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.problem import Problem
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.progress import ProgressCallback, Stop, ignore_progress, never_stop
 from islands.evolution.search_result import RankedModel, rank_models
 from islands.evolution.settings import Settings
 from islands.model.model import Model
@@ -47,17 +47,20 @@ _Sized = TypeVar("_Sized", bound=_HasSize)
 
 
 def select_final_models(
-    candidates: Iterable[ValidatedModel], problem: Problem, split: Split
+    candidates: Iterable[ValidatedModel], problem: Problem, split: Split, stop: Stop = never_stop
 ) -> tuple[RankedModel, ...]:
     """Assess the candidates and return the best model of every size, best first.
 
     If the parameters are constrained, a model must have Property 1; a size without such a model is left out.
+    Once ``stop`` returns true, the remaining models have no standard errors.
     """
     settings = problem.settings
     kept = []
     for entries in _group_by_size(each for each in candidates if isfinite(each.error)):
         for candidate in sorted(entries, key=lambda entry: entry.order):
-            model = _with_standard_errors(candidate, settings, split.estimation)
+            model = (
+                candidate.model if stop() else _with_standard_errors(candidate, settings, split.estimation)
+            )
             assessment = assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
             if _is_valid(assessment, settings):
                 kept.append(RankedModel(model, assessment))
@@ -91,21 +94,24 @@ def estimate_candidates(
     split: Split,
     offsets: Offsets,
     progress: ProgressCallback = ignore_progress,
+    stop: Stop = never_stop,
 ) -> list[ValidatedModel]:
     """Estimate and refine the best structures of every size, and validate them.
 
     Structures are those of the hall of fame and those that seeded the search, so that the result is never
     worse than the seeds. All of them are simulated on the validation data with the parameters of the search.
     The best of every size are estimated again in the units of the record and, if the settings ask for it,
-    refined over several shooting intervals. An estimator in the settings replaces both.
+    refined over several shooting intervals. An estimator in the settings replaces both. Once ``stop`` returns
+    true, the best structure of every remaining size is estimated only.
     """
     settings, validation = problem.settings, subtract_offsets(split.validation, offsets)
     found = []
     groups = _group_by_size(_evaluate_structures(hall_of_fame, problem))
     for done, individuals in enumerate(groups):
         progress(f"estimation of the final models of {individuals[0].size} terms", done / len(groups))
-        kept = screen(individuals, validation, settings.maximum_lag, *_REFINED)
-        found += _estimate_models(kept, settings, split, offsets)
+        count = (1, 0) if stop() else _REFINED
+        kept = screen(individuals, validation, settings.maximum_lag, *count)
+        found += _estimate_models(kept, settings, split, offsets, stop)
     return found
 
 
@@ -152,7 +158,7 @@ def screen(
 
 
 def _estimate_models(
-    individuals: list[Individual], settings: Settings, split: Split, offsets: Offsets
+    individuals: list[Individual], settings: Settings, split: Split, offsets: Offsets, stop: Stop
 ) -> list[ValidatedModel]:
     """Return models with estimated and with refined parameters in the units of the record."""
     found = (
@@ -171,18 +177,18 @@ def _estimate_models(
         for each in found
         if not isinstance(each, EvaluationOutcome) and each.model.size <= settings.max_terms
     ]
-    if settings.estimator:
+    if settings.estimator and not stop():
         return _estimate_with_choice(fitted, settings, split)
     estimated = [each.model for each in fitted]
     validated = _validate(estimated, 1, split.validation, settings.maximum_lag)
-    if settings.refine:
+    if settings.refine and not stop():
         interval = FITNESSES[settings.fitness](settings.shooting)
-        refined = _refine(estimated, interval, settings, split)
+        refined = _refine(estimated, interval, settings, split, stop)
         validated += refined
         best = [each.model for each in refined[:_MOST_PROMISING]]
         lengths = [max(1, round(factor * interval)) for factor in _INTERVALS] if interval else []
         for length in lengths:
-            validated += _refine(best, length, settings, split)
+            validated += _refine(best, length, settings, split, stop)
     return validated
 
 
@@ -207,22 +213,25 @@ def _estimate_with_choice(
 
 
 def _refine(
-    models: list[Model], interval: int | None, settings: Settings, split: Split
+    models: list[Model], interval: int | None, settings: Settings, split: Split, stop: Stop
 ) -> list[ValidatedModel]:
     """Refine models over shooting intervals and validate them; the kernels run in parallel threads."""
-    with ThreadPoolExecutor() as threads:
-        refined = threads.map(
-            lambda model: refine(
-                model,
-                split.estimation,
-                interval,
-                settings.constraints,
-                settings.maximum_lag,
-                standard_errors=False,
-            ),
-            models,
+
+    def refine_one(model: Model) -> Model | None:
+        if stop():
+            return None
+        refined = refine(
+            model,
+            split.estimation,
+            interval,
+            settings.constraints,
+            settings.maximum_lag,
+            standard_errors=False,
         )
-        found = [each.model for each in refined if not isinstance(each, EvaluationOutcome)]
+        return None if isinstance(refined, EvaluationOutcome) else refined.model
+
+    with ThreadPoolExecutor() as threads:
+        found = [each for each in threads.map(refine_one, models) if each is not None]
     return _validate(found, interval, split.validation, settings.maximum_lag)
 
 

@@ -9,7 +9,14 @@ from numpy.typing import ArrayLike
 from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.progress import (
+    ProgressCallback,
+    Stop,
+    StoppedError,
+    ignore_progress,
+    never_stop,
+    stop_between_steps,
+)
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.library_fit import FitSettings
 from islands.facade.results.result import Result
@@ -43,6 +50,7 @@ def fit(
     certificate: int = 10_000,
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
+    stop: Stop = never_stop,
 ) -> Result:
     """Fit models of increasing size to a record by subset selection and rank them on validation data.
 
@@ -91,6 +99,9 @@ def fit(
         Stored in the result; forward selection is deterministic.
     progress : callable, optional
         Called with a message and the completed fraction.
+    stop : callable, optional
+        Called before each step. Once it returns true, the fit ends with the models so far, without prediction
+        bands; ``search.ended_by`` of the result is ``stopped``.
 
     Returns
     -------
@@ -101,6 +112,8 @@ def fit(
     ------
     SettingsError
         A setting is unknown or out of range, or no model could be estimated.
+    StoppedError
+        ``stop`` returned true before the first model.
     RecordError
         The record is too short or incomplete, or the validation data has other columns or sampling time.
     """
@@ -114,8 +127,14 @@ def fit(
         certificate=certificate,
     )
     split = split_data(record, validation)
-    found = fit_chosen_library(
-        record, split, library, degree, lags, constraints, delays, settings, seed, progress
-    )
+    progress = stop_between_steps(progress, stop)
+    try:
+        found = fit_chosen_library(
+            record, split, library, degree, lags, constraints, delays, settings, seed, progress
+        )
+    except StoppedError as stopped:
+        if stopped.found is None:
+            raise
+        found = stopped.found
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     return Result(replace(found, settings={**found.settings, "validation": held_out}))

@@ -21,11 +21,18 @@ from islands.estimation.structure_selection.deviations import (
     subtract_offsets,
 )
 from islands.evolution.archipelago import empty_archipelago
-from islands.evolution.engine import Engine, Stop
+from islands.evolution.engine import Engine
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.presets import AUTO, resolve_kind, resolve_settings, with_tuples
 from islands.evolution.problem import Problem, make_problem
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.progress import (
+    ProgressCallback,
+    Stop,
+    StoppedError,
+    ignore_progress,
+    never_stop,
+    stop_between_steps,
+)
 from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
@@ -61,7 +68,7 @@ _MIN_RESIDUALS = 3
 SearchCallback = Callable[[SearchState, Settings], None]
 
 
-def identify(
+def identify(  # noqa: PLR0912 - one branch for each point at which a stop leaves steps out
     record: "RecordLike",
     y: "ArrayLike | IntoSeries | None" = None,
     dt: float | None = None,
@@ -73,7 +80,7 @@ def identify(
     seed: int = 0,
     progress: SearchCallback | None = None,
     stage: ProgressCallback = ignore_progress,
-    stop: Stop | None = None,
+    stop: Stop = never_stop,
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
     **changes: Unpack[SettingChanges],
@@ -104,7 +111,8 @@ def identify(
     stage : callable, optional
         Called with a message and the completed fraction of each stage before and after the epochs.
     stop : callable, optional
-        Called frequently. Once it returns true, the search ends with the best models so far.
+        Called frequently. Once it returns true, the present step ends with the best models so far, and those
+        after it are left out: refinement, prediction bands. ``search.ended_by`` of the result is ``stopped``.
     start : SearchState, optional
         State to continue from; the result equals that of an uninterrupted run.
     engine : str, Ray or Engine, optional
@@ -123,6 +131,8 @@ def identify(
     ------
     SettingsError
         A setting is unknown or out of range, or no model was found.
+    StoppedError
+        ``stop`` returned true before the first models were found.
     RecordError
         The record is too short or incomplete, or the validation data do not match it.
     ModelError
@@ -131,8 +141,14 @@ def identify(
     record, validation = read_data(record, y, dt, inputs, output, validation)
     if seed < 0:
         raise SettingsError(f"a seed is not negative, got {seed}")
+    report, stage = stage, stop_between_steps(stage, stop)
     if preset == AUTO:
-        preset = choose_preset(record, validation, changes, stage)
+        try:
+            preset = choose_preset(record, validation, changes, stage)
+        except StoppedError as stopped:
+            if stopped.found is None:
+                raise
+            return Result(stopped.found)
     if isinstance(preset, Choice):
         settings = resolve_kind(preset.kind, preset.delays, with_tuples(changes))
     else:
@@ -151,7 +167,6 @@ def identify(
         library_delays=tuple(delay // count for delay in settings.library_delays),
     )
     search_problem = make_problem(subtract_offsets(split.estimation, offsets), scaled, stage)
-    stop = stop or (lambda: False)
     state = start or SearchState(empty_archipelago(settings.islands, seed))
     if [(island.index, island.seed) for island in state.archipelago.islands] != [
         (index, seed) for index in range(settings.islands)
@@ -160,7 +175,7 @@ def identify(
             "the start state has other islands or another seed: pass the settings and the seed of its run"
         )
     with (
-        open_engine(engine, stage) as opened,
+        open_engine(engine, report) as opened,
         closing(opened.run(search_problem, state.archipelago, stop)) as epochs,
     ):
         # Epochs after the last one are never requested, so work that an engine does in advance has no effect.
@@ -168,12 +183,12 @@ def identify(
             state = advance(state, epoch)
             if progress is not None:
                 progress(state, settings)
-    if state.archipelago.generation < 0:
-        raise SettingsError("stopped before the first populations were evaluated: there is no model to keep")
+    if state.archipelago.generation < 0 and not search_problem.seeds:
+        raise StoppedError("first populations")
     hall_of_fame = state.archipelago.hall_of_fame
-    candidates = estimate_candidates(hall_of_fame, search_problem, split, offsets, stage)
-    stage("assessment of the final models", 1.0)
-    models = select_final_models(candidates, search_problem, split)
+    candidates = estimate_candidates(hall_of_fame, search_problem, split, offsets, report, stop)
+    report("assessment of the final models", 1.0)
+    models = select_final_models(candidates, search_problem, split, stop)
     if not models:
         raise SettingsError(
             f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
@@ -183,9 +198,9 @@ def identify(
     if isinstance(preset, Choice):
         described.update(preset=AUTO, choice=preset.to_document())
     described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
-    statistics = _make_statistics(state, hall_of_fame, search_problem)
+    statistics = _make_statistics(state, hall_of_fame, search_problem, stop())
     found = SearchResult(record, split, seed, described, statistics, models)
-    banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag)
+    banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag, stage)
     return Result(with_average(banded, count))
 
 
@@ -220,7 +235,9 @@ def _find_search_offsets(record: Dataset, settings: Settings) -> Offsets:
     return find_offsets(record, LARGE_OFFSET) if shiftable else no_offsets(record)
 
 
-def _make_statistics(state: SearchState, hall_of_fame: HallOfFame, problem: Problem) -> SearchStatistics:
+def _make_statistics(
+    state: SearchState, hall_of_fame: HallOfFame, problem: Problem, stopped: bool
+) -> SearchStatistics:
     maximum_lag, degree = _maximum_lag_and_degree(hall_of_fame)
     inputs = problem.record.inputs
     count = full_set(degree, maximum_lag, maximum_lag, inputs)
@@ -235,7 +252,7 @@ def _make_statistics(state: SearchState, hall_of_fame: HallOfFame, problem: Prob
         sum(state.outcomes.get(name, 0) for name in FEASIBLE_OUTCOMES) / max(1, state.evaluations),
         state.history,
         state.caches,
-        stop_reason(state, problem.settings) or "stopped",
+        "stopped" if stopped else stop_reason(state, problem.settings) or "stopped",
     )
 
 

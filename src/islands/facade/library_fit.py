@@ -29,7 +29,7 @@ from islands.estimation.structure_selection.deviations import (
 )
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.swap_search import swap_search
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.progress import ProgressCallback, StoppedError, ignore_progress
 from islands.evolution.search_result import (
     RankedModel,
     SearchResult,
@@ -98,10 +98,13 @@ def fit_library(
     seed : int
         Stored in the result.
     progress : callable, optional
-        Called with a message and the completed fraction.
+        Called with a message and the completed fraction. If it raises `StoppedError`, the result has the
+        models found so far, without prediction bands, and is marked as stopped.
 
     Raises
     ------
+    StoppedError
+        ``progress`` raised it before the first model.
     SettingsError
         No model could be estimated.
     RecordError
@@ -117,7 +120,7 @@ def fit_library(
     interval = count_means(shooting, samples)
     swaps = rated.make_settings(settings.max_terms, interval)
     structures, certificates, warm_up = _select(split, rated, swaps, settings.certificate, progress)
-    models, outcomes = _estimate(structures, split, settings, swaps, warm_up, progress)
+    models, outcomes, stopped = _estimate(structures, split, settings, swaps, warm_up, progress)
     best_of_size: dict[int, RankedModel] = {}
     for ranked in rank_models(models):
         best_of_size.setdefault(ranked.model.size, ranked)
@@ -127,6 +130,7 @@ def fit_library(
         sum(outcomes.values()),
         dict(outcomes),
         {"candidates": count, "bytes": 8 * count * rows},
+        ended_by="stopped" if stopped else None,
         certificates={found.terms: found for found in certificates},
     )
     described = {
@@ -140,12 +144,14 @@ def fit_library(
         "shooting": shooting,
     }
     result = SearchResult(record, split, seed, described, search, tuple(best_of_size.values()))
+    if stopped:
+        return with_average(result, samples)
     minimised = ESTIMATORS[settings.estimator].interval(interval)
     estimates = [
         ValidatedModel(entry.model, minimised, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
         for entry in models
     ]
-    return with_average(with_bands(result, estimates, constraints, warm_up), samples)
+    return with_average(with_bands(result, estimates, constraints, warm_up, progress), samples)
 
 
 def _estimate(
@@ -155,12 +161,23 @@ def _estimate(
     swaps: Settings,
     warm_up: int,
     progress: ProgressCallback,
-) -> tuple[list[RankedModel], Counter[str]]:
-    """Estimate and assess a model of every structure; return the models and the number of each outcome."""
+) -> tuple[list[RankedModel], Counter[str], bool]:
+    """Estimate and assess a model of every structure.
+
+    Return the models, the number of each outcome, and whether `StoppedError` ended the loop.
+    """
     constraints, interval = swaps.constraints, swaps.shooting
     outcomes: Counter[str] = Counter()
-    models = []
-    for done, (structure, offsets) in enumerate(structures, start=1):
+    models: list[RankedModel] = []
+    stopped = False
+    for done, (structure, offsets) in enumerate(structures):
+        try:
+            progress(f"estimation of {len(structure)} terms", done / len(structures))
+        except StoppedError:
+            if not models:
+                raise
+            stopped = True
+            break
         estimated = estimate_deviations(structure, offsets, split.estimation, constraints, warm_up)
         if not isinstance(estimated, EvaluationOutcome):
             estimated = estimate_with(
@@ -174,12 +191,11 @@ def _estimate(
         outcomes["ok"] += 1
         assessment = assess(estimated.model, split, interval, warm_up, constraints)
         models.append(RankedModel(estimated.model, assessment))
-        progress(f"model of {estimated.model.size} terms", done / len(structures))
     if not models:
         raise SettingsError(
             f"no model could be estimated: {dict(outcomes)}; take another library or a longer record"
         )
-    return models, outcomes
+    return models, outcomes, stopped
 
 
 def _select(

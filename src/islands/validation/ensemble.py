@@ -9,7 +9,7 @@ equal errors has the same weight, and terms that are not in the law of the syste
 one half.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -158,7 +158,12 @@ class Ensemble:
 
 
 def make_ensemble(
-    candidates: Sequence[ValidatedModel], split: Split, constraints: str, warm_up: int, seed: int
+    candidates: Sequence[ValidatedModel],
+    split: Split,
+    constraints: str,
+    warm_up: int,
+    seed: int,
+    report: Callable[[], None] = lambda: None,
 ) -> Ensemble | None:
     """Make the ensemble of the candidates.
 
@@ -176,6 +181,8 @@ def make_ensemble(
         Number of samples before the first prediction of every free run.
     seed : int
         Seed of the random generator.
+    report : callable
+        Called before each structure; it may raise an error to end the computation.
 
     Returns
     -------
@@ -186,6 +193,7 @@ def make_ensemble(
     floor = (_ROUNDING * split.validation.output_range) ** 2
     kept = _weigh(_best_of_each_structure(candidates), split.validation, floor, warm_up)
     for position, (candidate, weight) in enumerate(kept):
+        report()
         model, count = candidate.model, max(1, round(MEMBERS * weight))
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(position,)))
         drawn = draw_parameters(model, split.estimation, candidate.interval, constraints, warm_up, count, rng)

@@ -1,5 +1,6 @@
 """``islands fit``: forward selection from a library with (constrained) least squares."""
 
+import signal
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -22,6 +23,7 @@ from islands_api.cli.preprocessing_options import check_one_output, with_preproc
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
 from islands_api.cli.runs.coupled_run import couple_data, coupled_options, join_columns, show_coupled
+from islands_api.cli.stop_requests import stop_requests
 
 #: Default library for several outputs.
 SEVERAL_OUTPUTS = "polynomial"
@@ -96,7 +98,7 @@ def fit(
     check_one_output(steps, len(outputs))
     recordings = Recordings(records, names, output_column, dt, reading, steps)
     compile_kernels()
-    with progress("fit") as show:
+    with progress("fit") as show, stop_requests([signal.SIGINT] if len(outputs) == 1 else []) as stop:
         show("reading", 0.0)
         data = recordings.read(rows)
         held_out = recordings.read_held_out(validation, rows)
@@ -125,11 +127,14 @@ def fit(
             show("figures", 1.0)
             coupled.save(out)
         else:
-            result = islands.fit(data, validation=held_out, **given)
+            result = islands.fit(data, validation=held_out, stop=stop, **given)
             result = result.with_wall_time(perf_counter() - began)
             show("figures", 1.0)
-            result.save(out)
+            result.save(out, stop)
     if len(outputs) > 1:
         show_coupled(coupled, out)
     else:
         show_result(result, out)
+        if stop():
+            stop.explain(out, "repeat the command with --force for the complete result")
+        stop.exit()

@@ -1,9 +1,7 @@
 """Run of ``islands identify`` in its folder: record, search, checkpoints, result."""
 
 import json
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Generator
 from dataclasses import asdict, dataclass
 from math import inf, isfinite
 from pathlib import Path
@@ -16,10 +14,14 @@ from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.data.signal_map import match_rate
 from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.engine import ArchipelagoEpoch, Engine
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
+from islands.evolution.problem import Problem
+from islands.evolution.progress import Stop, StoppedError, stop_between_steps
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.facade.automatic.kind_choice import choice_from_document
+from islands.facade.automatic.kind_choice import Choice, choice_from_document
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.io.checkpoints import (
     read_checkpoint,
@@ -35,6 +37,7 @@ from islands_api.cli.console import Display, compile_kernels, errors, output, pr
 from islands_api.cli.output_folder import show_result
 from islands_api.cli.recordings import Recordings
 from islands_api.cli.search_progress import search_progress
+from islands_api.cli.stop_requests import StopRequests, stop_requests
 from islands_service.engines import ENGINES, SERIAL_NOTICE, default_engine, has_ray
 
 #: File of the search state.
@@ -107,9 +110,11 @@ def run(
     with (
         progress("identify") as show,
         # Ray installs a handler for SIGTERM when it starts, so it starts before our handlers are installed.
-        start_engine(run_options.address, print_message) as engine,
-        _stop_requests(run_options.wall_time) as stop,
+        start_engine(run_options.address, print_message) as started,
+        stop_requests() as stop,
     ):
+        until = inf if run_options.wall_time is None else monotonic() + run_options.wall_time
+        engine = _TimedEngine(started, until)
         if state is None:
             # Delete the files of an earlier run.
             for name in (CHECKPOINT, HALL, TEST):
@@ -120,7 +125,7 @@ def run(
             preset = (
                 choice_from_document(stored)
                 if stored
-                else choose_preset(data, held_out, job["changes"], show)
+                else _choose_preset(data, held_out, job["changes"], show, stop, folder)
             )
             # Checkpoints contain the job, so a resumed run does not choose again.
             job = {**job, "choice": preset.to_document()}
@@ -143,8 +148,10 @@ def run(
             checkpoints.write()
         result = result.with_wall_time(perf_counter() - began)
         show("figures", 1.0)
-        result.save(folder)
-    if result.search_result.search.ended_by == "stopped":
+        result.save(folder, stop)
+    if stop():
+        stop.explain(folder, f"continue with --resume {folder}")
+    elif result.search_result.search.ended_by == "stopped":
         errors.print(f"stopped: the result is the best so far; continue with --resume {folder}", markup=False)
         if run_options.wall_time is not None:
             errors.print(
@@ -156,6 +163,26 @@ def run(
             output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
     if test_data is not None:
         _evaluate_test(result, test_data, folder)
+    stop.exit()
+
+
+def _choose_preset(
+    data: islands.Dataset,
+    held_out: islands.Dataset | float,
+    changes: dict[str, Any],
+    show: Display,
+    stop: StopRequests,
+    folder: Path,
+) -> Choice:
+    """Choose the preset. If a stop is requested, save the best model of the kinds that were fitted."""
+    try:
+        return choose_preset(data, held_out, changes, stop_between_steps(show, stop))
+    except StoppedError as stopped:
+        if stopped.found is not None:
+            islands.Result(stopped.found).save(folder, stop)
+            stop.explain(folder, "the preset was not chosen yet, so repeat the command with --force")
+            stop.exit()
+        raise
 
 
 def _resolve_possible(job: dict[str, Any]) -> tuple[Settings, ...]:
@@ -252,27 +279,15 @@ class _CheckpointWriter:
             self._next = now + took + max(CHECKPOINT_SECONDS, took / CHECKPOINT_FRACTION)
 
 
-@contextmanager
-def _stop_requests(wall_time: float | None) -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns whether Ctrl-C, SIGTERM or the time limit requests a stop.
+class _TimedEngine:
+    """Engine whose search ends at a time; the steps after the search are not left out."""
 
-    A second Ctrl-C raises `KeyboardInterrupt`.
-    """
-    requested = False
-    until = inf if wall_time is None else monotonic() + wall_time
+    def __init__(self, engine: Engine, until: float) -> None:
+        self._engine, self._until = engine, until
 
-    def request_stop(number: int, _frame: object) -> None:
-        nonlocal requested
-        if requested and number == signal.SIGINT:
-            raise KeyboardInterrupt
-        requested = True
-
-    before = {number: signal.signal(number, request_stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield lambda: requested or monotonic() > until
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
+        """Run the engine."""
+        return self._engine.run(problem, start, lambda: stop() or monotonic() > self._until)
 
 
 def load_run(folder: Path) -> tuple[dict[str, Any], SearchState, float]:

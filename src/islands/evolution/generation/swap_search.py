@@ -5,7 +5,9 @@ adds the gene that reduces the shooting error most, exchanges single genes as lo
 continues with the next size. Its structures seed the evolution, which is not bound to the pool.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from functools import partial
 from math import inf, isfinite
 
 import numpy as np
@@ -13,7 +15,7 @@ import numpy as np
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.variation import Genes, with_required_genes
 from islands.evolution.gp.individual import Individual, Population
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.progress import ProgressCallback, StoppedError, ignore_progress
 from islands.model.expression import Expression
 
 #: Smallest relative reduction of the squared error for which an exchange continues.
@@ -49,7 +51,8 @@ def swap_search(
     depth : int
         Number of structures that are returned for every size.
     progress : ProgressCallback
-        Called before each size.
+        Called before each size and each exchange. If it raises `StoppedError`, the search ends with the
+        structures found so far.
 
     Returns
     -------
@@ -62,14 +65,18 @@ def swap_search(
     exact = _ROUNDING * float(np.mean(evaluator.record.y**2))
     first = search.evaluate([best], inf) if best else None
     error = inf if first is None else first.fitness
-    while error > exact > 0.0 and len(best) < evaluator.settings.max_terms and not search.is_exhausted:
-        progress(f"swap search among {len(pool)} candidates: {len(best) + 1} terms", None)
-        found = search.evaluate(((*best, gene) for gene in pool if gene not in best), inf)
-        start = min((each for each in (found, search.best(len(best) + 1)) if each), key=_order, default=None)
-        if start is None or start.size <= len(best):
-            break
-        exchanged = search.exchange(start)
-        best, error = exchanged.genes, exchanged.fitness
+    with suppress(StoppedError):
+        while error > exact > 0.0 and len(best) < evaluator.settings.max_terms and not search.is_exhausted:
+            step = f"swap search among {len(pool)} candidates: {len(best) + 1} terms"
+            progress(step, None)
+            found = search.evaluate(((*best, gene) for gene in pool if gene not in best), inf)
+            start = min(
+                (each for each in (found, search.best(len(best) + 1)) if each), key=_order, default=None
+            )
+            if start is None or start.size <= len(best):
+                break
+            exchanged = search.exchange(start, partial(progress, step, None))
+            best, error = exchanged.genes, exchanged.fitness
     return search.ranked(depth)
 
 
@@ -97,11 +104,12 @@ class _SwapSearch:
             self._seen.setdefault(each.size, {}).setdefault(each.key, each)
         return min(found, key=_order, default=None)
 
-    def exchange(self, start: Individual) -> Individual:
+    def exchange(self, start: Individual, report: Callable[[], None]) -> Individual:
         """Exchange single genes, each time the best exchange of all, as long as the error falls."""
         best = start
         required = with_required_genes((), self._evaluator.settings)
         while not self.is_exhausted:
+            report()
             genes = best.genes
             free = [place for place, gene in enumerate(genes) if gene not in required]
             exchanged = self.evaluate(

@@ -6,14 +6,14 @@ models are compared on the validation data.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 from types import MappingProxyType
 from typing import Any
 
 from islands.data.dataset import Dataset
-from islands.errors import IslandsError, SettingsError
+from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.progress import ProgressCallback
+from islands.evolution.progress import ProgressCallback, StoppedError
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.facade.automatic.kind_trials import NO_DEAD_TIME, ROUNDING, KindTrials, percent, try_kinds
 from islands.facade.trials.trial_library import TrialLibrary
@@ -116,6 +116,11 @@ def choose_kind(
     progress : callable
         Called with a message and the completed fraction.
 
+    Raises
+    ------
+    StoppedError
+        ``progress`` has requested a stop; the error has the best result of the kinds fitted so far.
+
     Returns
     -------
     tuple of Choice and mapping
@@ -159,12 +164,22 @@ def _fit_promising(
     results: dict[str, SearchResult] = {}
     if len(promising) > 1:
         for kind in promising:
-            progress(f"preset auto: fit of {kind}", None)
             try:
+                progress(f"preset auto: fit of {kind}", None)
                 results[kind] = fit_kind(libraries[kind].with_delays(trials.delays))
-            except IslandsError:
+                if results[kind].search.ended_by is not None:
+                    raise StoppedError(f"preset auto: fit of {kind}")
+            except StoppedError as stopped:
+                found = min(results.values(), key=_validation_error, default=None)
+                raise StoppedError(stopped.step, found) from stopped
+            except (SettingsError, RecordError, ModelError):
                 continue  # Another kind may have a model. If none has, the search reports what is wrong.
     return results
+
+
+def _validation_error(result: SearchResult) -> float:
+    error = result.recommended.assessment.metrics["validation"]["free_run"].rmse
+    return error if isfinite(error) else inf
 
 
 def _is_bounded(result: SearchResult) -> bool:

@@ -1,8 +1,12 @@
 """Result of `fit` and `identify`."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from islands.evolution.progress import Stop, never_stop
 from islands.evolution.search_result import SearchResult
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
@@ -11,6 +15,9 @@ from islands.io.result_folder import content_sha256, write_result
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.summary_text import summary
 from islands.validation.recommendation import Recommendation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -36,8 +43,11 @@ class Result(RankedModels[FittedModel]):
         """Return a copy of the result with the duration of the search in seconds."""
         return Result(replace(self.search_result, search=replace(self.search_result.search, wall_s=seconds)))
 
-    def save(self, folder: str | Path) -> Path:
-        """Write ``result.json``, the models, the figures of the recommended model, and the texts."""
+    def save(self, folder: str | Path, stop: Stop = never_stop) -> Path:
+        """Write ``result.json``, the models, the figures of the recommended model, and the texts.
+
+        Once ``stop`` returns true, the remaining figures are left out.
+        """
         from islands.figures.model_responses import RESPONSES, draw_responses  # noqa: PLC0415
         from islands.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
         from islands.figures.style import save  # noqa: PLC0415
@@ -48,12 +58,17 @@ class Result(RankedModels[FittedModel]):
         # An earlier result in the folder may have had a loop or an equilibrium.
         for name in ("loop", *RESPONSES):
             (figures / f"{name}.svg").unlink(missing_ok=True)
-        for kind in model_figures(self.search_result):
-            save(self.best.plot(kind), figures / f"{kind}.svg")
+        drawn: dict[str, Callable[[], Figure]] = {
+            kind: partial(self.best.plot, kind) for kind in model_figures(self.search_result)
+        }
         for name in search_figures(self.search_result):
-            save(SEARCH_FIGURES[name](self.search_result), figures / f"{name}.svg")
-        for name, figure in draw_responses(self.best.model, self.search_result.split.estimation).items():
-            save(figure, figures / f"{name}.svg")
+            drawn[name] = partial(SEARCH_FIGURES[name], self.search_result)
+        for name, draw in drawn.items():
+            if not stop():
+                save(draw(), figures / f"{name}.svg")
+        if not stop():
+            for name, figure in draw_responses(self.best.model, self.search_result.split.estimation).items():
+                save(figure, figures / f"{name}.svg")
         write_result(self.search_result, folder)
         return folder
 

@@ -31,8 +31,8 @@ def test_stopped_run_keeps_the_best_and_resumes_to_the_same_result(
     assert run("r.csv", *COLUMNS, *budget, "--out", "whole")[0] == 0
     interrupted(generation, number)
     code, out, error = run("r.csv", *COLUMNS, *budget, "--out", "out")
-    assert code == 0
-    assert error == "stopped: the result is the best so far; continue with --resume out"
+    assert code == (130 if number == signal.SIGINT else 0)
+    assert error.startswith("stopped: out has the best models so far")
     assert "out/: result.json" in out
     stopped = json.loads((tmp_path / "out/result.json").read_text())
     assert stopped["search"]["generations"] == generation
@@ -54,10 +54,16 @@ def test_stopped_run_keeps_the_best_and_resumes_to_the_same_result(
 
 
 @pytest.mark.ci
-def test_ctrl_c_in_the_last_generation_has_no_effect(run, interrupted):
+def test_ctrl_c_in_the_last_generation_leaves_out_the_refinement(run, interrupted, tmp_path):
     interrupted(3)
     code, _, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out")
-    assert (code, error) == (0, "")
+    assert code == 130
+    assert error.startswith("stopped: out has the best models so far")
+    assert json.loads((tmp_path / "out/result.json").read_text())["search"]["ended_by"] == "stopped"
+    interrupted(None)
+    assert run("--resume", "out")[0] == 0
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "whole")[0] == 0
+    assert models(tmp_path / "out") == models(tmp_path / "whole")
 
 
 @pytest.mark.parametrize(
@@ -179,7 +185,7 @@ def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
 @pytest.mark.ci
 def test_wall_time_of_a_resumed_run_includes_earlier_processes(run, interrupted, tmp_path):
     interrupted(0)
-    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[0] == 0
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[0] == 130
     path = tmp_path / "out/checkpoint.json"
     document = json.loads(path.read_text())
     document["about"]["wall_s"] += 1000.0
@@ -203,7 +209,7 @@ def test_resuming_a_finished_run_gives_the_same_result(run, tmp_path):
 def test_run_can_be_resumed_from_another_folder(run, interrupted, tmp_path, monkeypatch):
     write_record(record(seed=1), "v.csv")
     interrupted(1)
-    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", "--validation", "v.csv")[0] == 0
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", "--validation", "v.csv")[0] == 130
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert run("--resume", "../out")[0] == 0
@@ -218,7 +224,7 @@ def test_changed_file_is_rejected_on_resuming(run, interrupted, tmp_path, change
         write_record(record(seed=seed), name)
     interrupted(1)
     files = "--validation", "v.csv", "--test", "t.csv"
-    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", *files)[0] == 0
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", *files)[0] == 130
     before = models(tmp_path / "out")
     with (tmp_path / changed).open("a") as stream:
         stream.write("\n")
@@ -316,7 +322,7 @@ def test_engine_may_change_on_resuming(run, engines, interrupted, tmp_path):
     requested = engines(SerialEngine())
     assert run("r.csv", *COLUMNS, *TWO, "--out", "whole")[0] == 0
     interrupted(1)
-    assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 0
+    assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 130
     interrupted(None)
     words = ("--engine", "ray", "--ray-address", "there:6379", "--wall-time", "1e9", "--verbose")
     code, out, _ = run("--resume", "out", *words)
