@@ -27,7 +27,7 @@ def test_stop_at_any_check_returns_the_models_so_far():
         return fit(record, library="polynomial", degree=1, lags=2, max_terms=3, average=1, stop=stop)
 
     never, calls = stop_at(10_000)
-    complete = {model.size: model.equation for model in run(never).models}
+    complete = {model.model.size: model.equation for model in run(never).models}
     counts = []
     for check in range(1, len(calls) + 1):
         stop, made = stop_at(check)
