@@ -42,7 +42,7 @@ _PREFIX = "islands-ray-"
 #: Lock file in such a folder, held while the instance runs.
 _LOCK = "lock"
 
-#: Folder of Ray in such a folder. Ray gives the folder that it is told to use to everyone (mode 0777), so it
+#: Folder of Ray in such a folder. Ray opens the folder that it uses to all users (mode 0777), so the folder
 #: lies in one that only the user of this process may enter.
 _SESSIONS = "r"
 

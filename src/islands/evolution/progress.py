@@ -1,12 +1,9 @@
 """Progress callbacks of long computations, and requests to stop them."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from islands.errors import IslandsError
-
-if TYPE_CHECKING:
-    from islands.evolution.search_result import SearchResult
 
 #: Returns true if the computation must end.
 Stop = Callable[[], bool]
@@ -37,17 +34,11 @@ def never_stop() -> bool:
 
 
 class StoppedError(IslandsError):
-    """A computation was stopped before it had its result.
+    """A computation was stopped before it had its result."""
 
-    Attributes
-    ----------
-    found : SearchResult or None
-        Models found so far; None if there are none.
-    """
-
-    def __init__(self, step: str, found: "SearchResult | None" = None) -> None:
+    def __init__(self, step: str) -> None:
         super().__init__(f"stopped before the first models were found ({step}): there is no model to keep")
-        self.step, self.found = step, found
+        self.step = step
 
 
 def stop_between_steps(progress: ProgressCallback, stop: Stop) -> ProgressCallback:

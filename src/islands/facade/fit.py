@@ -12,11 +12,11 @@ from islands.data.split import split_data
 from islands.evolution.progress import (
     ProgressCallback,
     Stop,
-    StoppedError,
     ignore_progress,
     never_stop,
     stop_between_steps,
 )
+from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.library_fit import FitSettings
 from islands.facade.results.result import Result
@@ -132,9 +132,7 @@ def fit(
         found = fit_chosen_library(
             record, split, library, degree, lags, constraints, delays, settings, seed, progress
         )
-    except StoppedError as stopped:
-        if stopped.found is None:
-            raise
+    except StoppedChoiceError as stopped:
         found = stopped.found
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     return Result(replace(found, settings={**found.settings, "validation": held_out}))

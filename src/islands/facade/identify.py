@@ -36,7 +36,7 @@ from islands.evolution.progress import (
 from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
-from islands.facade.automatic.kind_choice import Choice
+from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.final_models import estimate_candidates, select_final_models
@@ -68,7 +68,7 @@ _MIN_RESIDUALS = 3
 SearchCallback = Callable[[SearchState, Settings], None]
 
 
-def identify(  # noqa: PLR0912 - one branch for each point at which a stop leaves steps out
+def identify(
     record: "RecordLike",
     y: "ArrayLike | IntoSeries | None" = None,
     dt: float | None = None,
@@ -145,9 +145,7 @@ def identify(  # noqa: PLR0912 - one branch for each point at which a stop leave
     if preset == AUTO:
         try:
             preset = choose_preset(record, validation, changes, stage)
-        except StoppedError as stopped:
-            if stopped.found is None:
-                raise
+        except StoppedChoiceError as stopped:
             return Result(stopped.found)
     if isinstance(preset, Choice):
         settings = resolve_kind(preset.kind, preset.delays, with_tuples(changes))

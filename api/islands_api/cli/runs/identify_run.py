@@ -1,7 +1,6 @@
 """Run of ``islands identify`` in its folder: record, search, checkpoints, result."""
 
 import json
-from collections.abc import Generator
 from dataclasses import asdict, dataclass
 from math import inf, isfinite
 from pathlib import Path
@@ -14,14 +13,11 @@ from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.data.signal_map import match_rate
 from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
-from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch, Engine
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
-from islands.evolution.problem import Problem
-from islands.evolution.progress import Stop, StoppedError, stop_between_steps
+from islands.evolution.progress import stop_between_steps
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.facade.automatic.kind_choice import Choice, choice_from_document
+from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError, choice_from_document
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.io.checkpoints import (
     read_checkpoint,
@@ -36,6 +32,7 @@ from islands.validation.metrics import metrics
 from islands_api.cli.console import Display, compile_kernels, errors, output, print_message, progress
 from islands_api.cli.output_folder import show_result
 from islands_api.cli.recordings import Recordings
+from islands_api.cli.runs.timed_engine import TimedEngine
 from islands_api.cli.search_progress import search_progress
 from islands_api.cli.stop_requests import StopRequests, stop_requests
 from islands_service.engines import ENGINES, SERIAL_NOTICE, default_engine, has_ray
@@ -114,7 +111,7 @@ def run(
         stop_requests() as stop,
     ):
         until = inf if run_options.wall_time is None else monotonic() + run_options.wall_time
-        engine = _TimedEngine(started, until)
+        engine = TimedEngine(started, until)
         if state is None:
             # Delete the files of an earlier run.
             for name in (CHECKPOINT, HALL, TEST):
@@ -177,11 +174,10 @@ def _choose_preset(
     """Choose the preset. If a stop is requested, save the best model of the kinds that were fitted."""
     try:
         return choose_preset(data, held_out, changes, stop_between_steps(show, stop))
-    except StoppedError as stopped:
-        if stopped.found is not None:
-            islands.Result(stopped.found).save(folder, stop)
-            stop.explain(folder, "the preset was not chosen yet, so repeat the command with --force")
-            stop.exit()
+    except StoppedChoiceError as stopped:
+        islands.Result(stopped.found).save(folder, stop)
+        stop.explain(folder, "the preset was not chosen yet, so repeat the command with --force")
+        stop.exit()
         raise
 
 
@@ -277,17 +273,6 @@ class _CheckpointWriter:
             write_checkpoint(self._state.archipelago, self._folder / CHECKPOINT, header)
             took = monotonic() - now
             self._next = now + took + max(CHECKPOINT_SECONDS, took / CHECKPOINT_FRACTION)
-
-
-class _TimedEngine:
-    """Engine whose search ends at a time; the steps after the search are not left out."""
-
-    def __init__(self, engine: Engine, until: float) -> None:
-        self._engine, self._until = engine, until
-
-    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
-        """Run the engine."""
-        return self._engine.run(problem, start, lambda: stop() or monotonic() > self._until)
 
 
 def load_run(folder: Path) -> tuple[dict[str, Any], SearchState, float]:

@@ -28,6 +28,20 @@ _CLOSE = 1.25
 FitKind = Callable[[TrialLibrary], SearchResult]
 
 
+class StoppedChoiceError(StoppedError):
+    """The choice was stopped after the fit of one kind or more.
+
+    Attributes
+    ----------
+    found : SearchResult
+        Result of the kind with the least error on the validation data.
+    """
+
+    def __init__(self, step: str, found: SearchResult) -> None:
+        super().__init__(step)
+        self.found = found
+
+
 @dataclass(frozen=True, slots=True)
 class Choice:
     """Kind of record and dead times that the preset ``auto`` chose.
@@ -119,7 +133,7 @@ def choose_kind(
     Raises
     ------
     StoppedError
-        ``progress`` has requested a stop; the error has the best result of the kinds fitted so far.
+        ``progress`` has requested a stop. If a kind was fitted before, the error is a `StoppedChoiceError`.
 
     Returns
     -------
@@ -170,8 +184,10 @@ def _fit_promising(
                 if results[kind].search.ended_by is not None:
                     raise StoppedError(f"preset auto: fit of {kind}")
             except StoppedError as stopped:
-                found = min(results.values(), key=_validation_error, default=None)
-                raise StoppedError(stopped.step, found) from stopped
+                if not results:
+                    raise
+                found = min(results.values(), key=_validation_error)
+                raise StoppedChoiceError(stopped.step, found) from stopped
             except (SettingsError, RecordError, ModelError):
                 continue  # Another kind may have a model. If none has, the search reports what is wrong.
     return results

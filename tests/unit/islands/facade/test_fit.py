@@ -314,7 +314,14 @@ def test_progress_fractions_are_monotonic(samples):
     parts = {"record": tank(samples), "validation": tank(100, seed=1)}
     islands.fit(**parts, library="polynomial", progress=lambda *news: reports.append(news))
     texts, shares = zip(*reports, strict=True)
-    stages = ("sampling rate", "inner products", "best subsets", "swap search", "model of 1")
+    stages = (
+        "sampling rate",
+        "inner products",
+        "best subsets",
+        "swap search",
+        "estimation of",
+        "prediction bands",
+    )
     assert list(dict.fromkeys(stage for text in texts for stage in stages if stage in text)) == list(stages)
     shares = [share for share in shares if share is not None]
     assert shares[0] == 0.0

@@ -4,23 +4,19 @@ Each test starts processes with a small module of kernels. They import a copy of
 the whole package takes a second to import. Most are forks of one process that has loaded Numba.
 """
 
-import json
 import os
-import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 import islands
 from support.forks import Fork, fork_server
+from support.kernel_processes import Start, get_output, process_starter, start_interpreter, wait_for_file
 
 pytestmark = pytest.mark.ci
-
-Start = Callable[..., "subprocess.Popen[str] | Fork"]
 
 SOURCE = Path(islands.__file__).parent / "kernels" / "jit_cache.py"
 
@@ -110,28 +106,6 @@ def sources(tmp_path: Path) -> None:
     (tmp_path / "toys.py").write_text(KERNELS)
 
 
-@contextmanager
-def process_starter(folder: Path, begin: Callable[..., "subprocess.Popen[str] | Fork"]) -> Iterator[Start]:
-    """Yield a function that starts a process in a folder; processes still running at the end are killed."""
-    running = []
-
-    def start(code: str, *arguments: str, **variables: str) -> "subprocess.Popen[str] | Fork":
-        environment = {name: text for name, text in os.environ.items() if not name.startswith("NUMBA_")}
-        environment |= {"PYTHONPATH": str(folder), "ISLANDS_CACHE_DIR": str(folder / "cache")} | variables
-        running.append(begin(code, arguments, environment, folder))
-        return running[-1]
-
-    yield start
-    for process in running:
-        process.kill()
-        process.communicate()
-
-
-def start_interpreter(code: str, arguments: Sequence[str], variables: dict[str, str], folder: Path):
-    command, pipe = [sys.executable, "-W", "error", "-c", code, *arguments], subprocess.PIPE
-    return subprocess.Popen(command, cwd=folder, env=variables, stdout=pipe, stderr=pipe, text=True)
-
-
 @pytest.fixture
 def start(tmp_path: Path, sources: None, forks: Callable[..., Fork]) -> Iterator[Start]:
     """Yield a function that starts a fork of a process that has loaded Numba."""
@@ -144,21 +118,6 @@ def start_new(tmp_path: Path, sources: None) -> Iterator[Start]:
     """Yield a function that starts a new interpreter."""
     with process_starter(tmp_path, start_interpreter) as start:
         yield start
-
-
-def get_output(process):
-    """Return the JSON output of a process, which must have succeeded with an empty stderr."""
-    out, errors = process.communicate(timeout=120)
-    assert process.returncode == 0, errors
-    assert not errors
-    return json.loads(out)
-
-
-def wait_for_file(path: Path, process) -> None:
-    """Wait for a file that a process writes."""
-    while not path.exists():
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.005)
 
 
 def stored_kernels(folder: Path) -> set[str]:

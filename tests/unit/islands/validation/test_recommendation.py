@@ -146,7 +146,7 @@ def test_a_model_that_only_warms_up_over_difficult_samples_is_not_better():
 
 
 @pytest.mark.parametrize("count", [2, 3, 10])
-def test_means_of_samples_are_compared_with_the_samples_of_the_same_part_of_the_data(count):
+def test_means_are_compared_with_the_samples_of_the_same_part_of_the_data(count):
     errors = np.repeat(np.arange(1.0, 24.0), 3 * count)
     means = errors.reshape(-1, count).mean(axis=1)
     blocks = compare_blocks(from_sample(9 * count, errors), from_sample(3, means))

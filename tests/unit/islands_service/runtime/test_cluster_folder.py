@@ -9,7 +9,7 @@ import pytest
 from islands_service.runtime import cluster as module
 
 #: User without rights.
-NOBODY = 65534
+OTHER_USER = 65534
 
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="another user is only available to root")
 
@@ -32,13 +32,13 @@ def short_folder():
     module.shutil.rmtree(folder)
 
 
-def as_nobody(*command: object) -> int:
+def as_other_user(*command: object) -> int:
     """Run a command of the system as another user and return its exit code."""
     return subprocess.run(
         list(map(str, command)),
         check=False,
-        user=NOBODY,
-        group=NOBODY,
+        user=OTHER_USER,
+        group=OTHER_USER,
         extra_groups=[],
         cwd="/",
         stderr=subprocess.DEVNULL,
@@ -55,11 +55,11 @@ def test_another_user_reaches_nothing_that_ray_writes(parent):
         sockets = {path.name for path in folder.rglob("sockets/*")}
         assert sockets == {"plasma_store", "raylet"}
         for path in (folder, *folder.glob("*/*"), *folder.rglob("sockets/*")):
-            assert as_nobody("test", "-r", path) == as_nobody("test", "-w", path) == 1, path
+            assert as_other_user("test", "-r", path) == as_other_user("test", "-w", path) == 1, path
         (socket,) = folder.rglob("sockets/plasma_store")
-        assert as_nobody("mv", socket, parent / "taken") != 0
-        assert as_nobody("mv", folder, parent / "taken") != 0
-        assert as_nobody("test", "-r", parent) == 0
+        assert as_other_user("mv", socket, parent / "taken") != 0
+        assert as_other_user("mv", folder, parent / "taken") != 0
+        assert as_other_user("test", "-r", parent) == 0
         assert socket.exists()
         # Ray writes nothing elsewhere.
         assert {path for path in Path("/tmp").iterdir() if path.name.startswith("ray")} <= before[1]
@@ -81,7 +81,7 @@ def test_folder_of_a_killed_run_is_removed(tmp_path):
     assert list(tmp_path.iterdir()) == [elsewhere]
 
 
-@pytest.mark.parametrize("owner", [pytest.param(NOBODY, marks=needs_root), None], ids=["other", "link"])
+@pytest.mark.parametrize("owner", [pytest.param(OTHER_USER, marks=needs_root), None], ids=["other", "link"])
 def test_planted_folder_is_not_opened(tmp_path, owner):
     target = tmp_path / "precious"
     target.mkdir(mode=0o700)

@@ -5,12 +5,12 @@ from math import inf, nextafter
 
 import pytest
 
-from islands.errors import SettingsError
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.history import HistoryPoint
 from islands.evolution.island import StepInfo
 from islands.evolution.presets import resolve_settings
+from islands.evolution.progress import StoppedError
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from support.identifications import BUDGET, RecordingEngine, identify, record_states
 
@@ -167,15 +167,16 @@ def test_search_stopped_within_an_epoch_keeps_the_previous_epoch(data, states):
     assert resumed.search_result.search.history == states[-1].history
 
 
-def test_search_stopped_after_its_last_epoch_has_used_its_budget(data, states):
+def test_stop_after_the_last_epoch_leaves_out_the_steps_after_the_search(data, states):
     seen = []
     found = identify(data, **BUDGET, seed=5, progress=record_states(seen), stop=lambda: len(seen) == 5)
     assert seen == states
-    assert found.search_result.search.ended_by == "generations"
+    assert found.search_result.search.ended_by == "stopped"
+    assert found.search_result.ensemble is None
 
 
 def test_search_stopped_before_its_first_population_raises_an_error(data):
-    with pytest.raises(SettingsError, match="stopped before the first populations were evaluated"):
+    with pytest.raises(StoppedError, match="there is no model to keep"):
         identify(data, **BUDGET, progress=pytest.fail, stop=lambda: True)
 
 

@@ -15,6 +15,7 @@ from islands.evolution.search_state import SearchState
 from islands.io.checkpoints import read_checkpoint, state_document, write_checkpoint
 from islands.io.records import write_record
 from islands_api.cli.runs import identify_run as command
+from islands_api.cli.runs import timed_engine
 from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models, record, refused
 
 # Stopped and resumed.
@@ -124,7 +125,8 @@ def test_failing_engine_loses_no_finished_epoch(run, engines, tmp_path):
 def test_checkpoints_are_written_every_ten_seconds(run, watched, monkeypatch, tmp_path):
     """An epoch takes six seconds of the replaced clock."""
     clock, found = [0.0], []
-    monkeypatch.setattr(command, "monotonic", lambda: clock[0])
+    for module in (command, timed_engine):
+        monkeypatch.setattr(module, "monotonic", lambda: clock[0])
 
     def watch(state):
         clock[0] += 6.0
@@ -162,7 +164,8 @@ def test_slow_checkpoints_are_written_less_often(run, watched, monkeypatch, tmp_
 @pytest.mark.ci
 def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
     clock = [50.0]
-    monkeypatch.setattr(command, "monotonic", lambda: clock[0])
+    for module in (command, timed_engine):
+        monkeypatch.setattr(module, "monotonic", lambda: clock[0])
 
     def watch(state):
         clock[0] += 6.0
