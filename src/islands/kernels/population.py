@@ -171,7 +171,7 @@ def evaluate(
         results.status[index] = status
 
 
-@kernel(forceinline=True)
+@kernel
 def _select_terms(terms, size, pruned, context, matrix, positions):
     """Prune an individual and leave out terms whose parameter must be zero; return the size and the status.
 
@@ -209,7 +209,7 @@ def _prune_increments(terms, context, matrix, positions):
     return prune_increments(matrix, size, reduction, previous, context.tolerance, positions)
 
 
-@kernel(forceinline=True)
+@kernel
 def _estimate(chosen, context, matrix, operand_index, theta):
     """Estimate the parameters of the chosen terms under the constraint; return the status.
 
