@@ -2,21 +2,33 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo collect test ci nightly soak fuzz load lint bench docs sbom licences audit wheel wheel-matrix clean
+# INSTALL_OPTIONS=--pip installs everything by pip instead of uv.
+INSTALL := $(PYTHON) deploy/packages/install.py .venv $(INSTALL_OPTIONS)
 
+.PHONY: help setup demo collect test ci nightly soak fuzz load lint bench docs lock sbom licences audit wheel wheel-matrix clean
+
+# The first target, so that `make` alone prints it.
+help:
+	@echo 'make demo     set up, identify a record, show the result: about a minute on a fresh machine with two cores'
+	@echo 'make test     the tests: about three minutes'
+	@echo 'make setup    the environment .venv with what runs: Ray and the service'
+	@echo 'make lint     format, types, imports     make docs   the site     make bench   speed on this machine'
+	@echo 'CONTRIBUTING.md describes the others.'
+
+# What runs: core, Ray, service. Other targets add their groups of packages when they are first called.
 setup: .venv/ready
 
-.venv/ready: requirements.lock pyproject.toml
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "islands needs Python 3.11 or newer: make PYTHON=python3.11")'
-	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --disable-pip-version-check --no-compile --require-hashes -r requirements.lock
-	-$(BIN)/python -m compileall -qq -j 0 .venv/lib
-	$(BIN)/pip install --disable-pip-version-check --no-build-isolation --no-deps -e .
-	$(BIN)/python -c 'from islands.facade.warm_up import warm_up; warm_up()'
-	touch $@
+.venv/ready: requirements.lock pyproject.toml deploy/packages/install.py
+	@$(INSTALL) --extra ray --extra service --group build
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
+	@touch $@
+
+.venv/ready-%: .venv/ready
+	@$(INSTALL) --extra all --group $*
+	@touch $@
 
 demo: setup
-	$(BIN)/islands demo --out demo-out
+	@$(BIN)/islands demo --out demo-out
 
 # By file, since fixtures of modules are costly, and in the order of collection, which has the long files first.
 PYTEST := $(BIN)/pytest --costs --dist loadfile --no-loadscope-reorder
@@ -25,42 +37,42 @@ PYTEST := $(BIN)/pytest --costs --dist loadfile --no-loadscope-reorder
 unexport PYTHONDONTWRITEBYTECODE
 
 # Compile the sources and rewrite the assertions of all tests once. Otherwise each worker of the first run does.
-collect: setup
+collect: .venv/ready-test
 	$(BIN)/pytest --collect-only -q >/dev/null
 
 # Three workers on two cores: some tests wait for other processes.
-test: setup
+test: .venv/ready-test .venv/ready-lint .venv/ready-docs
 	$(PYTEST) -n 3
 
 # What CI runs besides `make test`: browser, PostgreSQL, kills of a coordinator and of an island. The tests of the
 # wheel need one, which .ci/run builds first.
-ci: setup
+ci: .venv/ready-test .venv/ready-lint .venv/ready-docs .venv/ready-packages
 	$(PYTEST) -n 2 -m "ci and not nightly" --ignore tests/acceptance/test_installed_wheel.py
 
 # Another order and other kills every day of the year.
 DAY = $(shell date +%j)
 
 # Everything else: the remaining slow tests, the properties with many examples, 500 random kills, and mutated files.
-nightly: setup
+nightly: .venv/ready-test .venv/ready-lint .venv/ready-docs .venv/ready-packages
 	$(PYTEST) -n 2 --timeout 1200 --random-order --random-order-seed $(DAY) \
 		--hypothesis-profile thorough -m "nightly or hypothesis"
 	$(MAKE) soak fuzz
 
 # 500 random kills and suspensions of a service on each database: no job may be lost or duplicated, and results must
 # be identical.
-soak: setup
+soak: .venv/ready-test
 	$(BIN)/python benchmarks/service_soak.py --kills 500 --seed $(DAY)
 	$(BIN)/python benchmarks/service_soak.py --kills 500 --seed $(DAY) --database postgresql
 
 # Five minutes of mutated files for all readers of uploads.
-fuzz: setup
+fuzz: .venv/ready-test
 	$(BIN)/python benchmarks/fuzz_readers.py --seconds 300 --seed $(DAY)
 
 # Figures of a service under load, on a machine that should be otherwise idle.
-load: setup
+load: .venv/ready-test
 	$(BIN)/python benchmarks/service_load.py --repeat 5
 
-lint: setup
+lint: .venv/ready-lint
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -70,19 +82,24 @@ bench: setup
 	$(BIN)/islands bench
 
 # The theme prints a notice about a later version of MkDocs, which is not installed.
-docs: setup
+docs: .venv/ready-docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir site
 
-# What the image contains, in CycloneDX. The file depends on deploy/requirements.lock only.
-sbom: setup
+# Pin the newest versions that pyproject.toml admits and that the lock file does not pin yet; LOCK_OPTIONS=--upgrade for all.
+lock: setup
+	$(BIN)/uv pip compile pyproject.toml --quiet --all-extras --group build --group docs --group lint --group packages \
+		--group test --generate-hashes --custom-compile-command 'make lock' --output-file requirements.lock $(LOCK_OPTIONS)
+
+# What the image contains, in CycloneDX. The file depends on requirements.lock and pyproject.toml only.
+sbom: .venv/ready-packages
 	$(BIN)/python deploy/packages/write_sbom.py --output dist/islands-sbom.json
 
 # Every locked package has a licence of deploy/packages/licences.toml.
-licences: setup
+licences: .venv/ready-packages .venv/ready-test .venv/ready-lint .venv/ready-docs
 	$(BIN)/python deploy/packages/check_licences.py
 
 # Known vulnerabilities of the locked packages. Exit code 2 of the script: not checked, for lack of a service.
-audit: setup
+audit: .venv/ready-packages
 	$(BIN)/python deploy/packages/audit_packages.py
 
 wheel: setup

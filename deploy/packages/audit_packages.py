@@ -13,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from locked_packages import ALL, IMAGE, LockedPackage, find_program, normalise, read_lock
+from locked_packages import LOCK, LockedPackage, find_program, normalise, read_image, read_lock
 
 
 def query(lock: Path, options: list[str]) -> list[dict]:
@@ -76,10 +76,11 @@ def report(packages: dict[str, LockedPackage], image: set[str], entries: list[di
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--lock", type=Path, default=ALL)
+    parser.add_argument("--lock", type=Path, default=LOCK)
     arguments, options = parser.parse_known_args()
     entries = query(arguments.lock, options)
-    sys.exit(report(read_lock(arguments.lock), set(read_lock(IMAGE)), entries))
+    packages = read_lock(arguments.lock)
+    sys.exit(report(packages, set(read_image(packages)), entries))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Check that every locked package has a licence of `licences.toml`; print each that has not.
 
-    python deploy/packages/check_licences.py [--policy FILE] [--image LOCK] [--all LOCK]
+    python deploy/packages/check_licences.py [--policy FILE] [--lock LOCK]
 
 Reads the metadata of the installed packages only; nothing leaves the machine.
 """
@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from locked_packages import ALL, IMAGE, normalise, read_licences, read_lock
+from locked_packages import LOCK, normalise, read_image, read_licences, read_lock
 
 
 def find_faults(licences: dict[str, str], image: set[str], policy: dict[str, Any]) -> list[str]:
@@ -49,11 +49,10 @@ def find_faults(licences: dict[str, str], image: set[str], policy: dict[str, Any
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--policy", type=Path, default=Path(__file__).with_name("licences.toml"))
-    parser.add_argument("--image", type=Path, default=IMAGE, help="lock file of the image")
-    parser.add_argument("--all", type=Path, default=ALL, help="lock file of all packages")
+    parser.add_argument("--lock", type=Path, default=LOCK)
     arguments = parser.parse_args()
-    image = read_lock(arguments.image)
-    packages = read_lock(arguments.all) | image
+    packages = read_lock(arguments.lock)
+    image = read_image(packages)
     faults = find_faults(
         read_licences(packages), set(image), tomllib.loads(arguments.policy.read_text("utf-8"))
     )

@@ -1,20 +1,24 @@
-"""Packages of a lock file of pip-compile, and the licences that their installed metadata states."""
+"""Packages of the lock file, those of the image, and the licences that their installed metadata states."""
 
 import json
 import re
 import subprocess
 import sys
 import sysconfig
+import tomllib
+from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
+from packaging.requirements import Requirement
+
 ROOT = Path(__file__).parents[2]
 
-#: Lock file of everything: the packages of the service, of all extras, and of the development tools.
-ALL = ROOT / "requirements.lock"
+#: Lock file: the packages of the service, of all extras, and of the development tools.
+LOCK = ROOT / "requirements.lock"
 
-#: Lock file of what the image contains.
-IMAGE = ROOT / "deploy/requirements.lock"
+#: Extra of what the image contains.
+IMAGE_EXTRA = "server"
 
 _ENTRY = re.compile(r"^([\w.-]+)==(\S+)[^\n]*\n((?:[ #][^\n]*\n?)*)", re.MULTILINE)
 
@@ -54,6 +58,34 @@ def read_lock(path: Path) -> dict[str, LockedPackage]:
     return packages
 
 
+def read_image(packages: dict[str, LockedPackage]) -> dict[str, LockedPackage]:
+    """Return those of the locked packages that the image contains.
+
+    They follow from the requirements that the installed packages state, since the lock file does not tell
+    which extra of a package requires another one.
+    """
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    extras = {extra: list(map(Requirement, each)) for extra, each in project["optional-dependencies"].items()}
+    own = normalise(project["name"])
+    left = [*map(Requirement, project["dependencies"]), Requirement(f"{own}[{IMAGE_EXTRA}]")]
+    found: set[tuple[str, str]] = set()
+    while left:
+        requirement = left.pop()
+        name = normalise(requirement.name)
+        for extra in {"", *requirement.extras}:
+            if (name, extra) not in found:
+                found.add((name, extra))
+                left += extras.get(extra, []) if name == own else _find_requirements(name, extra)
+    names = {name for name, _ in found}
+    return {name: package for name, package in packages.items() if name in names}
+
+
+def _find_requirements(name: str, extra: str) -> list[Requirement]:
+    """Return what an installed package requires for an extra, or without one."""
+    requirements = map(Requirement, metadata.requires(name) or ())
+    return [each for each in requirements if each.marker is None or each.marker.evaluate({"extra": extra})]
+
+
 def find_program(name: str) -> str:
     """Return the path of a program of this environment."""
     return str(Path(sysconfig.get_path("scripts")) / name)
@@ -78,5 +110,5 @@ def read_licences(packages: dict[str, LockedPackage]) -> dict[str, str]:
         if found.get(name, {}).get("Version") != package.version
     ]
     if absent:
-        sys.exit(f"not installed in the locked version: {', '.join(absent)}; run: make setup")
+        sys.exit(f"not installed in the locked version: {', '.join(absent)}; run: make licences")
     return {name: found[name]["License"] for name in packages}

@@ -2,8 +2,8 @@
 
     python deploy/packages/write_sbom.py --output dist/islands-sbom.json
 
-The packages are those of `deploy/requirements.lock`. The same lock gives the same file, byte for byte: it
-contains no date and no random number. Nothing leaves the machine.
+The packages are those of `requirements.lock` that the extra of the image requires. The same lock gives the
+same file, byte for byte: it contains no date and no random number. Nothing leaves the machine.
 """
 
 import argparse
@@ -16,13 +16,13 @@ from typing import Any
 from cyclonedx.schema import SchemaVersion
 from cyclonedx.spdx import is_expression, is_supported_id
 from cyclonedx.validation.json import JsonStrictValidator
-from locked_packages import IMAGE, ROOT, read_licences, read_lock
+from locked_packages import LOCK, ROOT, read_image, read_licences, read_lock
 
 
 def make_document(lock: Path) -> dict[str, Any]:
     """Return the bill of materials of a lock file."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    packages = read_lock(lock)
+    packages = read_image(read_lock(lock))
     licences = read_licences(packages)
     references = {"islands": "root-component"}
     references |= {name: f"pkg:pypi/{name}@{package.version}" for name, package in packages.items()}
@@ -79,7 +79,7 @@ def describe_licence(licence: str) -> dict[str, Any]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, required=True)
-    parser.add_argument("--lock", type=Path, default=IMAGE)
+    parser.add_argument("--lock", type=Path, default=LOCK)
     arguments = parser.parse_args()
     document = make_document(arguments.lock)
     text = json.dumps(document, indent=1, sort_keys=True) + "\n"

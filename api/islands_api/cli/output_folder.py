@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from islands.facade.results.result import Result
 
 
+#: Files of a result in its folder.
+RESULT_FILES = "result.json, models/, figures/, summary.txt, method.txt"
+
+
 def check_folder(folder: Path, force: bool, result: str = "result.json") -> None:
     """Check that a result can be written to a folder without overwriting another result.
 
@@ -32,4 +36,4 @@ def check_folder(folder: Path, force: bool, result: str = "result.json") -> None
 def show_result(result: "Result", folder: Path) -> None:
     """Print the summary and the files of a result."""
     output.print(str(result), markup=False)
-    output.print(f"{folder}/: result.json, models/, figures/, summary.txt, method.txt", markup=False)
+    output.print(f"{folder}/: {RESULT_FILES}", markup=False)
