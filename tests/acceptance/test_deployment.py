@@ -159,7 +159,7 @@ def test_the_ray_cluster_is_accepted_and_an_unknown_field_is_found(tmp_path):
 
     assert is_known(document["spec"])
     assert not is_known({**document["spec"], "enableAutoscaling": True})
-    packages = (DEPLOY / "requirements.lock").read_text()
+    packages = (ROOT / "requirements.lock").read_text()
     assert f"\nray=={document['spec']['rayVersion']} " in packages
     for number, spec in enumerate(pod_specs(document)):
         pod = {"apiVersion": "v1", "kind": "Pod", "metadata": {"name": f"ray-{number}"}, "spec": spec}

@@ -16,7 +16,7 @@ from support.service import csv, run_identification, spec
 pytestmark = [
     pytest.mark.ci,
     pytest.mark.skipif(
-        find_spec("openapi_python_client") is None, reason="needs openapi-python-client: run make setup"
+        find_spec("openapi_python_client") is None, reason="needs openapi-python-client: run make test"
     ),
 ]
 
