@@ -1,18 +1,26 @@
 """Compilation of all kernels before the first use."""
 
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from multiprocessing import cpu_count
 
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
+from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
+from islands.estimation.structure_selection.certificate import certify
 from islands.facade.fit import fit
 from islands.facade.identify import identify
-from islands.kernels.jit_cache import ready
+from islands.kernels.jit_cache import cache_folder, ready
 from islands.model.expression import Lagged
 from islands.model.model import make_model
 from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.coupled_model import CoupledModel
+from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
+from islands.systems.published_models import PUBLISHED
 
 
 def warm_up(report: Callable[[str], None] = print) -> bool:
@@ -33,19 +41,61 @@ def warm_up(report: Callable[[str], None] = print) -> bool:
 
 def _use_all_kernels() -> None:
     """Call every kernel once with each of its argument types."""
-    whole = make_record("bouc-wen-piezo", "authors", "estimation")
-    record = Dataset(whole.u[:1200], whole.y[:1200], whole.dt)
+    with _second_process():
+        record = _make_record()
+        for constraints in ("none", "hysteresis"):
+            identify(
+                record,
+                preset="hysteresis",
+                population=10,
+                generations=1,
+                max_terms=3,
+                initial_terms=(1, 3),
+                library_degree=1,
+                shooting=100,
+                constraints=constraints,
+            )
     fit(record, library="phi-polynomial", max_terms=3)
-    for constraints in ("none", "hysteresis"):
-        identify(
-            record,
-            preset="hysteresis",
-            population=10,
-            generations=2,
-            shooting=100,
-            constraints=constraints,
-        )
     _simulate_two_outputs(record)
+
+
+def use_kernels_of_one_model() -> None:
+    """Call the kernels that the evaluation of populations calls last, or not at all."""
+    record = _make_record()
+    model = PUBLISHED["13"].model
+    free_run(model, record)
+    _simulate_two_outputs(record)
+    problem = make_selection_problem(model.regressors, record, "none")
+    if isinstance(problem, SelectionProblem):
+        select_forward(problem, 3)
+        certify(problem, 3, 100)
+
+
+@contextmanager
+def _second_process() -> Iterator[None]:
+    """Compile the kernels of one model in another process during the context, if there is a core for it.
+
+    The evaluation of populations is compiled in this process: pruning, estimation, and simulation last. By
+    then the other process has stored the simulation, which is loaded. What the other process does not
+    store, since it fails or is late, is compiled by this one.
+    """
+    if cpu_count() == 1 or cache_folder() is None:
+        yield
+        return
+    code = f"from {__name__} import {use_kernels_of_one_model.__name__} as use; use()"
+    nowhere = subprocess.DEVNULL
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(command, stdin=nowhere, stdout=nowhere, stderr=nowhere) as process:
+        try:
+            yield
+            process.wait()
+        finally:
+            process.kill()
+
+
+def _make_record() -> Dataset:
+    whole = make_record("bouc-wen-piezo", "authors", "estimation")
+    return Dataset(whole.u[:1200], whole.y[:1200], whole.dt)
 
 
 def _simulate_two_outputs(record: Dataset) -> None:
