@@ -86,7 +86,9 @@ docs: .venv/ready-docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir site
 
 # Pin the newest versions that pyproject.toml admits and that the lock file does not pin yet; LOCK_OPTIONS=--upgrade for all.
-lock: setup
+# The tools alone are installed before, since the lock file may not agree with pyproject.toml yet.
+lock:
+	@$(INSTALL) --tools --group build
 	$(BIN)/uv pip compile pyproject.toml --quiet --all-extras --group build --group docs --group lint --group packages \
 		--group test --generate-hashes --custom-compile-command 'make lock' --output-file requirements.lock $(LOCK_OPTIONS)
 

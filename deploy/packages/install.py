@@ -67,7 +67,10 @@ def run(command: list[str | Path], title: str) -> None:
     """
     began, lines = time.monotonic(), []
     show(title)
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+    # uv reads its settings from the project of the working folder.
+    with subprocess.Popen(
+        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
         for line in process.stdout or ():
             lines.append(line)
             if not line.startswith(" + "):
@@ -97,9 +100,10 @@ def main() -> None:
     arguments = parser.parse_args()
     if sys.version_info < PYTHON:
         sys.exit(f"islands needs Python 3.11 or newer, not {sys.version.split()[0]}: make PYTHON=python3.11")
-    python = create_environment(arguments.environment)
+    python = create_environment(arguments.environment.absolute())
     if arguments.pip:
-        options = ["--require-hashes", "--disable-pip-version-check", "--no-compile"]
+        # The lock file is complete. Without --no-deps pip refuses what [tool.uv] overrides.
+        options = ["--require-hashes", "--no-deps", "--disable-pip-version-check", "--no-compile"]
         run([python, "-m", "pip", "install", *options, "--requirement", LOCK], "installing all packages")
         return
     chosen = [f"--group={PROJECT}:{name}" for name in arguments.group]
