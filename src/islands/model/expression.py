@@ -198,3 +198,15 @@ def content(expression: Expression) -> tuple[object, ...]:
             return (2, samples, content(argument))
         case Constant(number):
             return (3, number)
+
+
+def replace_leaves(expression: Expression, transform: Callable[[Lagged], Expression]) -> Expression:
+    """Return an expression in which every signal is replaced by what ``transform`` returns for it."""
+    match expression:
+        case Lagged():
+            return transform(expression)
+        case Shift(samples, argument):
+            return Shift(samples, replace_leaves(argument, transform))
+        case Apply(primitive, arguments):
+            return Apply(primitive, tuple(replace_leaves(argument, transform) for argument in arguments))
+    return expression

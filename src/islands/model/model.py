@@ -1,12 +1,12 @@
 """NARX model, linear in its parameters: y(k) = theta_1 psi_1 + theta_2 psi_2 + ... (equation (10))."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
-from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
+from islands.model.expression import Apply, Constant, Expression, Lagged, replace_leaves
 from islands.model.primitives import SUB
 from islands.model.regressor import Regressor, regressor
 
@@ -175,21 +175,9 @@ def measured_model(model: Model) -> Model:
         return Apply(SUB, (leaf, Constant(offset))) if offset else leaf
 
     terms = [
-        (_replace_leaves(item.expression, subtract), parameter)
+        (replace_leaves(item.expression, subtract), parameter)
         for item, parameter in zip(model.regressors, model.parameters, strict=True)
     ]
     terms.append((Constant(1.0), done.output_offset))
     measured = make_model(terms, model.input_names, model.output_name, model.dt)
     return replace(measured, average=model.average, preprocessing=rate)
-
-
-def _replace_leaves(expression: Expression, transform: Callable[[Lagged], Expression]) -> Expression:
-    """Return an expression in which every signal is replaced by what ``transform`` returns for it."""
-    match expression:
-        case Lagged():
-            return transform(expression)
-        case Shift(samples, argument):
-            return Shift(samples, _replace_leaves(argument, transform))
-        case Apply(primitive, arguments):
-            return Apply(primitive, tuple(_replace_leaves(argument, transform) for argument in arguments))
-    return expression

@@ -11,8 +11,7 @@ from islands_api.web.job_submission import describe_job, describe_jobs
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import Cursor, JSONRoute, Limit, decode_cursor, encode_cursor
 from islands_api.web.responses import JSONDocument
-from islands_api.web.routes.jobs import Id
-from islands_service.domain.job import JobState
+from islands_api.web.routes.jobs import Id, StateFilter
 
 router = APIRouter(
     prefix="/v1/admin/jobs", tags=["administration"], responses=RESPONSES, route_class=JSONRoute
@@ -26,9 +25,7 @@ async def jobs(
     owner: Annotated[
         str | None, Query(min_length=1, max_length=64, description="Only jobs of this owner.")
     ] = None,
-    job_state: Annotated[
-        JobState | None, Query(alias="state", description="Only jobs in this state.")
-    ] = None,
+    job_state: StateFilter = None,
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> Any:

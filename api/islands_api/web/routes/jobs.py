@@ -58,6 +58,10 @@ _MIN_POINTS = 50
 _MAX_ISLAND_ERRORS = 100_000
 
 
+#: Query parameter of lists of jobs.
+StateFilter = Annotated[JobState | None, Query(alias="state", description="Only jobs in this state.")]
+
+
 @router.post("", status_code=202, response_model=JobView, responses=ACCEPTED_RESPONSES)
 async def submit(
     request: JobRequest, caller: Writer, state: AppStateDep, idempotency_key: IdempotencyKey = None
@@ -73,9 +77,7 @@ async def submit(
 async def jobs(
     caller: Reader,
     state: AppStateDep,
-    job_state: Annotated[
-        JobState | None, Query(alias="state", description="Only jobs in this state.")
-    ] = None,
+    job_state: StateFilter = None,
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> Any:

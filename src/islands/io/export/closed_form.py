@@ -22,7 +22,7 @@ from islands.io.simulator_spec.specification import (
     ModelSpec,
     SimulationSpec,
 )
-from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
+from islands.model.expression import Apply, Constant, Expression, Lagged, replace_leaves
 from islands.model.model import Model, make_model, measured_model
 from islands.model.primitives import MUL, PRIMITIVES, SUB
 
@@ -125,7 +125,7 @@ def _apply_effect(model: Model, effect: EffectSpec, scales: ScalesSpec) -> Model
     if effect.name in _INPUT_MAPS:
         transform = _INPUT_MAPS[effect.name]
         found = [
-            (_replace_leaves(each, 1, lambda leaf: transform(leaf, values, scales)), parameter)
+            (_replace_channel(each, 1, lambda leaf: transform(leaf, values, scales)), parameter)
             for each, parameter in terms
         ]
     elif effect.name in _OUTPUT_LINES:
@@ -146,20 +146,11 @@ def _move_output(terms: _Terms, factor: float, constant: float) -> _Terms:
         if isinstance(each, Lagged) and each.channel == 0:
             found += [(each, parameter), (Constant(1.0), -parameter * constant)]
         else:
-            found.append((_replace_leaves(each, 0, undo), factor * parameter))
+            found.append((_replace_channel(each, 0, undo), factor * parameter))
     return found
 
 
-def _replace_leaves(
+def _replace_channel(
     expression: Expression, channel: int, transform: Callable[[Expression], Expression]
 ) -> Expression:
-    match expression:
-        case Lagged(read, _) if read == channel:
-            return transform(expression)
-        case Shift(samples, argument):
-            return Shift(samples, _replace_leaves(argument, channel, transform))
-        case Apply(primitive, arguments):
-            return Apply(
-                primitive, tuple(_replace_leaves(argument, channel, transform) for argument in arguments)
-            )
-    return expression
+    return replace_leaves(expression, lambda leaf: transform(leaf) if leaf.channel == channel else leaf)
