@@ -1,4 +1,4 @@
-"""Structure of the repository: imports, packages, names and sizes of files."""
+"""Structure of the repository: imports, packages and names."""
 
 import ast
 import subprocess
@@ -6,7 +6,6 @@ import sys
 import sysconfig
 from collections import defaultdict
 from pathlib import Path
-from statistics import median
 
 import pytest
 
@@ -41,18 +40,6 @@ def test_every_module_has_a_docstring() -> None:
         assert path.read_text().lstrip("r").startswith('"""'), path
 
 
-def test_source_files_are_below_the_length_limit() -> None:
-    long = {str(path): count for path in SOURCES if (count := len(path.read_text().splitlines())) > 300}
-    assert not long
-
-
-def test_most_source_files_are_above_the_length_minimum() -> None:
-    lengths = [len(path.read_text().splitlines()) for path in SOURCES if "migrations" not in path.parts]
-    lengths = [length for length in lengths if length > 5]
-    assert median(lengths) >= 105
-    assert sum(length < 40 for length in lengths) <= 30
-
-
 def test_a_class_name_is_unique() -> None:
     """Searching for a class name must find one class only."""
     places: dict[str, set[Path]] = defaultdict(set)
@@ -70,21 +57,6 @@ def test_module_names_are_unique() -> None:
         if path.parent.name not in {"commands", "routes", "injection"} and "__" not in path.stem:
             places[path.stem].add(path)
     assert {name for name, found in places.items() if len(found) > 1} == SHARED_MODULE_NAMES
-
-
-def test_a_folder_has_at_most_fifteen_entries() -> None:
-    """The entries of the core are the layers of its import contract."""
-    entries: dict[Path, set[Path]] = defaultdict(set)
-    for path in SOURCES:
-        if path.stem == "__init__":
-            entries[path.parent.parent].add(path.parent)
-        elif path.stem != "__main__":
-            entries[path.parent].add(path)
-    assert not {
-        str(folder): len(found)
-        for folder, found in entries.items()
-        if len(found) > 15 + 2 * (folder.name == "islands")
-    }
 
 
 def test_no_module_has_a_catch_all_name() -> None:
