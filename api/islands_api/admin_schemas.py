@@ -89,6 +89,9 @@ class OwnerChanges(BaseModel):
     max_islands: Annotated[
         Quota, Field(description="Islands of the running jobs; further jobs stay in the queue.")
     ] = None
+    max_run_seconds: Annotated[
+        Quota, Field(description="Seconds for which each job may run; also for the present jobs.")
+    ] = None
     max_uploads: Annotated[Quota, Field(description="Uploads in progress, of each API process.")] = None
     max_stored: Annotated[Quota, Field(description="Bytes of data sets.")] = None
     max_streams: Annotated[Quota, Field(description="Open event streams, of each API process.")] = None
@@ -108,6 +111,7 @@ class OwnerView(ResponseModel):
     max_active: int | None = None
     max_running: int | None = None
     max_islands: int | None = None
+    max_run_seconds: int | None = None
     max_uploads: int | None = None
     max_stored: int | None = None
     max_streams: int | None = None

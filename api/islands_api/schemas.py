@@ -150,6 +150,14 @@ class JobView(ResponseModel):
     updated: datetime
     started: datetime | None = None
     finished: datetime | None = None
+    run_seconds: float = Field(
+        default=0.0, description="Seconds that it has run, without its time in the queue, to about a second."
+    )
+    max_run_seconds: int | None = Field(
+        default=None,
+        description="Limit of `run_seconds`, at which a search ends with its best models so far, and a "
+        "diagnosis or the analysis of a record fails. The operator can raise it.",
+    )
     spec: dict[str, Any]
     progress: dict[str, Any] | None = Field(
         default=None,

@@ -245,6 +245,19 @@ def test_queued_jobs_show_their_position_among_those_of_all_owners(service, orde
     }
 
 
+def test_job_states_its_run_time_and_its_limit(service, order):
+    job = service.submit(**order).json()
+    default = service.client.get(f"/v1/jobs/{job['id']}").json()
+    assert (job["max_run_seconds"], default["max_run_seconds"], default["run_seconds"]) == (3600, 3600, 0.0)
+    service.store.owners.change(LOCAL_OWNER, {"max_run_seconds": 7200})
+    service.store.leases.renew(claimed(service.store), 60.0, ran=7.26)
+    raised = service.client.get(f"/v1/jobs/{job['id']}").json()
+    assert (raised["max_run_seconds"], raised["run_seconds"]) == (7200, 7.3)
+    assert service.submit(**order).json()["max_run_seconds"] == 7200
+    service.store.owners.change(LOCAL_OWNER, {"max_run_seconds": None})
+    assert service.client.get(f"/v1/jobs/{job['id']}").json()["max_run_seconds"] == 3600
+
+
 def test_cancelling_a_job_twice_is_allowed(service):
     path = f"/v1/jobs/{make_job_in_state(service, JobState.RUNNING)}"
     first = service.client.post(f"{path}/cancel")

@@ -36,8 +36,8 @@ SPEC = {
     "settings": {"population": 30, "max_terms": 5, "shooting": 200, "islands": 2, "migrate_every": 1},
 }
 
-#: Frequent checkpoints, because tests are short.
-QUICK = {"ISLANDS_CHECKPOINT_EVERY": "0.5", "ISLANDS_RATE": "0"}
+#: Frequent checkpoints, because tests are short, and one coordinator, because most tests have one job.
+QUICK = {"ISLANDS_CHECKPOINT_EVERY": "0.5", "ISLANDS_RATE": "0", "ISLANDS_COORDINATORS": "1"}
 
 
 def free_port() -> int:

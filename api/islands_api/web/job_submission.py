@@ -81,7 +81,7 @@ async def accept_job(
     if not new:
         headers["Idempotent-Replayed"] = "true"
     # Without the position, since the time to find it is proportional to the length of the queue.
-    return JSONDocument(job_document(job), 202, headers)
+    return JSONDocument(job_document(job, state.settings.max_run_seconds), 202, headers)
 
 
 async def describe_job(state: AppState, job: Job) -> dict[str, Any]:
@@ -98,7 +98,7 @@ async def describe_jobs(state: AppState, jobs: Sequence[Job]) -> list[dict[str, 
         found = await state.run_blocking(state.store.leases.queue_places, unknown, *quotas)
         state.places.store(unknown, found)
         places |= found
-    return [job_document(job, places.get(job.id)) for job in jobs]
+    return [job_document(job, state.settings.max_run_seconds, places.get(job.id)) for job in jobs]
 
 
 def etag(job: Job) -> str:

@@ -27,11 +27,13 @@ _PLACE_SECONDS = 1.0
 _MAX_PLACES = 10_000
 
 
-def job_document(job: Job, place: QueuePlace | None = None) -> dict[str, Any]:
+def job_document(job: Job, max_run_seconds: int, place: QueuePlace | None = None) -> dict[str, Any]:
     """Convert a job to a document with the fields of `islands_api.schemas.JobView`.
 
     Parameters
     ----------
+    max_run_seconds : int
+        Limit of the run time of jobs whose owner has no such quota.
     place : QueuePlace, optional
         Place of a queued job, if it is known.
     """
@@ -51,6 +53,8 @@ def job_document(job: Job, place: QueuePlace | None = None) -> dict[str, Any]:
         "updated": _format_time(job.updated),
         "started": _format_time(job.started),
         "finished": _format_time(job.finished),
+        "run_seconds": round(job.run_seconds, 1),
+        "max_run_seconds": max_run_seconds if job.max_run_seconds is None else job.max_run_seconds,
         "spec": job.spec,
         "progress": progress,
         "summary": job.summary,

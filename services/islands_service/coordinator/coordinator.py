@@ -2,7 +2,7 @@
 
 import traceback
 from collections.abc import Callable
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, closing
 from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -154,7 +154,12 @@ class Coordinator:
             started = monotonic()
             try:
                 with Heartbeat(
-                    self._store, lease, self._settings.lease, self._stopping, self._abandon
+                    self._store,
+                    lease,
+                    self._settings.lease,
+                    self._stopping,
+                    self._abandon,
+                    self._settings.max_run_seconds,
                 ) as heartbeat:
                     outcome = self._run_job(lease, heartbeat)
                     self._finish(lease, outcome, heartbeat)
@@ -199,7 +204,7 @@ class Coordinator:
                 lease,
                 self._store,
                 self._blobs,
-                HangGuard(self._make_engine(lease, notes), heartbeat),
+                HangGuard(self._make_engine(lease, notes, heartbeat), heartbeat),
                 partial(self._check, heartbeat),
                 self._settings.checkpoint_every,
                 notes,
@@ -230,9 +235,7 @@ class Coordinator:
                 return self._store.leases.finish(lease, outcome)
             except StoreError as error:
                 log.warning("cannot finish yet", reason=str(error))
-                # A cancellation request that arrives now is too late.
-                with suppress(JobCancelled):
-                    heartbeat.check()
+                heartbeat.check()
                 self._stopping.wait(RETRY_SECONDS)
 
     def _release(self, lease: Lease, attempted: bool = False) -> None:
@@ -293,7 +296,11 @@ class Coordinator:
         warm_up(lambda line: log.info("kernels", note=line))
         freeze_garbage_collector()
 
-    def _make_engine(self, lease: Lease, notes: JobNotes) -> "Engine":
+    def _make_engine(self, lease: Lease, notes: JobNotes, heartbeat: Heartbeat) -> "Engine":
         from islands_service.coordinator.job_engine import make_job_engine  # noqa: PLC0415
 
-        return make_job_engine(lease, notes.add, self._settings.autoscaling, self._metrics.observe_islands)
+        def observe(placed: int, waiting: int) -> None:
+            self._metrics.observe_islands(placed, waiting)
+            heartbeat.observe_islands(placed, waiting)
+
+        return make_job_engine(lease, notes.add, self._settings.autoscaling, observe)

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from math import inf
+from sys import maxsize
 from threading import Event, Thread
 from time import monotonic, process_time
 from types import TracebackType
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING
 import structlog
 
 from islands.errors import IslandsError
+from islands_service.coordinator.job_failures import make_problem_document
 from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError
 from islands_service.liveness import StopRequest
 from islands_service.store import Store
@@ -34,6 +36,10 @@ CANCEL_POLL = 0.2
 #: Seconds that a job has to end by itself. Then the heartbeat stores the cancellation and abandons the job.
 CANCEL_GRACE = 0.4
 
+#: Seconds that a job has to end by itself at its limit of run time, with the models that it has found. Its
+#: owner gets no models afterwards.
+RUN_LIMIT_GRACE = 60.0
+
 #: Seconds without a call of `Heartbeat.check` after which a search counts as hanging. A search checks many
 #: times a second; a checkpoint of a thousand islands takes half a minute.
 HANG_TIMEOUT = 600.0
@@ -45,6 +51,18 @@ IDLE_TIMEOUT, IDLE_SHARE = 3600.0, 0.05
 
 class JobCancelled(IslandsError):  # noqa: N818 - control flow, not an error
     """The owner has cancelled the job."""
+
+
+class RunTimeLimitError(IslandsError):
+    """The job has run for as long as its owner may let a job run."""
+
+    def __init__(self, limit: int) -> None:
+        super().__init__(
+            f"the job ran for {limit} s, the limit of the run time of one job, and had no result yet: resume "
+            "it to continue from its last checkpoint for as long again, submit one with less work (a shorter "
+            "record, smaller populations), or ask the operator for a longer time"
+        )
+        self.limit = limit
 
 
 class CoordinatorStopping(IslandsError):  # noqa: N818 - control flow, not an error
@@ -63,8 +81,11 @@ class Heartbeat:
     stopping : StopRequest
         Stop request of the coordinator.
     abandon : callable
-        Called if a cancelled job, or one whose lease is lost, does not end by itself: the computation is in a
-        long step without checks. `restart_process` ends it; the default lets it come to its end.
+        Called if a job does not end by itself that is cancelled, has reached its limit of run time, or has
+        lost its lease: the computation is in a long step without checks. `restart_process` ends it; the
+        default lets it come to its end.
+    max_run_seconds : int
+        Limit of the run time of jobs whose owner has no such quota.
     """
 
     def __init__(
@@ -74,12 +95,16 @@ class Heartbeat:
         seconds: float,
         stopping: StopRequest,
         abandon: Callable[[], None] = lambda: None,
+        max_run_seconds: int = maxsize,
     ) -> None:
         self._store, self._lease, self._seconds, self._stopping = store, lease, seconds, stopping
-        self._abandon = abandon
+        self._abandon, self._max_run_seconds = abandon, max_run_seconds
         self._over = Event()
         self._lost = self._cancelled = self._completed = self._abandoned = False
-        self._searching = False
+        self._searching = self._waiting = False
+        # The limit of run time, once it is reached.
+        self._reached_limit: int | None = None
+        self._counted_until = monotonic()
         self._checked_at, self._cpu_at_check = monotonic(), process_time()
         self._thread = Thread(target=self._beat, name="heartbeat", daemon=True)
 
@@ -102,19 +127,31 @@ class Heartbeat:
 
         Raises
         ------
-        LeaseLostError, JobCancelled, CoordinatorStopping
+        LeaseLostError, JobCancelled, CoordinatorStopping, RunTimeLimitError
         """
         self._checked_at, self._cpu_at_check = monotonic(), process_time()
         if self._lost:
             raise LeaseLostError(f"the lease of job {self._lease.job.id} is lost")
-        if self._cancelled:
+        if self._cancelled and not self._completed:
             raise JobCancelled(f"job {self._lease.job.id} is cancelled")
         if self._stopping.requested:
             raise CoordinatorStopping("the coordinator is stopping")
+        if self._reached_limit is not None and not self._completed:
+            raise RunTimeLimitError(self._reached_limit)
 
     def complete(self) -> None:
-        """Mark the computation as complete: a cancellation is too late while its outcome is being stored."""
+        """Mark the computation as complete: from now on neither a cancellation nor a limit ends the job."""
         self._completed = True
+
+    def observe_islands(self, placed: int, waiting: int) -> None:
+        """Exclude from the run time the time in which all islands wait for a CPU of the cluster.
+
+        Parameters
+        ----------
+        placed, waiting : int
+            Numbers of islands with and without a separate CPU.
+        """
+        self._waiting = waiting > 0 and placed == 0
 
     @contextmanager
     def search(self) -> Iterator[None]:
@@ -146,12 +183,14 @@ class Heartbeat:
                 if self._lost:
                     pass
                 elif now >= renew_at:
-                    self._cancelled |= self._store.leases.renew(self._lease, self._seconds)
+                    self._renew(now)
                     renew_at = now + period
                 else:
                     self._cancelled |= self._store.leases.is_cancel_requested(self._lease)
                 if self._cancelled or self._lost:
                     end_by = min(end_by, now + CANCEL_GRACE)
+                elif self._reached_limit is not None:
+                    end_by = min(end_by, now + RUN_LIMIT_GRACE)
                 if now > end_by and not (self._completed or self._abandoned):
                     self._end_job()
             except LeaseLostError:
@@ -161,14 +200,30 @@ class Heartbeat:
                 # The lease may expire meanwhile. Then the next renewal raises `LeaseLostError`.
                 log.warning("heartbeat failed", job=self._lease.job.id, reason=str(error))
 
+    def _renew(self, now: float) -> None:
+        """Renew the lease, and count the run time since the last renewal."""
+        ran = 0.0 if self._waiting else now - self._counted_until
+        renewal = self._store.leases.renew(self._lease, self._seconds, ran)
+        self._counted_until = now
+        self._cancelled |= renewal.cancel_requested
+        limit = self._max_run_seconds if renewal.max_run_seconds is None else renewal.max_run_seconds
+        if self._reached_limit is None and renewal.run_seconds >= limit:
+            self._reached_limit = limit
+
     def _end_job(self) -> None:
-        """Store that the job is cancelled, unless its lease is lost, and abandon the computation."""
+        """Store that the job is cancelled or at its limit, unless its lease is lost, and abandon it."""
         if not self._lost:
-            self._store.leases.finish(self._lease, JobOutcome(JobState.CANCELLED))
+            self._store.leases.finish(self._lease, self._make_outcome())
             self._lost = True
         self._abandoned = True
         log.warning("job abandoned", job=self._lease.job.id)
         self._abandon()
+
+    def _make_outcome(self) -> JobOutcome:
+        if self._cancelled or self._reached_limit is None:
+            return JobOutcome(JobState.CANCELLED)
+        problem = make_problem_document(RunTimeLimitError(self._reached_limit))
+        return JobOutcome(JobState.FAILED, problem=problem)
 
     def _exit_if_hanging(self) -> None:
         seconds = monotonic() - self._checked_at

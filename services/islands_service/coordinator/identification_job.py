@@ -8,24 +8,28 @@ from typing import Any
 
 import structlog
 
+from islands.data.dataset import Dataset
 from islands.evolution.engine import Engine
 from islands.evolution.presets import AUTO
+from islands.evolution.progress import StoppedError, stop_between_steps
 from islands.evolution.search_result import SearchResult
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.facade.automatic.kind_choice import Choice
+from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.identify import identify
+from islands.facade.results.result import Result
 from islands.io.checkpoints import history_document
 from islands.io.models import model_json
 from islands.io.result_folder import result_document
 from islands.io.result_text.model_description import describe
 from islands.model.equations import equation
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
+from islands_service.coordinator.heartbeat import RunTimeLimitError
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import JobOutcome, JobState, Lease, ProgressReport
-from islands_service.domain.job_spec import parse_identification
+from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.runtime.errors import ClusterError
 from islands_service.store import Store
@@ -61,7 +65,8 @@ def run_identification_job(
     Raises
     ------
     IslandsError
-        The record or the settings are unusable, the cluster failed, or any error that ``check`` raises.
+        The record or the settings are unusable, the cluster failed, or any error that ``check`` raises. At
+        the limit of run time the search ends with its best models so far; the error is raised if it has none.
     """
     job = lease.job
     spec = parse_identification(job.spec)
@@ -70,20 +75,68 @@ def run_identification_job(
     checkpoints = JobCheckpoints(job, blobs)
     start = checkpoints.read()
     notes = notes or JobNotes(lease, store)
-    reporter = ProgressReporter(lease, store, checkpoints, check, every, start, notes)
+    stop = StopAtLimit(check)
+    reporter = ProgressReporter(lease, store, checkpoints, stop, every, start, notes)
+    try:
+        result = _search(spec, record, validation, start, engine, reporter, stop)
+    except StoppedError as stopped:
+        raise stop.reached or stopped from stopped
+    reached = stop.reached
+    reporter.flush()
+    found = result.with_wall_time(reporter.spent).search_result
+    if reached is None:
+        return make_outcome(found, start.note)
+    note = (
+        f"the search ended at the limit of the run time of one job, {reached.limit} s, with its best models "
+        "so far; the operator can raise the limit"
+    )
+    ended = replace(found, search=replace(found.search, ended_by="run time"))
+    return make_outcome(ended, "; ".join(filter(None, [start.note, note])))
 
-    def stop() -> bool:
-        check()
-        return False
 
+class StopAtLimit:
+    """Request to stop a search at the limit of its run time; `reached` is the error once it is reached.
+
+    Parameters
+    ----------
+    check : callable
+        Raises the reason if the job must end early.
+    """
+
+    def __init__(self, check: Callable[[], None]) -> None:
+        self._check = check
+        self.reached: RunTimeLimitError | None = None
+
+    def __call__(self) -> bool:
+        """Return whether the limit is reached; raise any other reason why the job must end."""
+        try:
+            self._check()
+        except RunTimeLimitError as error:
+            self.reached = error
+        return self.reached is not None
+
+
+def _search(
+    spec: Identification,
+    record: Dataset,
+    validation: Dataset | float,
+    start: JobStart,
+    engine: Engine,
+    reporter: "ProgressReporter",
+    stop: StopAtLimit,
+) -> Result:
     preset: str | Choice = spec.preset
     if preset == AUTO and start.state is not None:
         # A job of an earlier version without preset stored no choice, and had this default.
         preset = start.choice or "hysteresis"
     elif preset == AUTO:
-        preset = choose_preset(record, validation, spec.changes, reporter.report_stage)
+        try:
+            stage = stop_between_steps(reporter.report_stage, stop)
+            preset = choose_preset(record, validation, spec.changes, stage)
+        except StoppedChoiceError as stopped:
+            return Result(stopped.found)
     reporter.choice = preset if isinstance(preset, Choice) else None
-    result = identify(
+    return identify(
         record,
         validation=validation,
         preset=preset,
@@ -95,8 +148,6 @@ def run_identification_job(
         engine=engine,
         **spec.changes,
     )
-    reporter.flush()
-    return make_outcome(result.with_wall_time(reporter.spent).search_result, start.note)
 
 
 def make_outcome(found: SearchResult, note: str = "") -> JobOutcome:
@@ -131,7 +182,7 @@ class ProgressReporter:
         lease: Lease,
         store: Store,
         checkpoints: JobCheckpoints,
-        check: Callable[[], None],
+        check: StopAtLimit,
         every: float,
         start: JobStart,
         notes: JobNotes,

@@ -24,6 +24,7 @@ PROBLEM_TYPES: Mapping[str, str] = MappingProxyType(
         "RecordError": "invalid-record",
         "SettingsError": "invalid-settings",
         "JobMemoryError": "insufficient-memory",
+        "RunTimeLimitError": "run-time-limit",
         "ModelError": "invalid-model",
         "DatasetNotFoundError": "no-such-dataset",
         "MonitorNotFoundError": "no-such-monitor",

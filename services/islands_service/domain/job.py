@@ -175,6 +175,10 @@ class Job:
         Main figures of the result.
     problem : mapping or None
         Reason of the failure.
+    run_seconds : float
+        Seconds for which coordinators have run the job since its submission or its resume.
+    max_run_seconds : int or None
+        Limit of ``run_seconds`` of its owner; None is the default of the settings.
     created, updated, started, finished : float
         Seconds since 1970 by the clock of the database.
     versions : mapping
@@ -195,6 +199,8 @@ class Job:
     checkpoint: str | None
     summary: Mapping[str, Any] | None
     problem: Mapping[str, Any] | None
+    run_seconds: float
+    max_run_seconds: int | None
     created: float
     updated: float
     started: float | None
@@ -228,6 +234,22 @@ class Lease:
 
     job: Job
     epoch: int
+
+
+@dataclass(frozen=True, slots=True)
+class Renewal:
+    """State of a job when its lease was renewed.
+
+    Attributes
+    ----------
+    cancel_requested : bool
+    run_seconds, max_run_seconds
+        See `Job`.
+    """
+
+    cancel_requested: bool
+    run_seconds: float
+    max_run_seconds: int | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,8 @@ class Quotas:
         Running jobs. Further ones stay in the queue.
     max_islands : int or None
         Islands of the running jobs; None is no limit. Further jobs stay in the queue.
+    max_run_seconds : int
+        Seconds for which each job may run.
     max_uploads : int
         Uploads in progress.
     max_stored : int
@@ -44,6 +46,7 @@ class Quotas:
     max_active: int
     max_running: int
     max_islands: int | None
+    max_run_seconds: int
     max_uploads: int
     max_stored: int
     max_streams: int
@@ -88,6 +91,7 @@ def default_quotas(settings: ServiceSettings) -> Quotas:
         settings.max_active,
         settings.max_running,
         settings.max_running_islands,
+        settings.max_run_seconds,
         settings.max_uploads_per_owner,
         settings.max_stored,
         settings.max_streams,

@@ -14,7 +14,7 @@ from ray.exceptions import RayActorError, RayTaskError
 from islands.evolution.problem import Problem
 from islands.evolution.progress import ProgressCallback
 from islands.model.primitives import PRIMITIVES
-from islands_service.runtime.cluster import LOSS_ERRORS, check_version, cluster_cpus
+from islands_service.runtime.cluster import LOSS_ERRORS, check_version, cluster_cpus, reserved_cpus
 from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.island_actor import IslandActor
 
@@ -201,7 +201,7 @@ class IslandActorPool:
                 self._actor_count += 1
                 actor = _ACTOR.options(
                     name=f"{self._title}.{self._actor_count}" if self._title else None,
-                    num_cpus=0 if slot == STANDBY else 1,
+                    num_cpus=0.0 if slot == STANDBY else reserved_cpus(),
                 ).remote(self._problem)
                 started = actor.confirm_start.remote()
                 self._unstarted[slot] = (actor, started)

@@ -26,6 +26,7 @@ from ray.exceptions import (
 )
 
 from islands_service.runtime.errors import ClusterError
+from islands_service.settings.setting_checks import count_cpus
 
 #: Bytes of shared memory of a local Ray: it holds the record and the migrants.
 OBJECT_STORE_BYTES = 200_000_000
@@ -38,6 +39,9 @@ _CONNECT_TIMEOUT = 5.0
 
 #: Prefix of the temporary folders of local Ray instances.
 _PREFIX = "islands-ray-"
+
+#: Resource of a local Ray: the number of jobs that share its cores.
+_JOBS = "islands-jobs"
 
 #: Lock file in such a folder, held while the instance runs.
 _LOCK = "lock"
@@ -63,7 +67,7 @@ LOSS_ERRORS = (
 
 
 @contextmanager
-def cluster(address: str | None = None, cpus: int | None = None) -> Iterator[None]:
+def cluster(address: str | None = None, cpus: int | None = None, jobs: int = 1) -> Iterator[None]:
     """Connect to a cluster, or start a local Ray that ends with the block and removes its files.
 
     Parameters
@@ -72,6 +76,8 @@ def cluster(address: str | None = None, cpus: int | None = None) -> Iterator[Non
         ``HOST:PORT`` of the head of a cluster; by default a local Ray is started.
     cpus : int, optional
         Number of cores that a local Ray uses; by default all that this process may use.
+    jobs : int
+        Number of jobs that share the cores of a local Ray; see `reserved_cpus`.
 
     Raises
     ------
@@ -83,7 +89,7 @@ def cluster(address: str | None = None, cpus: int | None = None) -> Iterator[Non
             "this process is already connected to Ray: disconnect first, or give the address of that cluster"
         )
     logging.getLogger("ray").setLevel(logging.CRITICAL)
-    with _local_ray(cpus or _count_cpus()) if address is None else _remote_cluster(address):
+    with _local_ray(cpus or count_cpus(), jobs) if address is None else _remote_cluster(address):
         yield
 
 
@@ -95,6 +101,16 @@ def cluster_memory() -> float:
 def cluster_cpus() -> float:
     """Return the number of CPUs that the machines of the connected cluster offer."""
     return float(ray.cluster_resources().get("CPU", 0.0))
+
+
+def reserved_cpus() -> float:
+    """Return the number of CPUs that an actor or a task of the connected cluster reserves.
+
+    The jobs of one machine share its cores in time, so that none waits for the end of another: each may have
+    as many processes as there are cores. On other clusters each process has a CPU.
+    """
+    # Ray counts in units of 0.0001.
+    return int(10_000 / ray.cluster_resources().get(_JOBS, 1.0)) / 10_000
 
 
 def check_version(found: str) -> None:
@@ -153,17 +169,8 @@ def _check_reachable(address: str) -> None:
     socket.create_connection((host, int(port)), timeout=_CONNECT_TIMEOUT).close()
 
 
-def _count_cpus() -> int:
-    """Return the number of cores that a container or an affinity mask leaves to this process."""
-    cores = len(os.sched_getaffinity(0))
-    with suppress(OSError, ValueError):
-        quota, period = map(int, Path("/sys/fs/cgroup/cpu.max").read_text().split())
-        cores = min(cores, max(1, quota // period))
-    return cores
-
-
 @contextmanager
-def _local_ray(cpus: int) -> Iterator[None]:
+def _local_ray(cpus: int, jobs: int) -> Iterator[None]:
     # Ray's processes listen on all interfaces: the token keeps other users out.
     os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(16))
     parent = Path(tempfile.gettempdir())
@@ -179,6 +186,7 @@ def _local_ray(cpus: int) -> Iterator[None]:
                 address="local",
                 namespace=NAMESPACE,
                 num_cpus=cpus,
+                resources={_JOBS: jobs},
                 object_store_memory=OBJECT_STORE_BYTES,
                 include_dashboard=False,
                 log_to_driver=False,

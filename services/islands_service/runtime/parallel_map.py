@@ -9,7 +9,7 @@ import ray
 from ray.exceptions import RayError, RayTaskError
 
 from islands.discrepancy.interfaces.parallel import ParallelMap
-from islands_service.runtime.cluster import cluster
+from islands_service.runtime.cluster import cluster, cluster_cpus, reserved_cpus
 from islands_service.runtime.errors import ClusterError
 
 #: Seconds between two checks.
@@ -51,13 +51,15 @@ def ray_map(workers: int | None = None, check: Callable[[], object] = lambda: No
     check : callable
         Called many times a second during the computation. If it raises an error, all calls are ended.
     """
-    task: Any = ray.remote(num_cpus=1, max_retries=3)(_call)
 
     def parallel_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
         if not ray.is_initialized():  # otherwise Ray would start a local instance
             raise ClusterError("this process is not connected to Ray: connect it first")
+        reserved = reserved_cpus()
+        task: Any = ray.remote(num_cpus=reserved, max_retries=3)(_call)
+        at_once = int(cluster_cpus()) if workers is None and reserved < 1.0 else workers
         shared, upcoming = ray.put(function), iter(arguments)
-        submitted = [task.remote(shared, argument) for argument in islice(upcoming, workers)]
+        submitted = [task.remote(shared, argument) for argument in islice(upcoming, at_once)]
         pending = set(submitted)
         # The list grows during the iteration.
         try:

@@ -30,7 +30,7 @@ def main() -> int:
     stopping = StopRequest()
     stop_on_signals(stopping)
     try:
-        with cluster(None):
+        with cluster(None, jobs=max(1, settings.coordinators)):
             stop_on_signals(stopping)
             with _publish_address(settings.ray_address_file):
                 while not (failure := _find_failure()) and not stopping.wait(_POLL_SECONDS):

@@ -18,11 +18,16 @@ from islands_service.settings.setting_checks import (
     Networks,
     Positive,
     check_separate,
+    count_cpus,
     read_secret,
 )
 
 #: Addresses that only this machine can reach.
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
+
+
+#: Largest default number of coordinators, since each of them takes half a gigabyte.
+DEFAULT_COORDINATORS = 4
 
 
 class ServiceSettings(BaseSettings):
@@ -67,7 +72,8 @@ class ServiceSettings(BaseSettings):
         Whether the cluster starts machines for islands that wait for a CPU, such as one of KubeRay with an
         autoscaler. A job then requests a CPU for each island, even if the cluster has fewer.
     coordinators
-        Number of jobs that run at the same time.
+        Number of jobs that run at the same time: by default one for each core, at most four. They share the
+        cores of this machine, so that a long job does not keep the others waiting.
     lease
         Duration of a lease without a heartbeat, after which another coordinator may claim the job; at least
         one second.
@@ -90,6 +96,9 @@ class ServiceSettings(BaseSettings):
     max_running, max_running_islands
         Running jobs of one owner, and the sum of their islands, which is unlimited by default. Further jobs
         stay in the queue.
+    max_run_seconds
+        Run time of one job, without its time in the queue. A search then ends with its best models so far, a
+        diagnosis fails.
     max_streams
         Open event streams of one owner, of each API process.
     max_drawings
@@ -167,7 +176,9 @@ class ServiceSettings(BaseSettings):
     root_path: Annotated[str, Field(pattern=r"^(/[A-Za-z0-9._~-]+)*$")] = ""
     ray_address: str | None = None
     autoscaling: bool = False
-    coordinators: Annotated[int, Field(ge=0, le=64)] = 1
+    coordinators: Annotated[int, Field(ge=0, le=64)] = Field(
+        default_factory=lambda: min(count_cpus(), DEFAULT_COORDINATORS)
+    )
     lease: Annotated[float, Field(ge=1.0)] = 5.0
     checkpoint_every: Positive = 5.0
     max_upload: Count = 256_000_000
@@ -182,6 +193,7 @@ class ServiceSettings(BaseSettings):
     max_active: Count = 10_000
     max_running: Count = 1000
     max_running_islands: Count | None = None
+    max_run_seconds: Count = 3600
     max_streams: Count = 1000
     max_drawings: Count = 100
     max_evaluations: Count = 10_000_000_000

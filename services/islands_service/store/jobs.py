@@ -43,7 +43,7 @@ from islands_service.store.job_rows.submission_checks import (
     find_accepted_job,
     request_digest,
 )
-from islands_service.store.tables import events, jobs
+from islands_service.store.tables import events, jobs, owners
 
 #: Largest number of jobs of a page.
 MAX_PAGE_SIZE = 200
@@ -51,9 +51,16 @@ MAX_PAGE_SIZE = 200
 # Built once, since building a statement takes as long as executing it.
 _OWNED_JOB = select(jobs).where(jobs.c.id == bindparam("id"), jobs.c.owner == bindparam("owner"))
 _ANY_JOB = select(jobs).where(jobs.c.id == bindparam("id"))
+_RUN_LIMIT = select(owners.c.max_run_seconds).where(owners.c.name == bindparam("of_owner")).scalar_subquery()
 _INSERT_JOB = (
     insert(jobs)
-    .values(state=JobState.QUEUED, created=now(), updated=now(), islands_version=ISLANDS_VERSION)
+    .values(
+        state=JobState.QUEUED,
+        created=now(),
+        updated=now(),
+        islands_version=ISLANDS_VERSION,
+        max_run_seconds=_RUN_LIMIT,
+    )
     .returning(jobs)
 )
 
@@ -115,6 +122,7 @@ class Jobs:
             values = {
                 "id": uuid4().hex,
                 "owner": submission.owner,
+                "of_owner": submission.owner,
                 "kind": submission.kind,
                 "name": submission.name,
                 "spec": spec,
@@ -235,6 +243,7 @@ class Jobs:
                 cancel_requested=False,
                 stalled=0,
                 not_before=0.0,
+                run_seconds=0.0,
                 problem=None,
                 finished=None,
                 progress=without_note(current.progress),

@@ -20,6 +20,7 @@ from islands_service.domain.job import (
     Lease,
     LeaseLostError,
     ProgressReport,
+    Renewal,
 )
 from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
@@ -76,20 +77,30 @@ class Leases:
         asked = (coordinator, seconds, version, most_running, most_islands)
         return self._database.write(lambda connection: claim_job(connection, *asked))
 
-    def renew(self, lease: Lease, seconds: float) -> bool:
-        """Extend a lease; return whether cancellation of the job is requested.
+    def renew(self, lease: Lease, seconds: float, ran: float = 0.0) -> Renewal:
+        """Extend a lease, and count the run time of its job.
+
+        Parameters
+        ----------
+        seconds : float
+            Duration of the lease from now.
+        ran : float
+            Seconds for which the job has run since the last renewal.
 
         Raises
         ------
         LeaseLostError
         """
 
-        def operation(connection: Connection) -> bool:
-            held = update(jobs).where(*_held(lease)).values(lease_until=now() + seconds)
-            found = connection.execute(held.returning(jobs.c.cancel_requested)).one_or_none()
+        def operation(connection: Connection) -> Renewal:
+            held = update(jobs).where(*_held(lease))
+            renewed = held.values(lease_until=now() + seconds, run_seconds=jobs.c.run_seconds + ran)
+            found = connection.execute(
+                renewed.returning(jobs.c.cancel_requested, jobs.c.run_seconds, jobs.c.max_run_seconds)
+            ).one_or_none()
             if found is None:
                 raise _make_lease_lost_error(lease)
-            return bool(found.cancel_requested)
+            return Renewal(bool(found.cancel_requested), found.run_seconds, found.max_run_seconds)
 
         return self._database.write(operation)
 

@@ -70,6 +70,10 @@ jobs = Table(
     Column("not_before", Float, nullable=False, server_default=text("0")),
     # Versions of islands that cannot read the job, each in commas.
     Column("declined", Text, nullable=False, server_default=""),
+    # Seconds for which coordinators have run the job since its submission or its resume.
+    Column("run_seconds", Float, nullable=False, server_default=text("0")),
+    # Limit of these seconds, a copy of the quota of the owner; null is the default of the settings.
+    Column("max_run_seconds", BigInteger),
     # Islands of the search; 1 for a diagnosis.
     Column("islands", Integer, nullable=False, server_default=text("1")),
     # Monitor whose record the job analyses, and the number of the record in the order of submission. The jobs

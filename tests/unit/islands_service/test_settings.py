@@ -1,5 +1,6 @@
 """Settings: environment variables, ranges, and the environment of child processes."""
 
+import importlib
 import os
 from pathlib import Path
 
@@ -24,6 +25,14 @@ def test_arguments_precede_the_environment_and_that_precedes_defaults(monkeypatc
     assert service_settings(data_dir=tmp_path, port=None).port == 9000
 
 
+@pytest.mark.parametrize(("cores", "coordinators"), [(1, 1), (2, 2), (64, 4)])
+def test_one_coordinator_for_each_core_is_the_default_up_to_four(monkeypatch, cores, coordinators):
+    module = importlib.import_module("islands_service.settings.service_settings")
+    monkeypatch.setattr(module, "count_cpus", lambda: cores)
+    assert service_settings().coordinators == coordinators
+    assert service_settings(coordinators=0).coordinators == 0
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
@@ -36,6 +45,7 @@ def test_arguments_precede_the_environment_and_that_precedes_defaults(monkeypatc
         ("max_upload", "0"),
         ("max_islands", "0"),
         ("max_running_islands", "0"),
+        ("max_run_seconds", "0"),
         ("max_active", "many"),
         ("inspection_seconds", "0"),
         ("rate", "-1"),

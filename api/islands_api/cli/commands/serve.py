@@ -45,7 +45,10 @@ def serve(
         typer.Option("--ray-address", help="HOST:PORT of a cluster; by default a local Ray is started."),
     ] = None,
     coordinators: Annotated[
-        int | None, typer.Option("--coordinators", help="Jobs that run at the same time; 1 by default.")
+        int | None,
+        typer.Option(
+            "--coordinators", help="Jobs that run at the same time; one for each core by default, at most 4."
+        ),
     ] = None,
     tls_certificate: Annotated[Path | None, typer.Option("--tls-certificate", help="PEM file.")] = None,
     tls_key: Annotated[Path | None, typer.Option("--tls-key", help="PEM file.")] = None,

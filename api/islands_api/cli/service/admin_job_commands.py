@@ -30,12 +30,11 @@ def list_jobs(
         found = store.jobs.page(owner, wanted, None, limit).jobs
     table = Table(
         Column("job", no_wrap=True),
-        *(Column(name, overflow="fold") for name in ("owner", "state", "seconds")),
+        *(Column(name, overflow="fold") for name in ("owner", "state", "run time / s")),
     )
     for job in found:
-        seconds = "-" if job.started is None else f"{(job.finished or job.updated) - job.started:.0f}"
         # Names may contain characters that Rich takes for markup.
-        table.add_row(job.id, Text(job.owner), str(job.state), seconds)
+        table.add_row(job.id, Text(job.owner), str(job.state), f"{job.run_seconds:.0f}")
     output.print(table)
 
 

@@ -57,6 +57,10 @@ def set_owner(
         int | None,
         typer.Option("--max-islands", help="Islands of the running jobs; further jobs stay in the queue."),
     ] = None,
+    max_run_seconds: Annotated[
+        int | None,
+        typer.Option("--max-run-seconds", help="Run time of each job; also of the present jobs."),
+    ] = None,
     max_uploads: Annotated[
         int | None, typer.Option("--max-uploads", help="Uploads in progress, of each API process.")
     ] = None,
@@ -85,6 +89,7 @@ def set_owner(
         "max_active": max_active,
         "max_running": max_running,
         "max_islands": max_islands,
+        "max_run_seconds": max_run_seconds,
         "max_uploads": max_uploads,
         "max_stored": max_stored,
         "max_streams": max_streams,

@@ -118,7 +118,7 @@ async def job(
 async def cancel(job: Id, caller: Writer, state: AppStateDep) -> Any:
     """Cancel a job: a queued one immediately, a running one within about a second."""
     cancelled = await state.run_blocking(state.store.jobs.cancel, caller.owner, job, caller.requester)
-    return JSONDocument(job_document(cancelled), 202)
+    return JSONDocument(job_document(cancelled, state.settings.max_run_seconds), 202)
 
 
 @router.post("/{job}/resume", status_code=202, response_model=JobView)

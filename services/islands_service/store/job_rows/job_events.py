@@ -62,6 +62,8 @@ def job_from_row(row: Row[Any]) -> Job:
         row.checkpoint,
         read_document(row.summary),
         read_document(row.problem),
+        row.run_seconds,
+        row.max_run_seconds,
         row.created,
         row.updated,
         row.started,

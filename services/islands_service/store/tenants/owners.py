@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import Connection, func, select, union
+from sqlalchemy import Connection, func, select, union, update
 
 from islands.errors import IslandsError
 from islands_service.domain.job import ACTIVE, JobState, Requester
@@ -83,6 +83,10 @@ class Owners:
                 if values.get("weight", 1) is None:
                     values["weight"] = DEFAULT_WEIGHT
                 dialect.upsert(connection, owners, {"name": owner}, values)
+                if "max_run_seconds" in values:
+                    limit = {"max_run_seconds": values["max_run_seconds"]}
+                    unfinished = jobs.c.owner == owner, jobs.c.state.in_(ACTIVE)
+                    connection.execute(update(jobs).where(*unfinished).values(limit))
                 record_change(connection, Action.CHANGE_OWNER, owner, owner, by, json.dumps(values))
             return _read_owner(connection, owner)
 

@@ -7,6 +7,7 @@ import pytest
 
 from islands_service.coordinator import job_engine
 from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.heartbeat import Heartbeat
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import IDENTIFICATION, Job, JobOutcome, JobState
 from islands_service.liveness import StopRequest
@@ -56,7 +57,8 @@ def test_islands_with_and_without_a_separate_cpu_are_metrics(
     monkeypatch.setattr(job_engine, "RayEngine", lambda *arguments: engines.append(arguments))
     coordinator = Coordinator(settings, "me", StopRequest())
     lease = claimed(store)
-    coordinator._make_engine(lease, JobNotes(lease, store))
+    heartbeat = Heartbeat(store, lease, 60.0, StopRequest())
+    coordinator._make_engine(lease, JobNotes(lease, store), heartbeat)
     read = coordinator._metrics.registry.get_sample_value
     assert (read("islands_running_islands"), read("islands_pending_islands")) == (0.0, 0.0)
     engines[0][-1](2, 6)

@@ -7,8 +7,13 @@ from typing import Any
 import pytest
 
 from islands_service.coordinator import heartbeat as heartbeats
-from islands_service.coordinator.heartbeat import CoordinatorStopping, Heartbeat, JobCancelled
-from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError
+from islands_service.coordinator.heartbeat import (
+    CoordinatorStopping,
+    Heartbeat,
+    JobCancelled,
+    RunTimeLimitError,
+)
+from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError, Renewal
 from islands_service.liveness import StopRequest
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailableError
@@ -69,10 +74,10 @@ class Watched:
 
     def __init__(self, store: Store) -> None:
         self._leases, self.leases = store.leases, self
-        self.renewals: list[bool] = []
+        self.renewals: list[Renewal] = []
 
-    def renew(self, lease: Lease, seconds: float) -> bool:
-        self.renewals.append(self._leases.renew(lease, seconds))
+    def renew(self, lease: Lease, seconds: float, ran: float) -> Renewal:
+        self.renewals.append(self._leases.renew(lease, seconds, ran))
         return self.renewals[-1]
 
     def __getattr__(self, name: str) -> Any:
@@ -115,7 +120,8 @@ def test_cancel_request_is_noticed_at_the_next_renewal(
         store.jobs.cancel(ALICE, lease.job.id)
         before = len(watched.renewals)
         eventually(lambda: raised_by_check(heartbeat) is JobCancelled, seconds=20.0)
-    assert watched.renewals.index(True) <= before + 1  # one renewal may have been in progress
+    requested = [renewal.cancel_requested for renewal in watched.renewals]
+    assert requested.index(True) <= before + 1  # one renewal may have been in progress
 
 
 def test_cancel_request_before_the_claim_is_noticed_at_once(store: Store, lease: Lease) -> None:
@@ -186,6 +192,68 @@ def test_job_that_does_not_end_is_abandoned_once_and_stored_as_cancelled(
     assert states == [JobState.CANCELLED]
 
 
+def test_job_at_its_limit_of_run_time_has_a_grace_and_then_fails(store: Store, clock: Clock) -> None:
+    """The time of all attempts counts, up to the last renewal of each."""
+    submitted(store)
+    for ran in (6.0, 6.0):
+        with Heartbeat(
+            store, lease := claimed(store, 60.0), 60.0, StopRequest(), max_run_seconds=15
+        ) as heartbeat:
+            clock.await_beat()
+            clock.now += ran
+            clock.await_beat()
+            heartbeat.check()
+        store.leases.release(lease)
+    assert store.jobs.get(ALICE, lease.job.id).run_seconds == 12.0
+    with Heartbeat(store, claimed(store, 60.0), 60.0, StopRequest(), max_run_seconds=15) as heartbeat:
+        clock.now += 6.0
+        eventually(lambda: raised_by_check(heartbeat) is RunTimeLimitError, seconds=20.0)
+        clock.now += heartbeats.RUN_LIMIT_GRACE
+        clock.await_beat()
+        assert store.jobs.get(ALICE, lease.job.id).state == JobState.RUNNING
+        clock.now += 0.01
+        eventually(lambda: raised_by_check(heartbeat) is LeaseLostError, seconds=20.0)
+    failed = store.jobs.get(ALICE, lease.job.id)
+    assert failed.state == JobState.FAILED
+    assert failed.problem is not None
+    assert failed.problem["type"] == "run-time-limit"
+    assert "the job ran for 15 s" in failed.problem["detail"]
+    assert store.jobs.resume(ALICE, failed.id).run_seconds == 0.0
+
+
+def test_limit_of_run_time_is_the_quota_of_the_owner_also_if_it_changes(store: Store, clock: Clock) -> None:
+    submitted(store)
+    store.owners.change(ALICE, {"max_run_seconds": 30})
+    with Heartbeat(
+        store, lease := claimed(store, 60.0), 60.0, StopRequest(), max_run_seconds=10
+    ) as heartbeat:
+        clock.now += 20.0
+        clock.await_beat()
+        heartbeat.check()
+        store.owners.change(ALICE, {"max_run_seconds": 26})
+        clock.now += 6.0
+        eventually(lambda: raised_by_check(heartbeat) is RunTimeLimitError, seconds=20.0)
+        heartbeat.complete()  # a limit does not take a result that is being stored
+        heartbeat.check()
+    assert store.jobs.get(ALICE, lease.job.id).max_run_seconds == 26
+
+
+def test_time_in_which_all_islands_wait_for_a_cpu_is_no_run_time(store: Store, clock: Clock) -> None:
+    submitted(store)
+    with Heartbeat(
+        store, lease := claimed(store, 60.0), 60.0, StopRequest(), max_run_seconds=10
+    ) as heartbeat:
+        clock.await_beat()
+        heartbeat.observe_islands(0, 2)
+        clock.now += 100.0
+        clock.await_beat()
+        heartbeat.observe_islands(1, 1)
+        clock.now += 7.0
+        clock.await_beat()
+        heartbeat.check()
+    assert store.jobs.get(ALICE, lease.job.id).run_seconds == 7.0
+
+
 def test_job_of_a_lost_lease_is_abandoned(
     store: Store, lease: Lease, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -226,11 +294,11 @@ class Away:
         self._store, self.left = store, beats
         self.leases = self
 
-    def renew(self, lease: Lease, seconds: float) -> bool:
+    def renew(self, lease: Lease, seconds: float, ran: float) -> Renewal:
         if self.left:
             self.left -= 1
             raise StoreUnavailableError("the database does not answer")
-        return self._store.leases.renew(lease, seconds)
+        return self._store.leases.renew(lease, seconds, ran)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._store.leases, name)

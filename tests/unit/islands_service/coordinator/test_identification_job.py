@@ -11,7 +11,7 @@ import pytest
 
 from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
-from islands_service.coordinator.heartbeat import JobCancelled
+from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError, Submission
 from islands_service.reports.figure_worker import read_search_result
@@ -106,6 +106,37 @@ def test_job_that_continues_keeps_the_choice_of_the_preset_auto(
     assert outcome.document is not None
     assert outcome.document["settings"]["choice"]["kind"] == "hysteresis"
     assert get_models(outcome) == undisturbed[0]
+
+
+@pytest.mark.ci
+def test_search_at_its_limit_of_run_time_ends_with_its_models(
+    store: Store, blobs: Blobs, job: Job, undisturbed: Found, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    interruption = Interruption(store, job, 3)
+
+    def check() -> None:
+        try:
+            interruption()
+        except JobCancelled:
+            raise RunTimeLimitError(10) from None
+
+    outcome = run_job(claim(store), store, blobs, check)
+    assert outcome.state == JobState.SUCCEEDED
+    assert outcome.models
+    assert outcome.summary is not None
+    assert outcome.summary["ended_by"] == "run time"
+    assert "limit of the run time of one job, 10 s" in outcome.summary["words"]
+    assert outcome.document is not None
+    assert outcome.document["search"]["evaluations"] < undisturbed[1][-1][1]
+
+
+def test_search_without_models_fails_at_its_limit_of_run_time(store: Store, blobs: Blobs, job: Job) -> None:
+    def check() -> None:
+        raise RunTimeLimitError(10)
+
+    with pytest.raises(RunTimeLimitError, match="ran for 10 s"):
+        run_job(claim(store), store, blobs, check)
 
 
 @pytest.mark.ci

@@ -3,6 +3,20 @@
 import pytest
 
 
+@pytest.mark.parametrize(
+    ("resources", "reserved"), [({}, 1.0), ({"islands-jobs": 1.0}, 1.0), ({"islands-jobs": 3.0}, 0.3333)]
+)
+def test_processes_of_jobs_that_share_the_cores_reserve_a_fraction(monkeypatch, resources, reserved):
+    """As many processes as cores of each job fit on the machine."""
+    import ray
+
+    from islands_service.runtime.cluster import reserved_cpus
+
+    monkeypatch.setattr(ray, "cluster_resources", lambda: {"CPU": 8.0, **resources})
+    assert reserved_cpus() == reserved
+    assert 8 * resources.get("islands-jobs", 1.0) * reserved <= 8.0
+
+
 def test_start_of_ray_that_times_out_is_reported_as_a_cluster_error(monkeypatch):
     """Ray raises a plain exception on a machine that is too busy to start it within half a minute."""
     import ray

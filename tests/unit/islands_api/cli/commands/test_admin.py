@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from sqlalchemy import update
 
-from islands_service.domain.job import Requester
+from islands_service.domain.job import JobState, Requester
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.tables import audit
-from support.stores import submitted
+from support.stores import claimed, submitted
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -155,3 +155,31 @@ def test_password_in_the_options_file_is_accepted(run: Run, command_line: Run, t
     code, _, err = command_line("--config", options, "keys", "list")
     assert code == 2
     assert "every user of this machine" not in err
+
+
+def test_operator_lists_and_cancels_jobs_of_all_owners(folder: Path, command_line: Run) -> None:
+    admin = partial(command_line, "admin", "jobs")
+    with Store(ServiceSettings(data_dir=folder).url) as store:
+        first = submitted(store, "alice")
+        store.leases.renew(claimed(store), 60.0, ran=71.4)
+        second = submitted(store, "[bob]")
+        code, out, err = admin("list")
+        assert (code, err) == (0, "")
+        rows = [line.split() for line in out.splitlines() if first.id in line or second.id in line]
+        assert [row[1:-1:2] for row in rows] == [
+            [second.id, "[bob]", "queued", "0"],
+            [first.id, "alice", "running", "71"],
+        ]
+        assert second.id not in admin("list", "--owner", "alice")[1]
+        assert first.id not in admin("list", "--state", "queued")[1]
+        assert admin("list", "--state", "asleep")[:2] == (2, "")
+        assert admin("cancel", first.id)[1] == f"job {first.id} of owner alice is being cancelled\n"
+        assert admin("cancel", second.id)[1] == f"job {second.id} of owner [bob] is cancelled\n"
+        code, _, err = admin("cancel", second.id)
+        assert code == 2
+        assert "there is nothing to cancel" in err
+        assert store.jobs.get("[bob]", second.id).state == JobState.CANCELLED
+    actions = [
+        (entry["action"], entry["owner"]) for entry in read(partial(command_line, "admin", "audit"))[:2]
+    ]
+    assert actions == [("cancel-job-as-administrator", "[bob]"), ("cancel-job-as-administrator", "alice")]
