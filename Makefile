@@ -20,6 +20,7 @@ setup: .venv/ready
 
 .venv/ready: requirements.lock pyproject.toml deploy/packages/install.py
 	@$(INSTALL) --extra ray --extra service --group build
+	@$(BIN)/python -m pip uninstall --quiet --quiet --disable-pip-version-check --yes islands # the former name of the distribution
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
 	@touch $@
 

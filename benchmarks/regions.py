@@ -27,7 +27,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from importlib.metadata import version
 from math import inf
 from pathlib import Path
 from threading import Event
@@ -39,6 +38,7 @@ import numpy as np
 import ray
 
 from islands.data.dataset import Dataset
+from islands.distribution import read_version
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.epoch import IslandEpoch, select_migrants
@@ -106,7 +106,7 @@ class SimulatedIslandActor:
         self._answer = given[1]
 
     def prepare(self) -> str:
-        return version("islands")
+        return read_version()
 
     @ray.method(concurrency_group="watch")
     def wait_until_killed(self) -> None:
@@ -136,7 +136,7 @@ class SimulatedRegionActor:
 
     @ray.method(concurrency_group="watch")
     def check(self) -> RegionStatus:
-        return RegionStatus(version("islands"))
+        return RegionStatus(read_version())
 
     @ray.method(num_returns=2)
     def advance(self, *_arriving: Any) -> tuple[RegionReport, tuple[PackedEpoch, ...]]:

@@ -31,7 +31,7 @@ class LockedPackage(NamedTuple):
     name, version : str
         The name is normalised: lower case, with hyphens.
     needed_by : tuple of str
-        Names of the packages that require it; "islands" for a direct requirement.
+        Names of the packages that require it; that of the project for a direct requirement.
     hashes : tuple of str
         SHA-256 of the files that may be installed.
     """

@@ -24,7 +24,7 @@ def make_document(lock: Path) -> dict[str, Any]:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     packages = read_image(read_lock(lock))
     licences = read_licences(packages)
-    references = {"islands": "root-component"}
+    references = {project["name"]: "root-component"}
     references |= {name: f"pkg:pypi/{name}@{package.version}" for name, package in packages.items()}
     return {
         "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
@@ -33,7 +33,7 @@ def make_document(lock: Path) -> dict[str, Any]:
         "version": 1,
         "metadata": {
             "component": {
-                "bom-ref": references["islands"],
+                "bom-ref": references[project["name"]],
                 "type": "application",
                 "name": project["name"],
                 "version": project["version"],

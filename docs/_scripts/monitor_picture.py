@@ -1,6 +1,6 @@
 """Picture of the page of a monitor: ``python docs/_scripts/monitor_picture.py`` draws it again.
 
-It writes ``docs/pictures/monitor-page.png`` and needs the extras ``all`` and ``dev``, and Chromium.
+It writes ``docs/pictures/monitor-page.png`` and needs `make .venv/ready-test` and Chromium.
 """
 
 import subprocess

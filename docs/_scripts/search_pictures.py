@@ -1,7 +1,7 @@
 """Pictures of a search in the README: errors of its islands, and its page of the service.
 
 ``python docs/_scripts/search_pictures.py`` draws ``docs/pictures/search.svg`` and
-``docs/pictures/service.png`` again. It needs the extras ``all`` and ``dev``, and Chromium.
+``docs/pictures/service.png`` again. It needs `make .venv/ready-test` and Chromium.
 """
 
 import subprocess

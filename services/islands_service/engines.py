@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager, contextmanager
 from importlib.util import find_spec
 from types import MappingProxyType
 
+from islands.distribution import describe_missing_extra
 from islands.evolution.engine import Engine, SerialEngine
 from islands.evolution.progress import ProgressCallback
 
@@ -55,15 +56,15 @@ EngineFactory = Callable[[str | None, ProgressCallback], AbstractContextManager[
 #: Engines by name.
 ENGINES: Mapping[str, EngineFactory] = MappingProxyType({"serial": serial_engine, "ray": ray_engine})
 
-#: Notice of a command that runs several islands with the serial engine, since Ray is not installed.
-SERIAL_NOTICE = (
-    "engine: serial, on one core, since Ray is not installed; for all cores: pip install 'islands[ray]'"
-)
-
 
 def has_ray() -> bool:
     """Return whether Ray is installed."""
     return find_spec("ray") is not None
+
+
+def serial_notice() -> str:
+    """Return the notice of a command that runs several islands on one core, since Ray is not installed."""
+    return f"engine: serial, on one core; {describe_missing_extra('a search on all cores', 'ray')}"
 
 
 def default_engine(islands: int, address: str | None = None) -> str:

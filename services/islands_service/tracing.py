@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
+from islands.distribution import describe_missing_extra
 from islands.errors import SettingsError
 
 
@@ -45,9 +46,7 @@ class Traces:
 
 def _provider(endpoint: str, role: str) -> Any:
     if find_spec("opentelemetry") is None or find_spec("opentelemetry.sdk") is None:
-        raise SettingsError(
-            "traces (ISLANDS_TELEMETRY) need an extra: install it with pip install 'islands[telemetry]'"
-        )
+        raise SettingsError(describe_missing_extra("the setting ISLANDS_TELEMETRY", "telemetry"))
     # These imports are slow, and only needed with an endpoint.
     from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter  # noqa: PLC0415
     from opentelemetry.sdk.resources import Resource  # noqa: PLC0415

@@ -7,8 +7,9 @@
 """
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import Any
+
+from islands.distribution import read_version
 
 #: Public names by defining module. A module is imported on first use, because the compiler of the kernels
 #: takes half a second to import. `__init__.pyi` is generated from this table.
@@ -63,7 +64,7 @@ __all__ = sorted(_MODULES, key=lambda name: (not name.isupper(), name))  # noqa:
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        return version("islands")
+        return read_version()
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(f"islands.{_MODULES[name]}"), name)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from islands.data.dataset import Dataset
+from islands.distribution import describe_missing_extra
 from islands.errors import IslandsError, SettingsError
 from islands.facade.fit import fit
 from islands.facade.identify import identify
@@ -25,7 +26,7 @@ try:
     from sklearn.utils import check_random_state
     from sklearn.utils.validation import check_array, check_is_fitted, validate_data
 except ImportError as missing:
-    raise SettingsError("install islands[sklearn] to use IslandsRegressor") from missing
+    raise SettingsError(describe_missing_extra("IslandsRegressor", "sklearn")) from missing
 
 #: Where a prediction starts, as values of the parameter ``start``.
 STARTS = ("end", "begin")

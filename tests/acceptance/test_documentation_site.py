@@ -65,7 +65,7 @@ def generated() -> dict[str, str]:
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The built site. The proxy does not exist, so a build that needs the network fails."""
-    pytest.importorskip("mkdocs", reason="MkDocs is not installed: it comes with the extra 'docs'")
+    pytest.importorskip("mkdocs", reason="MkDocs is not installed: run: make .venv/ready-docs")
     folder = tmp_path_factory.mktemp("site")
     nowhere = "http://127.0.0.1:9"
     done = subprocess.run(

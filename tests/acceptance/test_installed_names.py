@@ -1,29 +1,88 @@
-"""No deployment guide installs the project by a name, which another project could register in an index."""
+"""No file of the repository installs the project by its name, which is in no index of packages."""
 
 import re
+import tomllib
+from collections.abc import Iterator
 
 import pytest
 
-from support.repository import DOCS, ROOT
+import islands
+from islands.distribution import NAME
+from support.repository import ROOT
 
-#: Guides and files with which servers are set up.
-DEPLOYMENT = sorted(
-    [
-        *(DOCS / "how-to").glob("deploy-*.md"),
-        ROOT / "deploy/Containerfile",
-        *(ROOT / "deploy").rglob("*.service"),
-    ]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+EXTRAS = PROJECT["optional-dependencies"].keys()
+
+#: Names of the import package and of the distribution, as a user may write them.
+NAMES = r"islands(?:[-_.]sysid)?"
+
+#: Beginning of a command that installs requirements.
+INSTALL = r"\b(?:pip[x3]?|uv|uvx|pdm|poetry|conda|mamba)\s[^\n]*?\b(?:install|add|run)\b[^\n]*?[\s'\"]"
+
+#: Installation of a requirement that begins with one of our names and is no file; and such a requirement with
+#: extras, wherever it stands.
+BY_NAME = re.compile(
+    rf"{INSTALL}({NAMES}(?:\[[\w, -]+\])?)(?=['\"`\s;,.=<>~]|$)"
+    rf"|(?<![/\w-])({NAMES}\[(?:{'|'.join(EXTRAS)})\b[\w, -]*\])",
+    re.MULTILINE,
 )
 
-#: Installation of a requirement that begins with the name of the project, and is no file.
-BY_NAME = re.compile(r"\bpip install\b[^\n]*?[\s'\"](islands(?:\[[\w,]+\])?)(?=['\"\s]|$)", re.MULTILINE)
+#: Files with our names that install nothing.
+EXEMPT = {"requirements.lock", "test_installed_names.py"}
+
+#: Folders with everything that a user or a developer reads or runs.
+FOLDERS = (".ci", "api", "benchmarks", "deploy", "docs", "examples", "services", "src", "tests")
 
 
-@pytest.mark.parametrize("path", DEPLOYMENT, ids=lambda path: path.name)
-def test_a_server_is_not_installed_by_name(path):
-    assert not BY_NAME.findall(path.read_text())
+def files() -> Iterator[tuple[str, str]]:
+    """Yield the path and the text of each file of the repository but this one."""
+    paths = [path for path in ROOT.iterdir() if path.is_file()]
+    paths += [path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if path.is_file()]
+    for path in paths:
+        if "__pycache__" not in path.parts and path.name not in EXEMPT:
+            try:
+                yield str(path.relative_to(ROOT)), path.read_text("utf-8")
+            except UnicodeDecodeError:
+                continue
 
 
-@pytest.mark.parametrize("command", ["pip install 'islands[service]'", "pip install --upgrade islands"])
-def test_an_installation_by_name_is_found(command):
-    assert BY_NAME.findall(command)
+def test_no_file_installs_the_project_by_name():
+    found = {(path, "".join(match.groups(""))) for path, text in files() for match in BY_NAME.finditer(text)}
+    # Extras that consist of other extras.
+    composed = {("pyproject.toml", PROJECT["optional-dependencies"][extra][0]) for extra in ("all", "server")}
+    assert found == composed
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "pip install 'islands[service]'",
+        "pip install --upgrade islands",
+        "RUN /opt/islands/bin/pip install --no-deps islands",
+        "uv pip install islands-sysid==0.1.0",
+        "uv tool install islands_sysid",
+        "(`pip install islands`).",
+        "install islands[fmi] to simulate an FMU",
+        "| `islands-sysid[service,oidc]` |",
+    ],
+)
+def test_an_installation_by_name_is_found(text):
+    assert BY_NAME.search(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "pip install 'dist/islands_sysid-0.1.0-py3-none-any.whl[all]'",
+        '/opt/islands/bin/pip install --no-deps "$(echo "$PWD"/dist/islands_sysid-*.whl)"',
+        "python3 deploy/packages/install.py /opt/islands --extra server",
+        "archipelago.islands[index]",
+    ],
+)
+def test_an_installation_of_a_file_is_allowed(text):
+    assert not BY_NAME.search(text)
+
+
+def test_the_distribution_has_the_name_and_the_version_of_the_project():
+    assert (NAME, islands.__version__) == (PROJECT["name"], PROJECT["version"])

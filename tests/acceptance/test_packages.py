@@ -26,7 +26,7 @@ SCRIPTS = ROOT / "deploy/packages"
 SMALL_LOCK = f"""\
 jinja2==3.1.6 \\
     --hash=sha256:{"0" * 64}
-    # via islands (pyproject.toml)
+    # via islands-sysid (pyproject.toml)
 markupsafe==3.0.4 \\
     --hash=sha256:{"0" * 64}
     # via jinja2
@@ -61,7 +61,7 @@ def write_installed_package(folder: Path, name: str, licence: str) -> None:
 def add_entry(lock: Path, name: str) -> None:
     """Add a package to a lock file."""
     with lock.open("a") as file:
-        file.write(f"{name}==1.0 \\\n    --hash=sha256:{'0' * 64}\n    # via islands\n")
+        file.write(f"{name}==1.0 \\\n    --hash=sha256:{'0' * 64}\n    # via islands-sysid\n")
 
 
 def test_the_licence_of_every_locked_package_is_accepted():

@@ -27,7 +27,7 @@ _INSTALL = "install it with 'apt-get install --no-install-recommends chromium'"
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
     api = pytest.importorskip(
-        "playwright.sync_api", reason="playwright is not installed: it comes with the extra 'dev'"
+        "playwright.sync_api", reason="playwright is not installed: run: make .venv/ready-test"
     )
     if not CHROMIUM.exists():
         pytest.skip(f"there is no {CHROMIUM}: {_INSTALL}")

@@ -2,11 +2,11 @@
 
 import json
 import platform
-from importlib.metadata import version
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+import islands
 from islands_api.web import prometheus
 from islands_service.domain.job import JobState, ProgressReport
 from support.service import kept, problem_of, queued, spec
@@ -138,7 +138,7 @@ def test_metrics_show_the_current_state_of_jobs(service):
 def test_metrics_describe_the_process_the_disk_and_the_commits(service):
     found = read_metrics(service)
     (build,) = [dict(labels) for name, labels in found if name == "islands_build_info"]
-    assert build == {"version": version("islands"), "python": platform.python_version(), "role": "api"}
+    assert build == {"version": islands.__version__, "python": platform.python_version(), "role": "api"}
     assert found["process_resident_memory_bytes", ()] > 1e7
     assert 0 < found["islands_disk_free_bytes", ()] < found["islands_disk_bytes", ()]
     queued(service.store)

@@ -7,7 +7,6 @@ import pytest
 
 from islands.errors import SettingsError
 from islands_api.__main__ import check_safe
-from islands_api.web import auth
 from islands_api.web.auth import make_verifier
 from islands_service.settings import ServiceSettings
 from support.issuers import AUDIENCE, encode_part, issuing, make_claims, make_key
@@ -197,9 +196,3 @@ def test_a_public_address_needs_a_key_or_complete_settings_of_tokens(service, ch
     check_safe(
         ServiceSettings(**public, oidc_issuer="https://id.example.org", oidc_audience="a"), service.store
     )
-
-
-def test_tokens_without_their_extra_name_it(monkeypatch):
-    monkeypatch.setattr(auth, "find_spec", lambda _name: None)
-    with pytest.raises(SettingsError, match=r"pip install 'islands\[oidc\]'"):
-        make_verifier(ServiceSettings(oidc_issuer="https://id.example.org", oidc_audience="a"))

@@ -4,7 +4,6 @@ import sys
 from collections.abc import Mapping
 from difflib import get_close_matches
 from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -13,6 +12,7 @@ import typer
 from rich.markup import escape
 from typer.core import TyperCommand, TyperGroup
 
+from islands.distribution import describe_missing_extra, read_version
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.progress import StoppedError
 from islands_api.cli.console import errors, exit_with_closed_output
@@ -149,7 +149,7 @@ def explain_missing_package(error: ModuleNotFoundError, command: str) -> Excepti
     extra = EXTRAS.get((error.name or "").partition(".")[0])
     if extra is None:
         return error
-    return SettingsError(f"islands {command} needs the {extra} packages: pip install 'islands[{extra}]'")
+    return SettingsError(describe_missing_extra(f"islands {command}", extra))
 
 
 app = typer.Typer(
@@ -162,7 +162,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"islands {version('islands')}")
+        typer.echo(f"islands {read_version()}")
         raise typer.Exit
 
 

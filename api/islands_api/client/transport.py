@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from email.utils import parsedate_to_datetime
 from http import HTTPStatus
-from importlib.metadata import version
 from itertools import chain, repeat
 from math import inf
 from time import monotonic
@@ -14,6 +13,7 @@ from typing import Any
 
 import httpx
 
+from islands.distribution import read_version
 from islands.errors import SettingsError
 from islands_api.client.errors import ServiceUnreachableError
 
@@ -50,7 +50,7 @@ def make_headers(key: str | None) -> dict[str, str]:
     SettingsError
         The key is malformed. The message does not contain the key.
     """
-    headers = {"User-Agent": f"islands/{version('islands')}"}
+    headers = {"User-Agent": f"islands/{read_version()}"}
     if key is None:
         return headers
     # A key read from a file ends with a line break. httpx would show other invalid characters in its error.

@@ -3,13 +3,13 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
-from importlib.metadata import version
 from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from starlette.middleware.gzip import GZipMiddleware
 
+from islands.distribution import read_version
 from islands_api.web import exception_handlers
 from islands_api.web.auth import KeyCache, make_verifier
 from islands_api.web.concurrency import BlockingExecutor
@@ -102,7 +102,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
 
     app = FastAPI(
         title="islands",
-        version=version("islands"),
+        version=read_version(),
         description=_DESCRIPTION,
         lifespan=lifespan,
         docs_url=None,

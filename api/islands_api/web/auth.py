@@ -10,6 +10,7 @@ from fastapi import Depends, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from fastapi.security.base import SecurityBase
 
+from islands.distribution import describe_missing_extra
 from islands.errors import SettingsError
 from islands_api.oidc.bearer_token import TokenRefusedError, is_token
 from islands_api.web.dependencies import AppState
@@ -166,9 +167,7 @@ def make_verifier(settings: ServiceSettings) -> "TokenVerifier | None":
     if not settings.oidc_issuer:
         return None
     if find_spec("joserfc") is None:
-        raise SettingsError(
-            "tokens (ISLANDS_OIDC_ISSUER) need an extra: install it with pip install 'islands[oidc]'"
-        )
+        raise SettingsError(describe_missing_extra("the setting ISLANDS_OIDC_ISSUER", "oidc"))
     # The import of the cryptography takes a tenth of a second.
     from islands_api.oidc.token_verifier import make_token_verifier  # noqa: PLC0415
 

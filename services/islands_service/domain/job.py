@@ -21,14 +21,14 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from importlib.metadata import version
 from typing import Any
 
+from islands.distribution import read_version
 from islands.errors import IslandsError
 from islands_service.domain.monitoring import MonitorUpdate
 
 #: Version of islands of this process.
-ISLANDS_VERSION = version("islands")
+ISLANDS_VERSION = read_version()
 
 
 class JobState(StrEnum):

@@ -2,10 +2,10 @@
 
 import platform
 from collections.abc import Callable
-from importlib.metadata import version
 
 from prometheus_client import CollectorRegistry, Histogram, Info, ProcessCollector, start_http_server
 
+from islands.distribution import read_version
 from islands.errors import SettingsError
 
 #: Upper bounds in seconds of the buckets of durable writes.
@@ -23,7 +23,7 @@ def make_registry(role: str) -> CollectorRegistry:
     registry = CollectorRegistry()
     ProcessCollector(registry=registry)
     build = Info("islands_build", "Version of islands and of Python.", registry=registry)
-    build.info({"version": version("islands"), "python": platform.python_version(), "role": role})
+    build.info({"version": read_version(), "python": platform.python_version(), "role": role})
     return registry
 
 

@@ -9,7 +9,6 @@ import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from importlib.metadata import version
 from math import inf
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from ray.exceptions import (
     WorkerCrashedError,
 )
 
+from islands.distribution import read_version
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings.setting_checks import count_cpus
 
@@ -120,9 +120,9 @@ def check_version(found: str) -> None:
     ------
     ClusterError
     """
-    if found != version("islands"):
+    if found != read_version():
         raise ClusterError(
-            f"a machine of the cluster has islands {found}, this one {version('islands')}: the result would "
+            f"a machine of the cluster has islands {found}, this one {read_version()}: the result would "
             "depend on the machine that computes it; install one version on all"
         )
 

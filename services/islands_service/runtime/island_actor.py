@@ -3,12 +3,12 @@
 Islands are passed and returned by value, so that the loss of an actor costs only time.
 """
 
-from importlib.metadata import version
 from threading import Event
 from time import monotonic
 
 import ray
 
+from islands.distribution import read_version
 from islands.evolution.epoch import run_epoch
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.island import Island
@@ -49,7 +49,7 @@ class IslandActor:
         warm_up(lambda _line: None)
         self._evaluator = Evaluator(self._problem.record, self._problem.settings)
         freeze_garbage_collector()
-        return version("islands")
+        return read_version()
 
     @ray.method(concurrency_group="watch")
     def wait_until_killed(self) -> None:

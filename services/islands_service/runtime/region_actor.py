@@ -7,10 +7,10 @@ The packed islands of a region stay in the object store of its machine.
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 
 import ray
 
+from islands.distribution import read_version
 from islands.evolution.engine import Caches
 from islands.evolution.island import StepInfo
 from islands.evolution.problem import Problem
@@ -118,7 +118,7 @@ class RegionActor:
     def check(self) -> RegionStatus:
         """Return the status since the last call."""
         messages = tuple(self._messages.popleft() for _ in range(len(self._messages)))
-        return RegionStatus(version("islands"), messages, *self._placement)
+        return RegionStatus(read_version(), messages, *self._placement)
 
     @ray.method(num_returns=2)
     def advance(self, *arriving: Mapping[int, bytes]) -> tuple[RegionReport, tuple[PackedEpoch, ...]]:

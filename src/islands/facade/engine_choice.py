@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 
+from islands.distribution import describe_missing_extra
 from islands.errors import SettingsError
 from islands.evolution.engine import Engine, SerialEngine
 from islands.evolution.progress import ProgressCallback, ignore_progress
@@ -80,7 +81,9 @@ def open_engine(
         try:
             engine = stack.enter_context(installed[name].load()(address, progress, cpus))
         except ImportError as error:
+            if name == "ray":
+                raise SettingsError(describe_missing_extra("the engine 'ray'", "ray")) from error
             raise SettingsError(
-                f"the engine {name!r} needs the package {error.name}: install islands[{name}]"
+                f"the engine {name!r} needs the package {error.name}, which is not installed"
             ) from error
         yield engine

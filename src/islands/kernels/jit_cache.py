@@ -22,7 +22,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache, partial
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -34,6 +33,8 @@ from numba.core.ccallback import CFunc
 from numba.core.codegen import get_host_cpu_features
 from numba.core.sigutils import normalize_signature
 from platformdirs import user_cache_path
+
+from islands.distribution import read_version
 
 #: File in the cache folder that marks it as complete: every kernel has been compiled.
 STAMP = "complete"
@@ -237,7 +238,7 @@ def _delete_unused_folders(used: Path) -> None:
 
 def _key() -> str:
     processor = get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME
-    return f"{version('islands')}-{numba.__version__}-{processor}-{_hash(processor)}"
+    return f"{read_version()}-{numba.__version__}-{processor}-{_hash(processor)}"
 
 
 def _hash(processor: str) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from islands.distribution import describe_missing_extra
 from islands.errors import ModelError
 from islands.model.equations import expressions_of_record, signal_names
 from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, Shift
@@ -57,7 +58,7 @@ def to_sympy(model: Model) -> "sympy.Eq":
     try:
         import sympy as sp  # noqa: PLC0415 - an extra
     except ImportError as error:
-        raise ModelError("install islands[sympy] to get the equation of SymPy") from error
+        raise ModelError(describe_missing_extra("the equation of SymPy", "sympy")) from error
     k = sp.Symbol("k", integer=True)
     names = (name.strip("[]") for name in signal_names(model))
     signals = [sp.Function(name, real=True) for name in names]

@@ -1,7 +1,5 @@
 """Public names of the package and its docstring."""
 
-from importlib.metadata import version
-
 import islands
 from islands.facade.fit import fit
 from islands.facade.identify import identify
@@ -34,7 +32,3 @@ def test_package_docstring_shows_an_example():
 def test_facade_functions_are_public():
     assert islands.identify is identify
     assert islands.fit is fit
-
-
-def test_version_equals_that_of_the_distribution():
-    assert islands.__version__ == version("islands")

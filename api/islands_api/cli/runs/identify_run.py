@@ -35,7 +35,7 @@ from islands_api.cli.recordings import Recordings
 from islands_api.cli.runs.timed_engine import TimedEngine
 from islands_api.cli.search_progress import search_progress
 from islands_api.cli.stop_requests import StopRequests, stop_requests
-from islands_service.engines import ENGINES, SERIAL_NOTICE, default_engine, has_ray
+from islands_service.engines import ENGINES, default_engine, has_ray, serial_notice
 
 #: File of the search state.
 CHECKPOINT = "checkpoint.json"
@@ -103,7 +103,7 @@ def run(
     compile_kernels()
     start_engine = ENGINES[run_options.engine_for(possible[0].islands)]
     if run_options.engine is None and possible[0].islands > 1 and not has_ray():
-        print_message(SERIAL_NOTICE)
+        print_message(serial_notice())
     with (
         progress("identify") as show,
         # Ray installs a handler for SIGTERM when it starts, so it starts before our handlers are installed.

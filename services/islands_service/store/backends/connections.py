@@ -6,6 +6,9 @@ from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, make_url
 
+from islands.distribution import describe_missing_extra
+from islands.errors import SettingsError
+
 #: Seconds that SQLite waits for the transaction of another process, and a thread for a connection.
 BUSY_TIMEOUT = 30.0
 
@@ -33,6 +36,11 @@ def make_engine(url: str) -> Engine:
 
     A transaction that writes must set the execution option ``writes``, and one with statements that may take
     minutes the option ``patient``.
+
+    Raises
+    ------
+    SettingsError
+        The database is one of PostgreSQL, but the extra ``cluster`` is not installed.
     """
     return (_sqlite if url.startswith("sqlite") else _postgresql)(url)
 
@@ -79,7 +87,10 @@ def _enable_wal(connection: sqlite3.Connection) -> None:
 
 def _postgresql(url: str) -> Engine:
     # An optional dependency, which SQLite does not need.
-    from islands_service.store.backends.timed_connection import TimedConnection  # noqa: PLC0415
+    try:
+        from islands_service.store.backends.timed_connection import TimedConnection  # noqa: PLC0415
+    except ImportError as error:
+        raise SettingsError(describe_missing_extra("a database of PostgreSQL", "cluster")) from error
 
     given = make_url(url).query
     engine = create_engine(

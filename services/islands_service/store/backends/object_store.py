@@ -14,6 +14,7 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import IO, Any, TypeVar
 
+from islands.distribution import describe_missing_extra
 from islands.errors import IslandsError, SettingsError
 from islands_service.store.database import StoreUnavailableError
 
@@ -79,8 +80,8 @@ class ObjectStore:
             s3fs = import_module("s3fs")
         except ImportError as error:
             raise SettingsError(
-                "ISLANDS_BLOB_STORE needs the package s3fs: install islands[s3], or unset it to store blobs "
-                "in the data folder"
+                f"{describe_missing_extra('the setting ISLANDS_BLOB_STORE', 's3')}; without the setting, "
+                "blobs are in the data folder"
             ) from error
         self._files = s3fs.S3FileSystem(
             # Attempts are counted by `_call`, over all layers.

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from islands.distribution import describe_missing_extra
 from islands.errors import ModelError
 from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
@@ -137,7 +138,7 @@ def linearise(model: Model, operating_point: ArrayLike, y: float | None = None) 
     try:
         import control as library  # noqa: PLC0415 - an extra
     except ImportError as error:
-        raise ModelError("install islands[control] to get a linear system") from error
+        raise ModelError(describe_missing_extra("a linear system", "control")) from error
     found = differentiate_model(model, operating_point, y)
     order = len(found.outputs)
     direct, past = found.inputs[:, 0], found.inputs[:, 1:].T

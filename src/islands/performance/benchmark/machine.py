@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+from islands.distribution import read_version
 from islands.io.export.fmu.compiler import find_compiler
 from islands.performance.benchmark.clock import cpu
 from islands.performance.benchmark.compiled_c import compile_model
 
-#: Packages whose versions influence the times.
-_PACKAGES = ("islands", "numpy", "numba", "llvmlite", "scipy")
+#: Other packages whose versions influence the times.
+_PACKAGES = ("numpy", "numba", "llvmlite", "scipy")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,7 @@ def this_machine() -> Machine:
         f"{platform.system()} {platform.machine()}",
         platform.python_version(),
         _compiler(),
-        {name: version(name) for name in _PACKAGES},
+        {"islands": read_version(), **{name: version(name) for name in _PACKAGES}},
     )
 
 

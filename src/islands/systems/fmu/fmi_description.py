@@ -8,6 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+from islands.distribution import describe_missing_extra
 from islands.errors import ModelError, SettingsError
 
 
@@ -104,7 +105,7 @@ def import_fmpy() -> Any:
     try:
         import fmpy  # noqa: PLC0415 - takes 0.3 s
     except ImportError as error:
-        raise SettingsError("install islands[fmi] to simulate an FMU") from error
+        raise SettingsError(describe_missing_extra("the simulation of an FMU", "fmi")) from error
     return fmpy
 
 

@@ -47,5 +47,5 @@ def test_every_package_of_an_extra_is_known():
 def test_all_names_every_extra_of_users():
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     (text,) = extras["all"]
-    assert text == f"islands[{','.join(sorted(set(extras) - {'all', 'server'}))}]"
+    assert text == f"islands-sysid[{','.join(sorted(set(extras) - {'all', 'server'}))}]"
     assert set(extras["ray"]) < set(extras["service"])

@@ -19,7 +19,7 @@ from islands.validation.metrics import Metrics, metrics
 from islands_api.cli.console import compile_kernels, output, print_message, progress
 from islands_api.cli.output_folder import RESULT_FILES, check_folder
 from islands_api.cli.search_progress import search_progress
-from islands_service.engines import ENGINES, SERIAL_NOTICE, default_engine, has_ray
+from islands_service.engines import ENGINES, default_engine, has_ray, serial_notice
 
 #: Number of islands: one for each core of the smallest supported machine.
 ISLANDS = 2
@@ -52,7 +52,7 @@ def demo(
         write_record(records[part], out / f"{part}.csv")
     compile_kernels()
     if not has_ray():
-        print_message(SERIAL_NOTICE)
+        print_message(serial_notice())
     with (
         progress("demo") as show,
         ENGINES[default_engine(ISLANDS)](None, print_message) as engine,

@@ -10,6 +10,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from islands.distribution import describe_missing_extra
 from islands.errors import RecordError
 from islands.io.records.formats.text.table_start import has_samples
 from islands.io.records.formats.text.text_table import DelimitedText, split_table
@@ -51,7 +52,7 @@ def read_workbook(path: Path, options: ReadingOptions = DEFAULT_READING) -> Deli
         from openpyxl import load_workbook  # noqa: PLC0415
         from openpyxl.utils.exceptions import InvalidFileException  # noqa: PLC0415
     except ImportError as error:
-        raise RecordError(f"{file}: install islands[excel] to read XLSX, or save the sheet as CSV") from error
+        raise RecordError(f"{describe_missing_extra(file, 'excel')}; or save the sheet as CSV") from error
     if not zipfile.is_zipfile(path):
         raise RecordError(f"{file} is not a workbook of the format XLSX: save it again as XLSX or as CSV")
     try:

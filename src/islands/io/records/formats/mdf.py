@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.distribution import describe_missing_extra
 from islands.errors import RecordError
 from islands.io.records.column_names import append_unit
 from islands.io.records.formats.columnar import ColumnarFile
@@ -66,7 +67,7 @@ def _translated_errors(file: str) -> Iterator[None]:
     try:
         from asammdf.blocks.utils import MdfException  # noqa: PLC0415
     except ImportError as error:
-        raise RecordError(f"{file}: install islands[mdf] to read MDF, or export the record as CSV") from error
+        raise RecordError(f"{describe_missing_extra(file, 'mdf')}; or export the record as CSV") from error
     try:
         yield
     except (*DAMAGED, MdfException) as error:

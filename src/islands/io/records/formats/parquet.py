@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.distribution import describe_missing_extra
 from islands.errors import RecordError
 from islands.io.records.column_names import seconds_per_unit
 from islands.io.records.formats.columnar import ColumnarFile
@@ -59,8 +60,7 @@ def _translated_errors(file: str) -> Iterator[None]:
         import pyarrow  # noqa: PLC0415
     except ImportError as error:
         raise RecordError(
-            f"{file}: reading Parquet needs pyarrow, which is not installed: "
-            "pip install 'islands[parquet]', or export the record to .csv"
+            f"{describe_missing_extra(file, 'parquet')}; or export the record as CSV"
         ) from error
     try:
         yield

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.distribution import describe_missing_extra
 from islands.errors import RecordError
 from islands.io.records.column_names import append_unit
 from islands.io.records.formats.columnar import ColumnarFile
@@ -63,7 +64,7 @@ def _open(path: Path) -> Any:
         from nptdms import TdmsFile  # noqa: PLC0415
     except ImportError as error:
         raise RecordError(
-            f"{path.name}: install islands[tdms] to read TDMS, or export the record as CSV"
+            f"{describe_missing_extra(path.name, 'tdms')}; or export the record as CSV"
         ) from error
     return TdmsFile.open(path)
 

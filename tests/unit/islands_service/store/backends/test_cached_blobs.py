@@ -11,7 +11,6 @@ from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store.backends import cached_blobs
 from islands_service.store.backends.cached_blobs import CachedBlobs, open_blobs
 from islands_service.store.backends.object_store import (
-    ObjectStore,
     ObjectStoreError,
     ObjectStoreRefusedError,
 )
@@ -206,9 +205,3 @@ def test_the_setting_names_a_bucket_without_credentials(url):
 def test_without_an_object_store_blobs_are_in_the_data_folder(tmp_path):
     blobs = open_blobs(ServiceSettings(data_dir=tmp_path))
     assert blobs.path(blobs.write(b"a")).is_relative_to(tmp_path / "blobs")
-
-
-def test_the_missing_extra_is_named(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "s3fs", None)
-    with pytest.raises(SettingsError, match=r"install islands\[s3\]"):
-        ObjectStore("s3://bucket/a")

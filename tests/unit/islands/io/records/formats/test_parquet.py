@@ -1,7 +1,6 @@
 """Parquet files: types of numbers, times in the unit of their name, and checks of declared sizes."""
 
 import struct
-import sys
 from datetime import UTC, date, datetime, timedelta
 from decimal import Decimal
 
@@ -245,11 +244,3 @@ def test_a_row_count_above_the_limit_is_refused(honest):
     claiming(honest, 2**40)
     message = refusal(honest, ["u"], "y")
     assert f"column u declares {2**40} samples, but a record has at most {MOST_SAMPLES}" in message
-
-
-def test_a_missing_extra_is_refused_with_installation_advice(write, monkeypatch):
-    file = write()
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    message = refusal(file)
-    assert "pip install 'islands[parquet]'" in message
-    assert "export the record to .csv" in message
