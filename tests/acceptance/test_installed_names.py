@@ -21,7 +21,7 @@ NAMES = r"islands(?:[-_.]sysid)?"
 INSTALL = r"\b(?:pip[x3]?|uv|uvx|pdm|poetry|conda|mamba)\s[^\n]*?\b(?:install|add|run)\b[^\n]*?[\s'\"]"
 
 #: Installation of a requirement that begins with one of our names and is no file; and such a requirement with
-#: extras, wherever it stands.
+#: extras in any place.
 BY_NAME = re.compile(
     rf"{INSTALL}({NAMES}(?:\[[\w, -]+\])?)(?=['\"`\s;,.=<>~]|$)"
     rf"|(?<![/\w-])({NAMES}\[(?:{'|'.join(EXTRAS)})\b[\w, -]*\])",
@@ -40,7 +40,7 @@ def files() -> Iterator[tuple[str, str]]:
     paths = [path for path in ROOT.iterdir() if path.is_file()]
     paths += [path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if path.is_file()]
     for path in paths:
-        if "__pycache__" not in path.parts and path.name not in EXEMPT:
+        if "__pycache__" not in path.parts and path.suffix != ".svg" and path.name not in EXEMPT:
             try:
                 yield str(path.relative_to(ROOT)), path.read_text("utf-8")
             except UnicodeDecodeError:
