@@ -18,7 +18,7 @@ from support.kernel_processes import Start, get_output, process_starter, start_i
 
 pytestmark = pytest.mark.ci
 
-SOURCE = Path(islands.__file__).parent / "kernels" / "jit_cache.py"
+SOURCES = Path(islands.__file__).parent
 
 KERNELS = """
 import numba
@@ -98,11 +98,12 @@ def forks() -> Iterator[Callable[..., Fork]]:
 
 @pytest.fixture
 def sources(tmp_path: Path) -> None:
-    """Copy the file under test and a module of kernels to the folder of the test."""
-    package = tmp_path / "islands" / "kernels"
-    package.mkdir(parents=True)
-    (package.parent / "__init__.py").touch()
-    (package / "jit_cache.py").write_bytes(SOURCE.read_bytes())
+    """Copy the file under test, what it imports, and a module of kernels to the folder of the test."""
+    package = tmp_path / "islands"
+    (package / "kernels").mkdir(parents=True)
+    (package / "__init__.py").touch()
+    for name in ("distribution.py", "kernels/jit_cache.py"):
+        (package / name).write_bytes((SOURCES / name).read_bytes())
     (tmp_path / "toys.py").write_text(KERNELS)
 
 
