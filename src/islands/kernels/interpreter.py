@@ -93,7 +93,7 @@ def call_row(_typingctx, address, target, first, second, lanes):
     return types.void(types.int64, types.int64, types.int64, types.int64, types.int64), generate
 
 
-@kernel(forceinline=True)
+@kernel(forceinline=True, constants=("count", "times"))
 def execute(operation, target, first, second, function, count, times):
     """Execute one instruction on rows: ``target = operation(first, second)``.
 
@@ -123,7 +123,7 @@ def execute(operation, target, first, second, function, count, times):
             write(target + at, add(read(first + at, count), read(second + at, count)))
 
 
-@kernel(forceinline=True)
+@kernel(forceinline=True, constants=("count",))
 def multiply_factors(a, b, c, d, degree, count):
     """Return the product, from left to right, of the first ``degree`` of four rows, given as addresses."""
     product = read(a, count)

@@ -35,6 +35,7 @@ from numba.core.sigutils import normalize_signature
 from platformdirs import user_cache_path
 
 from islands.distribution import read_version
+from islands.kernels.callee import Callee
 
 #: File in the cache folder that marks it as complete: every kernel has been compiled.
 STAMP = "complete"
@@ -48,18 +49,27 @@ COMPILED = ("kernels", "systems", "discrepancy/effects")
 _PACKAGE = Path(__file__).absolute().parents[1]
 
 
-def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+def kernel(
+    function: Callable[..., Any] | None = None, constants: tuple[str, ...] = (), **options: Any
+) -> Any:
     """Compile a function as a kernel, which releases the GIL; 1/0 is inf and not an exception.
 
-    Use it as ``@kernel``, or with more Numba options as ``@kernel(forceinline=True)``.
+    Use it as ``@kernel``, or with more Numba options as ``@kernel(forceinline=True)``. ``constants`` are the
+    parameters whose value the compiler must know if another kernel calls this one.
+
+    Machine code is generated and stored for calls from Python; see `islands.kernels.callee` for calls from
+    other kernels.
 
     The cache distinguishes functions of one factory by the numbers that they enclose. They must not enclose a
     kernel: its representation differs in every process, so the cache would never find the function.
     """
     if function is None:
-        return partial(kernel, **options)
+        return partial(kernel, constants=constants, **options)
     options |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     dispatcher = numba.njit(**options)(function)
+    callee = Callee(function, dispatcher.targetoptions, constants)
+    # Numba asks for these two when a kernel calls this one.
+    dispatcher.get_call_template, dispatcher.get_overload = callee.get_call_template, callee.get_overload
     folder = cache_folder()
     if folder is not None:
         with _numba_caches_in(folder):

@@ -80,7 +80,7 @@ class Chunk(NamedTuple):
     steps: int
 
 
-@kernel(forceinline=True)
+@kernel(forceinline=True, constants=("count",))
 def allocate_workspace(program, warm_up, count):
     """Allocate the workspace and write the constants into their temporaries."""
     width = VECTOR * count
@@ -107,7 +107,7 @@ def safe_error(bound, largest):
     return safe if 1e-290 < safe < 1e300 else -1.0
 
 
-@kernel(forceinline=True, _nrt=False)
+@kernel(forceinline=True, _nrt=False, constants=("count",))
 def open_block(workspace, layout, block, lane, diverged, count):
     """Reset the block's errors and copy its measured warm-up rows into the history."""
     apart = 8 * layout.row_stride
@@ -120,7 +120,7 @@ def open_block(workspace, layout, block, lane, diverged, count):
         write(address(workspace.arena, step * VECTOR * count), row)
 
 
-@kernel(forceinline=True, _nrt=False)
+@kernel(forceinline=True, _nrt=False, constants=("count",))
 def _place_operands(program, workspace, layout, sample, count):
     """Compute the address and the stride of every operand for a chunk whose first row is at ``sample``."""
     # Fields are read from their tuples once: each access costs as much as a row.
@@ -137,7 +137,7 @@ def _place_operands(program, workspace, layout, sample, count):
             places[index], strides[index] = address(signals, channel * flat + sample) - lag * apart, apart
 
 
-@kernel(forceinline=True, _nrt=False)
+@kernel(forceinline=True, _nrt=False, constants=("count",))
 def run_chunk(program, theta, workspace, layout, block, chunk, active, squared_error, count):
     """Simulate the steps of a chunk; return the number of lanes whose intervals have not ended.
 
@@ -184,7 +184,7 @@ def _get_place(places, operand):
     return places[np.uint64(operand)]
 
 
-@kernel(forceinline=True, _nrt=False)
+@kernel(forceinline=True, _nrt=False, constants=("count",))
 def move_history(workspace, layout, chunk, count):
     """Copy the last rows of a chunk to the place of the warm-up rows."""
     width = VECTOR * count
