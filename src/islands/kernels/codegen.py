@@ -89,7 +89,7 @@ def generate_program(
         node = needed[index]
         operation, first, second = nodes.operation[node], nodes.first[node], nodes.second[node]
         if operation == LAGGED:
-            operands[index] = first, second
+            operands[index, 0], operands[index, 1] = first, second
             continue
         operands[index, 0] = TEMPORARY
         if operation == CONSTANT:
@@ -105,7 +105,8 @@ def generate_program(
             rows += 1
         operands[index, 1] = row
         a, b = operand_index[first], operand_index[second]
-        code[position] = operation, row, a, b
+        code[position, 0], code[position, 1] = operation, row
+        code[position, 2], code[position, 3] = a, b
         addresses[position] = nodes.address[node]
         position += 1
         for operand in (a, b) if a != b else (a, -1):

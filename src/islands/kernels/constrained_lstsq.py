@@ -88,7 +88,10 @@ def from_columns(program, rows, terms, reduction, factor, eta):
             right[a] += fold(dot_chunk(chunk, one, chunk, terms * CHUNK))
             for b in range(a + 1):
                 reduced[a, b] += fold(dot_chunk(chunk, one, chunk, free[b] * CHUNK))
-    least = _factorise(reduced, np.diag(reduced), factor)
+    norms = np.empty(count)
+    for a in range(count):
+        norms[a] = reduced[a, a]
+    least = _factorise(reduced, norms, factor)
     if least > 0.0:
         _solve(factor, right, eta)
     return least
@@ -113,7 +116,8 @@ def correct(program, rows, terms, reduction, factor, eta):
         for a in range(free.size):
             right[a] += fold(dot_chunk(chunk, free[a] * CHUNK, chunk, target))
     _solve(factor, right, correction)
-    eta += correction
+    for a in range(free.size):
+        eta[a] += correction[a]
 
 
 @kernel

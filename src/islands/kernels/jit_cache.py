@@ -67,8 +67,8 @@ def kernel(
         return partial(kernel, constants=constants, **options)
     options |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     dispatcher = numba.njit(**options)(function)
-    callee = Callee(function, dispatcher.targetoptions, constants)
-    # Numba asks for these two when a kernel calls this one.
+    callee = dispatcher.callee = Callee(function, dispatcher.targetoptions, constants)
+    # Numba calls these two where a kernel calls this one.
     dispatcher.get_call_template, dispatcher.get_overload = callee.get_call_template, callee.get_overload
     folder = cache_folder()
     if folder is not None:

@@ -62,7 +62,9 @@ def complete_pairs(structures, sizes, target, nodes, pairs, rows, operand_index)
     """
     local = np.full(nodes.degree.size, -1, np.int64)
     terms = np.empty_like(local)
-    most = np.sum((sizes + 1) * (sizes + 2) // 2)
+    most = 0
+    for size in sizes:
+        most += (size + 1) * (size + 2) // 2
     missing, places = np.empty((most, 2), np.int64), np.empty(most, np.int64)
     count = used = 0
     for index in range(sizes.size):
@@ -83,7 +85,7 @@ def complete_pairs(structures, sizes, target, nodes, pairs, rows, operand_index)
                         terms[used] = term
                         used += 1
                 places[count] = at
-                missing[count] = local[one], local[other]
+                missing[count, 0], missing[count, 1] = local[one], local[other]
                 count += 1
     if count == 0:
         return

@@ -106,8 +106,22 @@ def reduce(
             if group[i] == group[j]:
                 pivot[i] = best
                 share[i] = weight[i] / weight[best]
-    free = np.flatnonzero(pivot != np.arange(terms))
+    is_free, free = np.empty(terms, np.bool_), np.empty(terms, np.int64)
+    for j in range(terms):
+        is_free[j] = pivot[j] != j
+    free = free[: find_true(is_free, free)]
     return Reduction(pivot, share, fixed, np.empty(0, np.int64), np.empty((0, terms)), np.empty(0), free)
+
+
+@kernel
+def find_true(values, found):
+    """Find the true values; return their number. ``found``, out, are their positions, ascending."""
+    count = 0
+    for position in range(values.size):
+        if values[position]:
+            found[count] = position
+            count += 1
+    return count
 
 
 @kernel
@@ -126,7 +140,8 @@ def add_equalities(
     row_pivot, row_share = np.empty(targets.size, np.int64), np.zeros((targets.size, terms))
     row_fixed, rank = np.zeros(targets.size), 0
     is_free = np.zeros(terms, np.bool_)
-    is_free[reduction.free] = True
+    for j in reduction.free:
+        is_free[j] = True
     for row in range(targets.size):
         coefficient, size = np.zeros(terms), np.zeros(terms)
         rest, height = targets[row], abs(targets[row])
@@ -172,6 +187,7 @@ def add_equalities(
             for j in range(terms):
                 row_share[q, j] = _subtract_rounded(row_share[q, j], weight * row_share[rank, j])
         rank += 1
+    free = np.empty(terms, np.int64)
     return Reduction(
         reduction.pivot,
         reduction.share,
@@ -179,7 +195,7 @@ def add_equalities(
         row_pivot[:rank].copy(),
         row_share[:rank].copy(),
         row_fixed[:rank].copy(),
-        np.flatnonzero(is_free),
+        free[: find_true(is_free, free)],
     ), True
 
 
@@ -198,7 +214,10 @@ def find_zeros(
     """Find the parameters that equalities force to be zero."""
     zero[:] = False
     for q in range(reduction.row_pivot.size):
-        zero[reduction.row_pivot[q]] = reduction.row_fixed[q] == 0.0 and not np.any(reduction.row_share[q])
+        is_zero = reduction.row_fixed[q] == 0.0
+        for j in range(zero.size):
+            is_zero &= reduction.row_share[q, j] == 0.0
+        zero[reduction.row_pivot[q]] = is_zero
     for p in range(zero.size):
         if reduction.pivot[p] != p:
             continue
@@ -212,15 +231,20 @@ def find_zeros(
                     if reduction.row_pivot[q] == j:
                         moved[j] = 0.0
                         rest = _subtract_rounded(rest, reduction.share[j] * reduction.row_fixed[q])
-                        moved -= reduction.share[j] * reduction.row_share[q]
-                        size += np.abs(reduction.share[j] * reduction.row_share[q])
-        zero[p] = rest == 0.0 and not np.any(np.abs(moved) > _ROUNDING * size)
+                        for i in range(zero.size):
+                            moved[i] -= reduction.share[j] * reduction.row_share[q, i]
+                            size[i] += abs(reduction.share[j] * reduction.row_share[q, i])
+        is_zero = rest == 0.0
+        for i in range(zero.size):
+            is_zero &= not (abs(moved[i]) > _ROUNDING * size[i])
+        zero[p] = is_zero
 
 
 @kernel
 def expand(reduction, eta, theta):
     """Compute all parameters ``theta`` from the free ones; the pivots complete the sums of their groups."""
-    theta[:] = reduction.fixed
+    for j in range(theta.size):
+        theta[j] = reduction.fixed[j]
     for a in range(eta.size):
         _set_parameter(reduction, reduction.free[a], eta[a], theta)
     for q in range(reduction.row_pivot.size):
@@ -250,9 +274,7 @@ def drop_single_members(terms, positions, size, groups):
         for j in range(size):
             if j != i and groups.group[terms[positions[j]]] == group:
                 single[i] = False
-    left = positions[:size][~single]
-    positions[: left.size] = left
-    return left.size
+    return _leave_out(positions, size, single)
 
 
 @kernel
@@ -261,17 +283,29 @@ def drop_zero_parameters(terms, positions, size, groups):
     while size > 0:
         chosen = terms[positions[:size]]
         group, weight, sums, _ = get_constraint(chosen, groups)
-        norms = np.eye(size)
+        norms = np.zeros((size, size))
+        for i in range(size):
+            norms[i, i] = 1.0
         reduction = reduce(norms, size, group, weight, sums)
         reduction, feasible = add_equalities(reduction, norms, get_equalities(chosen, groups), groups.targets)
         zero = np.empty(size, np.bool_)
         find_zeros(reduction, zero)
-        if not (feasible and zero.any()):  # an inconsistent structure is left as it is
+        left = _leave_out(positions, size, zero) if feasible else size
+        if left == size:  # an inconsistent structure is left as it is
             break
-        left = positions[:size][~zero]
-        positions[: left.size] = left
-        size = left.size
+        size = left
     return size
+
+
+@kernel
+def _leave_out(positions, size, dropped):
+    """Delete the dropped ones of the first ``size`` positions in place; return the number of the others."""
+    left = 0
+    for i in range(size):
+        if not dropped[i]:
+            positions[left] = positions[i]
+            left += 1
+    return left
 
 
 @kernel
@@ -279,7 +313,8 @@ def get_equalities(chosen, groups):
     """Return the coefficients of the chosen terms, one row for each equality."""
     rows = np.empty((groups.targets.size, chosen.size))
     for i in range(chosen.size):
-        rows[:, i] = groups.coefficients[chosen[i]]
+        for row in range(groups.targets.size):
+            rows[row, i] = groups.coefficients[chosen[i], row]
     return rows
 
 
@@ -295,5 +330,8 @@ def get_constraint(chosen, groups):
             sums[i] = groups.sums[group[i]]
     feasible = True
     for required in range(groups.required):
-        feasible &= np.any(group == required)
+        present = False
+        for i in range(chosen.size):
+            present |= group[i] == required
+        feasible &= present
     return group, weight, sums, feasible

@@ -177,7 +177,8 @@ def _select_terms(terms, size, pruned, context, matrix, positions):
 
     ``positions``, out, are the terms that are left. ``matrix`` is scratch memory.
     """
-    positions[:size] = np.arange(size)
+    for position in range(size):
+        positions[position] = position
     if not read_gram(terms[:size], context.target, context.pairs, matrix):
         return size, OVERFLOW
     if pruned and context.previous < 0:
@@ -198,7 +199,7 @@ def _prune_increments(terms, context, matrix, positions):
     Columns that are zero on the record are left to the estimation, which rejects them.
     """
     size = terms.size
-    if not np.diag(matrix)[:size].all():
+    if _has_zero_column(matrix, size):
         return size
     group, weight, sums, _ = get_constraint(terms, context.groups)
     reduction = reduce(matrix, size, group, weight, sums)
@@ -222,7 +223,7 @@ def _estimate(chosen, context, matrix, operand_index, theta):
     if context.rows.count <= size:
         return TOO_FEW_ROWS
     read_gram(chosen, context.target, context.pairs, matrix)
-    if not np.diag(matrix)[:size].all():  # a column is zero on the record, and was not pruned
+    if _has_zero_column(matrix, size):  # a column is zero on the record, and was not pruned
         return DEPENDENT
     reduction = reduce(matrix, size, group, weight, sums)
     if context.groups.targets.size > 0:
@@ -234,11 +235,26 @@ def _estimate(chosen, context, matrix, operand_index, theta):
     factor, eta = ConstrainedFactor(np.empty((count, count)), np.empty(count)), np.empty(count)
     least = from_gram(matrix, size, reduction, factor, eta)
     if least < ILL_CONDITIONED:
-        program = generate_program(context.nodes, np.append(chosen, context.target), operand_index)
+        terms = np.empty(size + 1, np.int64)
+        for position in range(size):
+            terms[position] = chosen[position]
+        terms[size] = context.target
+        program = generate_program(context.nodes, terms, operand_index)
         if least < SINGULAR and from_columns(program, context.rows, size, reduction, factor, eta) < SINGULAR:
             return DEPENDENT
         correct(program, context.rows, size, reduction, factor, eta)
     expand(reduction, eta, theta)
-    if context.groups.signs.size > 0 and np.any(context.groups.signs[chosen] * theta < 0.0):
-        return WRONG_SIGN
+    if context.groups.signs.size > 0:
+        for position in range(size):
+            if context.groups.signs[chosen[position]] * theta[position] < 0.0:
+                return WRONG_SIGN
     return OK
+
+
+@kernel
+def _has_zero_column(matrix, size):
+    """Return whether the squared norm of one of the columns, on the diagonal of the matrix, is zero."""
+    for position in range(size):
+        if matrix[position, position] == 0.0:
+            return True
+    return False

@@ -8,6 +8,7 @@ import numpy as np
 
 from islands.kernels.constrained_lstsq import reduced_product, reduced_target_product
 from islands.kernels.jit_cache import kernel
+from islands.kernels.parameter_reduction import find_true
 
 #: A candidate whose squared norm has shrunk to this fraction counts as dependent on the selected ones: in
 #: float64 the Gram matrix has sixteen digits of the squares, so fewer than six of the remainder.
@@ -84,9 +85,7 @@ def prune(gram, terms, tolerance, kept):
     kept_terms = np.zeros(terms, np.bool_)
     for rank in range(selected):
         kept_terms[order[rank]] = err[rank] > tolerance
-    found = np.flatnonzero(kept_terms)
-    kept[: found.size] = found
-    return found.size
+    return find_true(kept_terms, kept)
 
 
 @kernel
@@ -124,13 +123,13 @@ def prune_increments(
         reduced[a, count] = reduced[count, a] = along
     order, err = np.empty(count, np.int64), np.empty(count)
     selected = select(reduced, count, 0.0, count, order, err)
-    stays = fixed != 0.0
+    stays = np.empty(terms, np.bool_)
+    for p in range(terms):
+        stays[p] = fixed[p] != 0.0
     for rank in range(selected):
         if err[rank] > tolerance:
             term = free[order[rank]]
             stays[term] = True
             if reduction.pivot[term] >= 0:
                 stays[reduction.pivot[term]] = True
-    found = np.flatnonzero(stays)
-    kept[: found.size] = found
-    return found.size
+    return find_true(stays, kept)

@@ -215,8 +215,8 @@ def _evaluate(gram, correlation, tree, ranges, shares, scratch, error, chosen):
     gain, one, other = _complete(gram, scratch, rank, fixed, split, columns, left_to_choose)
     best = max(0.0, 1.0 - explained - gain)
     if best < error:
-        chosen[:] = -1
-        chosen[:fixed] = scratch.columns[:fixed]
+        for place in range(chosen.size):
+            chosen[place] = scratch.columns[place] if place < fixed else -1
         if one >= 0:
             chosen[fixed] = scratch.columns[one]
         if other >= 0:

@@ -1,6 +1,6 @@
 """Compiled kernels are stored in one folder, loaded again, and compiled by one process at a time.
 
-Each test starts processes with a small module of kernels. They import a copy of the file under test, since
+Each test starts processes with a small module of kernels. They import a copy of the files under test, since
 the whole package takes a second to import. Most are forks of one process that has loaded Numba.
 """
 
@@ -27,7 +27,7 @@ from islands.kernels.jit_cache import cache_folder, kernel
 set_before = numba.config.CACHE_DIR
 
 
-@kernel(inline="always")
+@kernel
 def half(x):
     return x / 2.0
 
@@ -98,11 +98,11 @@ def forks() -> Iterator[Callable[..., Fork]]:
 
 @pytest.fixture
 def sources(tmp_path: Path) -> None:
-    """Copy the file under test, what it imports, and a module of kernels to the folder of the test."""
+    """Copy the files under test, what they import, and a module of kernels to the folder of the test."""
     package = tmp_path / "islands"
     (package / "kernels").mkdir(parents=True)
     (package / "__init__.py").touch()
-    for name in ("distribution.py", "kernels/jit_cache.py"):
+    for name in ("distribution.py", "kernels/callee.py", "kernels/jit_cache.py"):
         (package / name).write_bytes((SOURCES / name).read_bytes())
     (tmp_path / "toys.py").write_text(KERNELS)
 
@@ -129,7 +129,7 @@ def test_kernels_are_stored_in_the_chosen_folder_only(start, tmp_path):
     found = get_output(start(READY))
     folder = Path(found["folder"])
     assert folder.parent == tmp_path / "cache" / "kernels"
-    assert stored_kernels(folder) == stored_kernels(tmp_path) == {"toys.ratio"}  # others are inlined
+    assert stored_kernels(folder) == stored_kernels(tmp_path) == {"toys.ratio"}  # half is called by it alone
     assert [path.parent.parent for path in tmp_path.rglob("*.nbi")] == [folder]
 
 
