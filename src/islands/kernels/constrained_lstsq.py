@@ -120,7 +120,7 @@ def correct(program, rows, terms, reduction, factor, eta):
         eta[a] += correction[a]
 
 
-@kernel
+@kernel(_nrt=False)
 def _reduce_products(gram, terms, reduction, reduced, right):
     """Eliminate the pivots of the equalities from the inner products of the free columns."""
     free, pivots, share = reduction.free, reduction.row_pivot, reduction.row_share
@@ -144,7 +144,7 @@ def _reduce_products(gram, terms, reduction, reduced, right):
                 )
 
 
-@kernel
+@kernel(_nrt=False)
 def reduced_target_product(gram, reduction, i, terms):
     """Return the inner product of a column and the target, both without the pivots of the groups."""
     total = reduced_times_column(gram, reduction, i, terms)
@@ -154,7 +154,7 @@ def reduced_target_product(gram, reduction, i, terms):
     return total
 
 
-@kernel
+@kernel(_nrt=False)
 def reduced_product(gram, reduction, i, j):
     """Return the inner product of two reduced columns."""
     total = reduced_times_column(gram, reduction, i, j)
@@ -163,7 +163,7 @@ def reduced_product(gram, reduction, i, j):
     return total
 
 
-@kernel
+@kernel(_nrt=False)
 def reduced_times_column(gram, reduction, i, column):
     """Return the inner product of a reduced column and one of the Gram matrix."""
     if reduction.pivot[i] < 0:
@@ -171,7 +171,7 @@ def reduced_times_column(gram, reduction, i, column):
     return gram[i, column] - reduction.share[i] * gram[reduction.pivot[i], column]
 
 
-@kernel
+@kernel(_nrt=False)
 def _reduce_columns(chunk, terms, reduction):
     """Eliminate the pivots from the columns of a chunk and from the target, which follows them."""
     for j in range(terms):
@@ -195,7 +195,7 @@ def _subtract_column(chunk, at, share, other):
         store(chunk, at + row, subtract(load(chunk, at + row, 4), part))
 
 
-@kernel
+@kernel(_nrt=False)
 def _factorise(matrix, norms, factor):
     """Factor the equilibrated matrix, ``lower lower' = scale matrix scale`` (Cholesky), given its lower half.
 
@@ -222,7 +222,7 @@ def _factorise(matrix, norms, factor):
     return least
 
 
-@kernel
+@kernel(_nrt=False)
 def _solve(factor, right, solution):
     """Solve ``matrix solution = right`` with the factor of the equilibrated matrix."""
     lower, scale = factor

@@ -79,7 +79,7 @@ def gram(
         _read_tiles(running, blocks, begin, end, terms, out)
 
 
-@kernel
+@kernel(_nrt=False)
 def _add_pairs(chunk, pairs, running):
     """Add the products of a chunk of rows to the running sums of every pair, four pairs at a time."""
     last = pairs.shape[0] - 1
@@ -99,7 +99,7 @@ def _add_pairs(chunk, pairs, running):
         store(running, VECTOR * pair, add(load(running, VECTOR * pair, 4), sums))
 
 
-@kernel
+@kernel(_nrt=False)
 def _add_tiles(chunk, blocks, begin, end, running):
     """Add the products of a chunk of rows to the running sums of some tiles, four terms times four."""
     tile = 0
@@ -126,7 +126,7 @@ def _add_tiles(chunk, blocks, begin, end, running):
             tile += 1
 
 
-@kernel
+@kernel(_nrt=False)
 def _read_tiles(running, blocks, begin, end, terms, out):
     """Fold the running sums of some tiles and write both halves of the symmetric matrix."""
     tile = 0

@@ -44,7 +44,7 @@ def pair_key(one, other):
     return (min(one, other) << 32) | max(one, other)
 
 
-@kernel
+@kernel(_nrt=False)
 def find_pair(pairs, key):
     """Return the place of a key, or the free place where it belongs; at least one place must be free."""
     last = pairs.keys.size - 1
@@ -102,7 +102,7 @@ def complete_pairs(structures, sizes, target, nodes, pairs, rows, operand_index)
         pairs.values[places[index]] = numbers[index]
 
 
-@kernel
+@kernel(_nrt=False)
 def read_gram(terms, target, pairs, matrix):
     """Read the Gram matrix of the terms, the target last, from the table; return whether it is finite."""
     size = terms.size

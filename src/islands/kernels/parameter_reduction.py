@@ -113,7 +113,7 @@ def reduce(
     return Reduction(pivot, share, fixed, np.empty(0, np.int64), np.empty((0, terms)), np.empty(0), free)
 
 
-@kernel
+@kernel(_nrt=False)
 def find_true(values, found):
     """Find the true values; return their number. ``found``, out, are their positions, ascending."""
     count = 0
@@ -240,7 +240,7 @@ def find_zeros(
         zero[p] = is_zero
 
 
-@kernel
+@kernel(_nrt=False)
 def expand(reduction, eta, theta):
     """Compute all parameters ``theta`` from the free ones; the pivots complete the sums of their groups."""
     for j in range(theta.size):
@@ -254,7 +254,7 @@ def expand(reduction, eta, theta):
         _set_parameter(reduction, reduction.row_pivot[q], total, theta)
 
 
-@kernel
+@kernel(_nrt=False)
 def _set_parameter(reduction, j, parameter, theta):
     """Set a parameter that is not the pivot of its group, and complete the sum of the group."""
     theta[j] = parameter
@@ -297,7 +297,7 @@ def drop_zero_parameters(terms, positions, size, groups):
     return size
 
 
-@kernel
+@kernel(_nrt=False)
 def _leave_out(positions, size, dropped):
     """Delete the dropped ones of the first ``size`` positions in place; return the number of the others."""
     left = 0

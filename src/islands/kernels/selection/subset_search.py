@@ -163,7 +163,7 @@ def _allocate(count):
     )
 
 
-@kernel
+@kernel(_nrt=False)
 def _divide(ranges, shares, parent, child, split, one, some, other):
     """Write a child: the ranges of its parent, with one range divided into two halves."""
     ranges[child] = -1
@@ -180,7 +180,7 @@ def _divide(ranges, shares, parent, child, split, one, some, other):
         ranges[child, place], shares[child, place] = other, rest
 
 
-@kernel
+@kernel(_nrt=False)
 def _evaluate(gram, correlation, tree, ranges, shares, scratch, error, chosen):
     """Return the lower bound of a node, or the error of its best subset; whether it is the error; the work.
 
@@ -224,7 +224,7 @@ def _evaluate(gram, correlation, tree, ranges, shares, scratch, error, chosen):
     return best, True, columns**2 * (fixed + 1) // 2
 
 
-@kernel
+@kernel(_nrt=False)
 def _explain(gram, correlation, scratch, fixed, columns):
     """Orthogonalise the columns against the first ``fixed`` ones.
 
@@ -253,7 +253,7 @@ def _explain(gram, correlation, scratch, fixed, columns):
     return explained, rank
 
 
-@kernel
+@kernel(_nrt=False)
 def _complete(gram, scratch, rank, fixed, split, columns, number):
     """Return the largest squares that one or two more columns explain, and their positions.
 
