@@ -7,9 +7,10 @@ from dataclasses import dataclass
 AT_ONCE = "+1"
 
 #: Quantity and unit in the notation of ISO 80000: ``t/s``, ``U_1/mV``. Products of units are in brackets.
-_QUOTIENT = re.compile(r"([^/]+?)\s*/\s*([^/\s]+)")
+# A run of blanks must match in one way only: otherwise the time grows with the square of its length.
+_QUOTIENT = re.compile(r"([^/]*[^/\s])\s*/\s*([^/\s]+)")
 
-_BRACKETED = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]")
+_BRACKETED = re.compile(r"(|.*\S)\s*[\[(]([^\[\]()]*)[\])]")
 
 #: Exponents of ten of the SI prefixes.
 _PREFIXES = {"": 0, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "k": 3, "M": 6, "G": 9, "T": 12}
@@ -24,7 +25,7 @@ _UNIT = re.compile(f"(?:{'|'.join(PLAIN_UNITS)})|([{''.join(_PREFIXES)}]?)({'|'.
 _LONG_TIMES = ("min", "h", "d")
 
 #: Names of times.
-_TIME_STEM = re.compile(r"(?:t|(?i:.*(?:time|zeit|duration|dauer|delay|period|age)))(?:_.*)?")
+_TIME_STEM = re.compile(r"(?:t|(?i:.*(?:time|zeit|duration|dauer|delay|period|age)))(?:_.*)?", re.DOTALL)
 
 #: Units of time that divide the unit before them.
 _DIVISORS = frozenset({"s", "s2", "min", "h"})
@@ -86,8 +87,8 @@ def parse_unit(name: str) -> str:
 
 def _split_unit(name: str) -> tuple[str, str]:
     """Return the name without its unit, and the unit."""
-    if (bracketed := _BRACKETED.fullmatch(name)) and is_unit(bracketed[2]):
-        return bracketed[1], bracketed[2]
+    if (bracketed := _BRACKETED.fullmatch(name)) and is_unit(unit := bracketed[2].strip()):
+        return bracketed[1], unit
     if (quotient := _match_quotient(name)) is not None:
         return quotient[1], quotient[2]
     stem, _, last = name.rpartition("_")

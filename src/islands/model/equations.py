@@ -177,4 +177,4 @@ def _break_rows(terms: Sequence[str]) -> list[str]:
 
 
 def _count_characters(element: str) -> int:
-    return len(unescape(re.sub("<[^>]*>", "", element)))
+    return len(unescape(re.sub("<[^<>]*>", "", element)))

@@ -31,14 +31,13 @@ FORMS = (
 _UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _NUMBER = rf"[-+]?{_UNSIGNED}"
 _NUMBERS = rf"{_NUMBER}(?:\s*,\s*{_NUMBER})*"
-_TERM = rf"\s*(?:(?P<sign>[-+])\s*)?(?:(?P<weight>{_UNSIGNED})\s*\*\s*)?\[(?P<term>[^\[\]]+)\]"
+_TERM = re.compile(rf"\s*(?:(?P<sign>[-+])\s*)?(?:(?P<weight>{_UNSIGNED})\s*\*\s*)?\[(?P<term>[^\[\]]+)\]")
 _FIXED_POINT = re.compile(rf"fixed-point\s*=\s*(?P<point>{_NUMBERS})")
 _GAIN = re.compile(
     rf"gain(?:\(u(?P<channel>\d{{1,3}})?\))?\s*=\s*(?P<gain>{_NUMBER})(?:\s*at\s+(?P<point>{_NUMBERS}))?"
 )
-_LINEAR = re.compile(
-    rf"(?P<terms>(?:{re.sub(r'P<[a-z]+>', ':', _TERM)})+)\s*(?P<relation><=|>=|=)\s*(?P<target>{_NUMBER})"
-)
+_TERMS = rf"(?:{re.sub(r'P<[a-z]+>', ':', _TERM.pattern)})+"
+_LINEAR = re.compile(rf"(?P<terms>{_TERMS})\s*(?P<relation><=|>=|=)\s*(?P<target>{_NUMBER})")
 
 
 def parse_statements(text: str, names: Mapping[str, tuple[Part, ...]]) -> tuple[Part, ...]:
@@ -109,7 +108,9 @@ def _read_number(statement: str, text: str) -> float:
 
 def _make_linear(statement: str, match: re.Match[str]) -> Part:
     weights: dict[Regressor, float] = {}
-    for position, entry in enumerate(re.finditer(_TERM, match["terms"])):
+    for position, text in enumerate(match["terms"].split("]")[:-1]):
+        entry = _TERM.fullmatch(f"{text}]")
+        assert entry is not None
         if position and not entry["sign"]:
             raise SettingsError(f"{statement!r} lacks a sign before [{entry['term']}]: write + or -")
         weight = _read_number(statement, f"{entry['sign'] or ''}{entry['weight'] or 1}")

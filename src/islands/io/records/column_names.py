@@ -19,12 +19,15 @@ _TIME = re.compile(
     re.IGNORECASE,
 )
 
-#: End of the name of a time column: its unit in any case, a number, or another word.
-_END = re.compile(r"(?:[_\[(/]|\sin\s)\s*([^_\[\](/)]*?)\s*[\])]?$")
+#: Marks before the last word of a name, and marks before which no last word begins.
+_OPENING, _CLOSING = "_[(/", "])"
 
 #: Last words of names of time columns that are not a unit.
 _WORDS = ("time", "value", "stamp")
 
+
+#: Names that a message lists, at most.
+_LISTED = 10
 
 #: Unit in brackets behind a name.
 _BRACKETED_UNIT = re.compile(r"\s*[\[(][^\[\]()]*[\])]")
@@ -74,9 +77,19 @@ def looks_like_time(name: str) -> bool:
 
 def seconds_per_unit(name: str) -> float | None:
     """Return the unit of a time column in seconds, None if the unit is unknown."""
-    end = _END.search(name)
-    text = "" if end is None else normalise_unit(spell_unit(end[1].lower()))
+    text = normalise_unit(spell_unit(_last_word(name).lower()))
     return TIME_UNITS.get("" if text.isdigit() or text in _WORDS else text)
+
+
+def _last_word(name: str) -> str:
+    """Return the end of a name in brackets, behind a mark or behind ``in``; empty if there is none."""
+    text = name.strip()
+    text = text[:-1] if text.endswith(tuple(_CLOSING)) else text
+    place = max(text.rfind(mark) for mark in _OPENING + _CLOSING)
+    if place >= 0 and text[place] in _OPENING:
+        return text[place + 1 :].strip()
+    _, *word = re.split(r"\sin\s", text[place + 1 :], maxsplit=1)
+    return word[0].strip() if word else ""
 
 
 def time_column(
@@ -137,7 +150,7 @@ def time_column(
 def _check_single(candidates: Sequence[str], file: str) -> str | None:
     if len(candidates) > 1:
         raise RecordError(
-            f"{file}: columns {' and '.join(candidates)} may all be the time: name one by --time "
+            f"{file}: columns {' and '.join(candidates[:_LISTED])} may all be the time: name one by --time "
             "(library: time=)"
         )
     return candidates[0] if candidates else None

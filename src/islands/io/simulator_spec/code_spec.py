@@ -27,8 +27,8 @@ _Name = Annotated[str, Field(min_length=1, max_length=500)]
 #: Options behind the file name that are lists of names.
 _LISTS = ("channels", "initial", "parameters")
 
-#: Comma between names; a name can contain others in brackets, as ``K[1,2]``.
-_COMMA = re.compile(r",(?![^\[]*\])")
+#: Name in a list with commas; a name can contain others in brackets, as ``K[1,2]``.
+_LISTED = re.compile(r"(?:\[[^\[\]]*\]|[^,])+")
 
 
 class ProgramSpec(SimulatorSpec):
@@ -172,7 +172,7 @@ class FmuSpec(SimulatorSpec):
         except ValueError:
             raise SettingsError(f"{query}: write OPTION=VALUE&OPTION=VALUE behind {file}?") from None
         for name, value in given:
-            options[name] = list(filter(None, _COMMA.split(value))) if name in _LISTS else value
+            options[name] = _LISTED.findall(value) if name in _LISTS else value
         if "parameters" in options:
             options["parameters"] = dict(map(_parse_parameter, options["parameters"]))
         return cls.model_validate({**options, "kind": kind, "file": file})

@@ -32,7 +32,7 @@ _DATED = re.compile(rf"\s*{_DATE}(?:(?:\s*[Tt,;_]\s*|\s+){_TIME}{_ZONE})?\s*")
 _TIMED = re.compile(rf"\s*{_TIME}{_ZONE}\s*")
 
 #: ISO 8601 without separators: 20261122T140503.25.
-_BASIC = re.compile(r"\s*(\d{4})(\d\d)(\d\d)[Tt](\d\d)(\d\d)(\d\d)")
+_BASIC = re.compile(r"^\s*(\d{4})(\d\d)(\d\d)[Tt](\d\d)(\d\d)(\d\d)")
 
 #: Beginnings of the names of months in English and German.
 _MONTHS = {
