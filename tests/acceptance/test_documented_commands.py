@@ -52,6 +52,17 @@ def test_commands_and_options_of_a_page_exist(page: Path) -> None:
             assert not unknown, line
 
 
+@pytest.mark.parametrize("page", ["README.md", "docs/how-to/choose-a-preset.md"])
+def test_the_stated_defaults_are_those_of_the_commands(page: str) -> None:
+    text = (ROOT / page).read_text("utf-8")
+    stated = re.findall(r"`(\w+) (--[\w-]+) (\w+)`(?= and [^.]*the defaults?\b|,? the defaults?\b)", text)
+    assert {command for command, _, _ in stated} == {"fit", "identify"}
+    for name, option, value in stated:
+        command, _ = find_command(["islands", name])
+        (parameter,) = [each for each in command.params if option in each.opts]
+        assert parameter.default == value, (name, option)
+
+
 def test_a_wrong_option_is_found() -> None:
     command, rest = find_command(shlex.split("islands jobs submit piezo.csv --input u_V --outputs y_um"))
     assert set(used_options(rest)) - option_names(command) == {"--outputs"}

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import yaml
 from hooks import expand_nav, nav_pages, written_pages
 
+from islands_api.cli.app import COMMANDS
 from support.repository import DOCS, ROOT
 
 #: Hand-written pages: those of the site and those of the repository's root.
@@ -79,10 +80,15 @@ def is_generated(page: str) -> bool:
 
 
 def commands(page: Path) -> Iterator[str]:
-    """Yield the commands of a page that begin with ``islands`` or ``make``: in blocks and in inline code."""
+    """Yield the commands of a page that begin with ``islands`` or ``make``: in blocks and in inline code.
+
+    In inline code ``islands`` may be left out before a command with an option, such as ``fit --library auto``.
+    """
     shell = [code for language, code in blocks(page) if language in ("", "sh", "bash", "console")]
-    lines = re.sub(r"\\\n\s*", "", "\n".join(shell)).splitlines() + re.findall(r"`([^`\n]+)`", prose(page))
-    for line in lines:
+    inline = re.findall(r"`([^`\n]+)`", prose(page))
+    short = rf"({'|'.join(COMMANDS)})( [a-z]+)* --"
+    spans = [f"islands {span}" if re.match(short, span) else span for span in inline]
+    for line in [*re.sub(r"\\\n\s*", "", "\n".join(shell)).splitlines(), *spans]:
         command = re.sub(r"^(\$ |\.venv/bin/)", "", line.strip())
         if re.match(r"(islands|make) [a-z]", command):
             yield re.split(r"\s+#\s| \| |[;&>]", command)[0]

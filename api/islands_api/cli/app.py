@@ -202,3 +202,8 @@ def main() -> None:
             sys.stdout.flush()
     except BrokenPipeError:
         exit_with_closed_output()
+    except SystemExit as end:
+        # Rich and Click end with code 1 if they cannot write.
+        if isinstance(end.__context__, BrokenPipeError):
+            exit_with_closed_output()
+        raise

@@ -24,21 +24,13 @@ CLOSED_OUTPUT = 141
 
 
 def exit_with_closed_output() -> NoReturn:
-    """Exit quietly because the standard output is closed, as that of ``islands show result | head``."""
+    """Exit quietly because the reader of the output has ended, as that of ``islands show result | head``."""
     # Python writes the rest of its buffer at exit, which would fail again.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(CLOSED_OUTPUT)
 
 
-class OutputConsole(Console):
-    """Console of the standard output."""
-
-    def on_broken_pipe(self) -> None:
-        """Exit quietly."""
-        exit_with_closed_output()
-
-
-output = OutputConsole(highlight=False, soft_wrap=True)
+output = Console(highlight=False, soft_wrap=True)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 #: Fraction from which the time left is estimated.

@@ -2,28 +2,40 @@
 
 import os
 import subprocess
-import sys
 
 import pytest
 
 from islands_api.cli.app import COMMANDS
-from support.command_line import islands
+from islands_api.cli.console import CLOSED_OUTPUT
+from support.command_line import ISLANDS, islands
 
 
 @pytest.mark.ci
 @pytest.mark.parametrize(
-    ("arguments", "code"),
-    [(("--version",), 1), (("systems", "list"), 141), (("examples", "list"), 141), (("--help",), 1)],
+    ("arguments", "is_joined"),
+    [
+        *((each, False) for each in ("", "--help", "--version", "fit --help", "jobs --help", "systems list")),
+        *((each, True) for each in ("--help", "systems list", "fitt", "show no-result")),
+    ],
 )
-def test_command_with_a_closed_output_exits_quietly(arguments: tuple[str, ...], code: int) -> None:
+def test_command_with_a_closed_output_ends_quietly_with_the_code_of_a_closed_pipe(
+    arguments: str, is_joined: bool
+) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as closed:
-        program = "from islands_api.cli import main; main()"
-        found = subprocess.run(
-            [sys.executable, "-c", program, *arguments], stdout=closed, stderr=subprocess.PIPE, check=False
-        )
-    assert (found.stderr, found.returncode) == (b"", code)
+        errors = closed if is_joined else subprocess.PIPE
+        found = subprocess.run([ISLANDS, *arguments.split()], stdout=closed, stderr=errors, check=False)
+    assert (found.stderr or b"", found.returncode) == (b"", CLOSED_OUTPUT)
+
+
+@pytest.mark.ci
+def test_head_receives_its_lines_from_a_shell() -> None:
+    shell = f"set -o pipefail; {ISLANDS} --help | head -n 2"
+    found = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, check=False)
+    assert (found.stderr, "Usage: islands" in found.stdout) == ("", True)
+    # All of the help may be in the pipe before its reader ends.
+    assert found.returncode in (0, CLOSED_OUTPUT)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
