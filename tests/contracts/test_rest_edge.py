@@ -2,13 +2,16 @@
 
 import errno
 import threading
+from functools import partial
 
 import pytest
 from sqlalchemy import event
 
 from islands.errors import SettingsError
+from islands_api.web import app
 from islands_api.web.routes import service as routes
 from islands_service.settings import service_settings
+from support.processes import eventually
 from support.service import csv, kept, problem_of, queued, spec
 
 #: Header of the proxy of another site or of the service's own page, as browsers send it.
@@ -158,7 +161,7 @@ def test_a_full_disk_is_not_ready(service, monkeypatch):
 def test_a_database_that_hangs_is_not_ready_within_the_deadline(service, monkeypatch):
     released = threading.Event()
     monkeypatch.setattr(routes, "_READY_SECONDS", 0.1)
-    monkeypatch.setattr(service.store, "check_ready", lambda: released.wait(20.0))
+    monkeypatch.setattr(service.store.readiness, "check", lambda: released.wait(20.0))
     try:
         for _ in range(3):
             answer = service.client.get("/readyz", timeout=5.0)
@@ -187,6 +190,24 @@ def refuse_writes(store, _path):
     @event.listens_for(store.database.engine, "checkout")
     def _configure(connection, *_):
         connection.execute("PRAGMA query_only=ON")
+
+
+@pytest.mark.ci
+def test_damage_behind_the_first_pages_is_found_in_the_background(serve, monkeypatch):
+    monkeypatch.setattr(app, "CHECK_SECONDS", 0.2)
+    with serve() as running:
+        path = running.settings.data_dir / "islands.db"
+        store, ready = running.store, partial(running.client.get, "/readyz")
+        for number in range(400):
+            queued(store, name=f"{number}" * 50, spec={"text": "x" * 50_000})
+        with store.database.engine.connect() as connection:
+            connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+        eventually(lambda: ready().status_code == 200)
+        with path.open("r+b") as file:
+            file.seek(path.stat().st_size - 8192)
+            file.write(b"\xaa" * 4096)
+        eventually(lambda: ready().status_code == 503)
+        problem_of(ready(), 503, "store-unavailable")
 
 
 @pytest.mark.parametrize("damage", [damage_pages, drop_table, refuse_writes])

@@ -36,6 +36,9 @@ from islands_service.store import Store
 from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.tracing import Traces
 
+#: Least number of seconds between two complete checks of the database.
+CHECK_SECONDS = 60.0
+
 #: Minimum size in bytes of a response that is compressed.
 _GZIP_MIN_BYTES = 4000
 
@@ -86,10 +89,12 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
         state.blobs.observe_object = state.metrics.observe_object
         app.state.keys = KeyCache(state)
         running = (hub.run(), sender.run(), _send_heartbeats(settings.lifeline))
+        opened.readiness.watch(CHECK_SECONDS)
         tasks = [asyncio.create_task(each) for each in running]
         try:
             yield
         finally:
+            opened.readiness.stop()
             for task in tasks:
                 task.cancel()
                 with suppress(asyncio.CancelledError):

@@ -3,7 +3,7 @@
 from types import TracebackType
 
 from islands_service.store.audit import AuditTrail
-from islands_service.store.backends.readiness import check_database
+from islands_service.store.backends.readiness import Readiness
 from islands_service.store.database import Database
 from islands_service.store.datasets import Datasets
 from islands_service.store.jobs import Jobs
@@ -50,6 +50,7 @@ class Store:
         except BaseException:
             self.database.close()
             raise
+        self.readiness = Readiness(self.database)
         self.jobs = Jobs(self.database)
         self.leases = Leases(self.database)
         self.results = Results(self.database)
@@ -61,10 +62,6 @@ class Store:
         self.deliveries = Deliveries(self.database)
         self.retention = Retention(self.database)
         self.audit = AuditTrail(self.database)
-
-    def check_ready(self) -> None:
-        """Check that the database can accept a job; see `check_database` for the errors."""
-        check_database(self.database)
 
     def close(self) -> None:
         """Write the queued operations and close all connections."""

@@ -29,8 +29,8 @@ async def readyz(state: AppStateDep) -> Any:
     """Return 200 if the database answers and data can be written, so that jobs are accepted.
 
     Ray may still be starting. A database that has damaged pages, lacks tables or is read-only is not ready.
-    If the database, the disk or the object store hangs, the status is 503 after
-    two seconds.
+    The pages of a large SQLite database are checked in the background, at the start and then once a minute.
+    If the database, the disk or the object store hangs, the status is 503 after two seconds.
     """
     check = asyncio.ensure_future(state.run_blocking(_check_ready, state))
     # The thread of a hanging check cannot be interrupted: leave it behind.
@@ -45,7 +45,7 @@ async def readyz(state: AppStateDep) -> Any:
 
 
 def _check_ready(state: AppState) -> None:
-    state.store.check_ready()
+    state.store.readiness.check()
     state.blobs.check_writable()
 
 
