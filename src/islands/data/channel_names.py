@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 #: Suffix of an input's name: read the column one sample early, for a system that responds within the sample.
 AT_ONCE = "+1"
@@ -68,6 +69,8 @@ class ChannelName:
     at_once: bool
 
 
+# Every simulation compares the names of its model with those of its record.
+@lru_cache(maxsize=256)
 def parse_channel_name(name: str) -> ChannelName:
     """Return the parts of the name of an input or an output."""
     base = name.removesuffix(AT_ONCE)

@@ -89,7 +89,7 @@ def differentiate_model(model: Model, u: ArrayLike, y: float | None = None) -> L
     model = measured_model(model)
     levels = _read_levels(model, u)
     if y is None:
-        y = find_equilibrium(model, levels)
+        y = _find_rest(model, levels)
     found = _differentiate(model, levels, y)
     if np.isnan(found.outputs).any() or np.isnan(found.inputs).any():
         expressions = expressions_of_record(model)
@@ -128,7 +128,7 @@ def static_characteristic(model: Model, inputs: ArrayLike) -> NDArray[np.float64
     model = measured_model(model)
     points = np.atleast_1d(np.asarray(inputs, dtype=np.float64))
     rows = points[:, None] if points.ndim == 1 else points
-    return np.array([find_equilibrium(model, _read_levels(model, row)) for row in rows])
+    return np.array([_find_rest(model, _read_levels(model, row)) for row in rows])
 
 
 def find_equilibrium(model: Model, u: Sequence[float]) -> float:
@@ -143,7 +143,11 @@ def find_equilibrium(model: Model, u: Sequence[float]) -> float:
         There is no stable equilibrium, there are several, or every output in a range is one, as in models of
         hysteresis.
     """
-    model = measured_model(model)
+    return _find_rest(measured_model(model), u)
+
+
+def _find_rest(model: Model, u: Sequence[float]) -> float:
+    """Return the unique stable equilibrium of a model of signals as measured."""
     where = ", ".join(f"{name} = {level:g}" for name, level in zip(signal_names(model)[1:], u, strict=True))
     roots = _find_roots(model, u, where)
     stable = []
