@@ -6,6 +6,7 @@ import numpy as np
 
 from islands.io.export.sampled_block import SampledBlock, make_block
 from islands.model.model import Model
+from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
@@ -56,15 +57,27 @@ def block_case(name):
     """Return a case of ``OF_BLOCKS``."""
     exported = OF_BLOCKS[name]
     if isinstance(exported, CoupledModel):
-        records = make_coupled_record(exported, samples=60).records
-        u, y = records[0].u, np.column_stack([each.y for each in records])
-        run = y
-    else:
-        data = record(exported.inputs, dt=0.1) if name == "at once" else record_of(name)
-        simulated = free_run(exported, data)
-        assert simulated.outcome
-        u, y, run = data.u, data.y[:, None], simulated.y[:, None]
+        return coupled_case(exported, make_coupled_record(exported, samples=60))
+    return model_case(exported, record(exported.inputs, dt=0.1) if name == "at once" else record_of(name))
+
+
+def model_case(exported, data):
+    """Return the case of a model and a record at its rate, as measured."""
+    simulated = free_run(exported, data)
+    assert simulated.outcome
+    return make_case(exported, data.u, data.y[:, None], simulated.y[:, None])
+
+
+def coupled_case(exported, data):
+    """Return the case of a model of several outputs and a record at its rate, as measured."""
+    simulated = coupled_free_run(exported, data)
+    assert simulated.outcome
+    return make_case(exported, data.records[0].u, data.y, simulated.y)
+
+
+def make_case(exported, u, y, simulated):
+    """Return the case of a simulation, of shape (samples, outputs), that starts from measured samples."""
     block, first = make_block(exported), max(exported.maximum_lag, 1)
     signals = [*y.T, *u.T]
     past = [float(signals[channel][first - lag]) for channel, lag in block.samples]
-    return BlockCase(exported, block, past, np.ascontiguousarray(u[first:]), run[first:])
+    return BlockCase(exported, block, past, np.ascontiguousarray(u[first:]), simulated[first:])

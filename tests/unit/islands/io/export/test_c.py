@@ -12,13 +12,13 @@ import islands
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.io.export import export
-from islands.io.export.fmu.compiler import find_compiler
 from islands.io.export.parts import functions
 from islands.model.primitives import PRIMITIVES
 from islands.model.user_primitive import primitive
 from islands.performance.benchmark.compiled_c import compile_model
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
+from support.exported_programs import FLAGS, needs_compiler, pointer, run_c
 from support.programs import (
     CASES,
     HOSTILE_NAMES,
@@ -32,29 +32,10 @@ from support.programs import (
 )
 from support.strategies import models, part_of_the_examples
 
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
-
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-pedantic", "-Werror")
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("c")
-
-
-def pointer(signal, sample=0):
-    return ctypes.cast(signal.ctypes.data + 8 * sample, ctypes.POINTER(ctypes.c_double))
-
-
-def simulated(exported, data, folder, y=None):
-    """Run the compiled ``simulate``. Before the run, y is NaN after the first samples."""
-    y = data.y.copy() if y is None else y
-    y[exported.maximum_lag :] = np.nan
-    inputs = [np.ascontiguousarray(column) for column in data.u.T]
-    simulate = compile_model(export(exported, "c"), FLAGS, folder).simulate
-    simulate.restype = None
-    simulate(*map(pointer, inputs), pointer(y), ctypes.c_size_t(data.samples))
-    return y
 
 
 def of_the_library(exported):
@@ -66,7 +47,7 @@ def of_the_library(exported):
 @pytest.mark.parametrize("name", CASES)
 def test_the_compiled_program_simulates_like_the_kernel(name, folder):
     exported, data = CASES[name], record_of(name)
-    ours, theirs, lag = free_run(exported, data), simulated(exported, data, folder), exported.maximum_lag
+    ours, theirs, lag = free_run(exported, data), run_c(exported, data, folder), exported.maximum_lag
     assert ours.outcome
     assert bits(theirs[:lag]) == bits(data.y[:lag])
     if of_the_library(exported):
@@ -80,7 +61,7 @@ def test_the_compiled_program_simulates_like_the_kernel(name, folder):
 @pytest.mark.parametrize("name", PRIMITIVES)
 def test_compiled_primitives_equal_the_kernels_at_jumps_and_limits(name, folder):
     exported, data = at_the_edges(name)
-    ours, theirs = free_run(exported, data, bound=np.inf).y[1:], simulated(exported, data, folder)[1:]
+    ours, theirs = free_run(exported, data, bound=np.inf).y[1:], run_c(exported, data, folder)[1:]
     if name in OF_THE_LIBRARY:
         np.testing.assert_array_max_ulp(theirs, ours, maxulp=4)
     else:
@@ -98,13 +79,13 @@ def test_the_compiled_program_equals_the_model_bit_for_bit(folder, random_model,
     # The kernel stops a diverging free run at the bound; C continues to infinity.
     assume(run.outcome)
     lag = random_model.maximum_lag
-    assert bits(simulated(random_model, data, folder)[lag:]) == bits(run.y[lag:])
+    assert bits(run_c(random_model, data, folder)[lag:]) == bits(run.y[lag:])
 
 
 @needs_compiler
 def test_a_zero_input_gives_no_negative_zero(folder):
     at_rest = Dataset(np.zeros((9, 1)), np.zeros(9), 0.1)
-    assert bits(simulated(model({"u(k-1)": -0.5, "y(k-1)": -0.25}), at_rest, folder)) == [0] * 9
+    assert bits(run_c(model({"u(k-1)": -0.5, "y(k-1)": -0.25}), at_rest, folder)) == [0] * 9
 
 
 @needs_compiler
@@ -140,7 +121,7 @@ def test_simulate_does_not_write_outside_its_range(samples, folder):
 def test_a_column_name_cannot_break_the_file(name, folder):
     exported = islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name)
     data = Dataset([[1.0], [2.0]], [0.5, 0.0], 0.1)
-    assert simulated(exported, data, folder).tolist() == [0.5, 2.0]
+    assert run_c(exported, data, folder).tolist() == [0.5, 2.0]
 
 
 @pytest.mark.parametrize("kind", ["c", "matlab"])
@@ -212,7 +193,7 @@ OWN = {
 def test_a_user_defined_primitive_is_compiled_with_its_body(name, folder):
     arguments = "u(k-1), y(k-1)" if OWN[name].arity == 2 else "u(k-1)"
     exported = model({f"{name}({arguments})*sign(u(k-2))": 0.3, "y(k-2)": 0.2}, primitives=PRIMITIVES | OWN)
-    assert bits(simulated(exported, record(), folder)[2:]) == bits(free_run(exported, record()).y[2:])
+    assert bits(run_c(exported, record(), folder)[2:]) == bits(free_run(exported, record()).y[2:])
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,5 @@
 """MATLAB export: Octave runs it, and it simulates like the kernel."""
 
-import shutil
-import subprocess
-
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
@@ -14,58 +11,14 @@ from islands.model.primitives import PRIMITIVES
 from islands.model.user_primitive import primitive
 from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
+from support.exported_programs import needs_octave, octave, run_matlab
 from support.programs import CASES, HOSTILE_NAMES, at_the_edges, model, record, record_of
 from support.strategies import models
-
-OCTAVE = shutil.which("octave-cli")
-
-needs_octave = pytest.mark.skipif(OCTAVE is None, reason="no octave-cli: install Octave to run the MATLAB")
-
-#: Exchanges numbers through binary files, which keep every bit.
-_SCRIPT = """
-function r = read_numbers(name)
-  file = fopen(name); r = fread(file, Inf, 'double'); fclose(file);
-end
-function write_numbers(name, values)
-  file = fopen(name, 'w'); fwrite(file, values, 'double'); fclose(file);
-end
-{runs}
-"""
-
-
-def octave(script, folder):
-    """Run a script in a folder of functions. Warnings fail the test."""
-    done = subprocess.run(
-        [OCTAVE, "--quiet", "--no-init-file", "--no-history", "--eval", script],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, ""), done.stderr
-    return done.stdout
-
-
-def simulated(programs, folder):
-    """Run several exported models on one record each, in one process with a folder for each."""
-    runs = []
-    for index, (exported, data) in enumerate(programs):
-        own = folder / str(index)
-        own.mkdir()
-        (own / "narx_model.m").write_text(export(exported, "matlab"), encoding="ascii")
-        inputs = [f"u{channel}" for channel in range(data.inputs)]
-        for name, column in zip(inputs, data.u.T, strict=True):
-            np.ascontiguousarray(column).tofile(own / name)
-        data.y[: exported.maximum_lag].tofile(own / "y0")
-        arguments = ", ".join(f"read_numbers('{name}')" for name in [*inputs, "y0"])
-        runs.append(f"cd('{own}'); clear narx_model; write_numbers('y', narx_model({arguments}));")
-    octave(_SCRIPT.format(runs="\n".join(runs)), folder)
-    return [np.fromfile(folder / str(index) / "y") for index in range(len(programs))]
 
 
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory):
-    found = simulated([(CASES[name], record_of(name)) for name in CASES], tmp_path_factory.mktemp("octave"))
+    found = run_matlab([(CASES[name], record_of(name)) for name in CASES], tmp_path_factory.mktemp("octave"))
     return dict(zip(CASES, found, strict=True))
 
 
@@ -84,7 +37,7 @@ def test_octave_simulates_like_the_kernel(name, cases):
 @needs_octave
 def test_octave_primitives_equal_the_kernels_at_jumps_and_limits(tmp_path):
     programs = [at_the_edges(name) for name in PRIMITIVES]
-    for (exported, data), theirs in zip(programs, simulated(programs, tmp_path), strict=True):
+    for (exported, data), theirs in zip(programs, run_matlab(programs, tmp_path), strict=True):
         ours = free_run(exported, data, bound=np.inf).y
         np.testing.assert_allclose(theirs[1:], ours[1:], rtol=1e-12, err_msg=export(exported, "plain"))
 
@@ -99,7 +52,7 @@ def test_octave_runs_any_model(tmp_path_factory, random_models, seed):
     runs = [(each, free_run(each, data)) for each in random_models]
     # The kernel stops a diverging free run at the bound; Octave continues to infinity.
     calm = [(each, run) for each, run in runs if run.outcome]
-    found = simulated([(each, data) for each, _ in calm], tmp_path_factory.mktemp("octave"))
+    found = run_matlab([(each, data) for each, _ in calm], tmp_path_factory.mktemp("octave"))
     for (each, run), theirs in zip(calm, found, strict=True):
         lag = each.maximum_lag
         np.testing.assert_allclose(theirs[lag:], run.y[lag:], rtol=1e-12)
@@ -109,7 +62,7 @@ def test_octave_runs_any_model(tmp_path_factory, random_models, seed):
 def test_a_column_name_cannot_break_the_file(tmp_path):
     data = islands.Dataset([[1.0], [2.0]], [0.5, 0.0], 0.1)
     named = [islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name) for name in HOSTILE_NAMES]
-    found = simulated([(each, data) for each in named], tmp_path)
+    found = run_matlab([(each, data) for each in named], tmp_path)
     assert [y.tolist() for y in found] == [[0.5, 2.0]] * len(HOSTILE_NAMES)
 
 
@@ -200,5 +153,5 @@ def test_a_user_defined_primitive_runs_with_its_body(tmp_path):
         arguments = "u(k-1), y(k-1)" if entry.arity == 2 else "u(k-1)"
         terms = {f"{name}({arguments})*sign(u(k-2))": 0.3, "y(k-2)": 0.2}
         programs.append((model(terms, primitives=PRIMITIVES | OWN), record()))
-    for (exported, data), theirs in zip(programs, simulated(programs, tmp_path), strict=True):
+    for (exported, data), theirs in zip(programs, run_matlab(programs, tmp_path), strict=True):
         np.testing.assert_allclose(theirs[2:], free_run(exported, data).y[2:], rtol=1e-12)

@@ -12,12 +12,11 @@ from fmpy.validation import validate_fmu
 
 from islands.errors import ModelError
 from islands.io.export import write_export
-from islands.io.export.fmu.compiler import compile_library, find_compiler
+from islands.io.export.fmu.compiler import compile_library
 from islands.systems.published_models import PUBLISHED
 from support.block_cases import OF_BLOCKS, OF_STATES, block_case
+from support.exported_programs import needs_compiler, run_fmu
 from support.programs import HOSTILE_NAMES, model
-
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 
 FORMATS = ("fmu", "fmu2")
 
@@ -33,30 +32,9 @@ ESSENTIAL = ("many parts", "several inputs", "two masses")
     [name if name in ESSENTIAL else pytest.param(name, marks=pytest.mark.nightly) for name in OF_BLOCKS],
 )
 def test_fmpy_simulates_like_the_free_run(name, kind, tmp_path):
-    case, path = block_case(name), tmp_path / "model.fmu"
-    write_export(case.exported, kind, path)
-    assert validate_fmu(str(path)) == []
-    columns, count = case.block.columns, case.block.outputs
-    signals = np.empty(len(case.inputs), [(column, float) for column in ("time", *columns[count:])])
-    signals["time"] = np.arange(len(case.inputs)) * case.block.dt
-    for column, values in zip(columns[count:], case.inputs.T, strict=True):
-        signals[column] = values
-    names = [f"start.{columns[channel]}[{lag}]" for channel, lag in case.block.samples]
-    found = fmpy.simulate_fmu(
-        str(path),
-        stop_time=signals["time"][-1],
-        step_size=case.block.dt,
-        output_interval=case.block.dt,
-        start_values=dict(zip(names, case.past, strict=True)),
-        input=signals,
-        output=columns[:count],
-    )
-    expected = case.outputs
-    if any(case.block.feedthrough):
-        # An input that acts at once delays the output by one sampling time.
-        expected = np.vstack([case.past[:1], expected[:-1]])
-    for column, values in zip(columns[:count], expected.T, strict=True):
-        np.testing.assert_allclose(found[column], values, rtol=1e-12, atol=0)
+    case = block_case(name)
+    found = run_fmu(case, kind, tmp_path)
+    np.testing.assert_allclose(found, case.outputs[: len(found)], rtol=1e-12, atol=0)
 
 
 class Session:
