@@ -188,6 +188,10 @@ class ModelView(ResponseModel):
     size: int = Field(description="Number of terms.")
     equation: str
     latex: str
+    signals: str = Field(
+        default="",
+        description="Signals of the equation: deviations, filtered samples or means; empty for the record's.",
+    )
     terms: list[dict[str, Any]] = Field(
         description="Regressor, parameter, standard error and inclusion probability of each term."
     )

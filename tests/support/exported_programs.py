@@ -206,7 +206,7 @@ def run_matlab_system(case, folder):
     return np.fromfile(folder / "outputs").reshape(case.outputs.shape)
 
 
-def run_fmu(case, kind, folder):
+def run_fmu(case, folder, kind):
     """Simulate the FMU, which fmpy validates, and return the outputs.
 
     An input that acts at once delays the output by one sampling time: it has the past output first, and not

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import typer
 
 from islands.data.preprocessing_steps import DETREND, PreprocessingSteps
-from islands.errors import SettingsError
 from islands_api.cli.option_groups import group_options, make_option
 
 #: Types and descriptions of the options, by the field.
@@ -31,18 +30,6 @@ def with_preprocessing_options(command: Callable[..., None]) -> Callable[..., No
 
 def _collect(values: dict[str, Any]) -> PreprocessingSteps:
     return PreprocessingSteps(**{name: value for name, value in values.items() if value is not None})
-
-
-def check_one_output(steps: PreprocessingSteps, outputs: int) -> None:
-    """Check that a model of several outputs has no preprocessing.
-
-    Raises
-    ------
-    SettingsError
-        It has.
-    """
-    if outputs > 1 and not steps.is_none:
-        raise SettingsError("--lowpass, --decimate and --detrend are for one output: leave them out")
 
 
 def _make_option(name: str) -> Parameter:

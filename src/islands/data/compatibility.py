@@ -14,6 +14,7 @@ from islands.data.channel_names import (
 )
 from islands.data.dataset import Dataset, same_dt
 from islands.data.input_lead import advance_inputs
+from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import RecordError
 
 
@@ -35,11 +36,13 @@ class Reference(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ColumnReference:
-    """Columns of a simulation that is neither a model nor a record."""
+    """Columns and preprocessing of a simulation that is neither a model of one output nor a record."""
 
     input_names: tuple[str, ...]
     output_name: str
     dt: float | None = None
+    average: int = 1
+    preprocessing: Preprocessing | None = None
 
 
 @dataclass(frozen=True, slots=True)

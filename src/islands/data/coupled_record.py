@@ -93,11 +93,16 @@ class CoupledRecord:
         """
         record = self.records[place]
         others = [other for other in self.records if other is not record]
+        done = record.preprocessing
         return replace(
             record,
             u=np.column_stack([record.u, *(other.y for other in others)]),
             input_names=(*record.input_names, *(other.output_name for other in others)),
             input_units=(*record.input_units, *(other.output_unit for other in others)),
+            preprocessing=done
+            and done.with_inputs(
+                other.preprocessing.output_offset if other.preprocessing else 0.0 for other in others
+            ),
         )
 
     def skip_missing(self) -> "CoupledRecord":

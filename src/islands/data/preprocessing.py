@@ -13,14 +13,11 @@ from scipy.signal import butter, sosfiltfilt
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset, same_dt
-from islands.data.preprocessing_steps import Preprocessing, PreprocessingSteps
+from islands.data.preprocessing_steps import Preprocessing, PreprocessingSteps, find_decimation_cutoff
 from islands.errors import RecordError, SettingsError
 
 #: Orders of the low-pass filter and of the filter before a decimation, which run twice.
 _LOWPASS_ORDER, _DECIMATION_ORDER = 2, 4
-
-#: Cutoff before a decimation, relative to half of the new sampling rate.
-_CUTOFF = 0.8
 
 #: Samples of a segment for every order of a filter, at least.
 _SAMPLES_PER_ORDER = 6
@@ -152,7 +149,7 @@ def _reduce(record: Dataset, steps: PreprocessingSteps) -> Dataset:
         raise RecordError(
             f"{early[0]} is read one sample early, so it cannot be decimated: read the input without +1"
         )
-    record = _filter(record, _CUTOFF * 0.5 / (record.dt * steps.decimate), _DECIMATION_ORDER)
+    record = _filter(record, find_decimation_cutoff(record.dt, steps.decimate), _DECIMATION_ORDER)
     kept = np.concatenate([np.arange(begin, end, steps.decimate) for begin, end in record.bounds])
     return replace(
         record,

@@ -10,6 +10,9 @@ from islands.errors import SettingsError
 #: Values of ``detrend``.
 DETREND = ("none", "constant", "linear")
 
+#: Cutoff before a decimation, relative to half of the new sampling rate.
+_CUTOFF = 0.8
+
 
 @dataclass(frozen=True, slots=True)
 class PreprocessingSteps:
@@ -52,6 +55,11 @@ class PreprocessingSteps:
 NO_STEPS = PreprocessingSteps()
 
 
+def find_decimation_cutoff(dt: float, decimate: int) -> float:
+    """Return the cutoff in hertz of the filter before a decimation of samples of ``dt`` seconds."""
+    return _CUTOFF * 0.5 / (dt * decimate)
+
+
 @dataclass(frozen=True, slots=True)
 class Preprocessing:
     """Steps that were done with a record, and the values with which another record repeats them.
@@ -80,6 +88,11 @@ class Preprocessing:
         return self.steps.lowpass is not None or self.steps.decimate > 1
 
     @property
+    def decimation_cutoff(self) -> float | None:
+        """Cutoff in hertz of the filter before the decimation. None without a decimation."""
+        return None if self.steps.decimate == 1 else find_decimation_cutoff(self.dt, self.steps.decimate)
+
+    @property
     def without_offsets(self) -> "Preprocessing":
         """The filter and the decimation alone: signals as measured, at the rate of the model."""
         steps = replace(self.steps, detrend="none")
@@ -88,6 +101,10 @@ class Preprocessing:
     def select_inputs(self, places: Iterable[int]) -> "Preprocessing":
         """Return the preprocessing of some inputs, in another order."""
         return replace(self, input_offsets=tuple(self.input_offsets[place] for place in places))
+
+    def with_inputs(self, offsets: Iterable[float]) -> "Preprocessing":
+        """Return the preprocessing with further inputs, which have the given offsets."""
+        return replace(self, input_offsets=(*self.input_offsets, *offsets))
 
     def as_document(self) -> dict[str, Any]:
         """Return the preprocessing as JSON values."""

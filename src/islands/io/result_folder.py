@@ -17,6 +17,7 @@ from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
 from islands.model.equations import equation, latex_equation
+from islands.model.signal_statement import describe_signals
 from islands.validation.assessment import PARTS
 from islands.validation.ensemble import Ensemble
 from islands.validation.physics import PhysicsChecks
@@ -110,6 +111,7 @@ def _model_document(
         "size": model.size,
         "equation": equation(model),
         "latex": latex_equation(model),
+        "signals": describe_signals(model),
         "terms": terms,
         "bands": bands_document(entry.bands),
         "metrics": {

@@ -2,7 +2,8 @@
 
 import re
 from collections.abc import Sequence
-from html import unescape
+from html import escape, unescape
+from textwrap import wrap
 
 from islands.data.channel_names import parse_channel_name
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
@@ -19,6 +20,7 @@ from islands.model.rendering import (
     plain,
     plain_factor,
 )
+from islands.model.signal_statement import describe_signals
 
 #: Maximum number of visible characters of a row of MathML.
 _ROW_CHARACTERS = 80
@@ -31,6 +33,12 @@ def equation(model: Model, digits: int = 6) -> str:
     The input of a column that is read one sample early (``u_V+1``) is written as ``u(k)`` for its lag 1.
     """
     return f"y(k) = {_join_terms(_plain_terms(model, digits))}"
+
+
+def plain_text(model: Model) -> str:
+    """Write a model as one line; a second one states its signals, unless they are those of the record."""
+    statement = describe_signals(model)
+    return f"{equation(model)}\nwhere {statement}" if statement else equation(model)
 
 
 def _plain_terms(model: Model, digits: int) -> list[str]:
@@ -113,8 +121,22 @@ def _name_signals(text: str, model: Model) -> str:
     return re.sub(r"\b(y|u\d*)\(k(?=[-)])", lambda leaf: f"{names[leaf[1]]}(k", text)
 
 
-def latex_equation(model: Model, digits: int = 6) -> str:
-    """Write a model as one line of LaTeX without dollar signs."""
+def named_signals(model: Model) -> str:
+    """State which signals an equation reads, with the names of `signal_names`; see `describe_signals`."""
+    return describe_signals(model, signal_names(model))
+
+
+def latex_equation(model: Model, digits: int = 6, statement: str | None = None) -> str:
+    """Write a model as LaTeX without dollar signs: one line, and a second one for signals not of the record.
+
+    Parameters
+    ----------
+    model : Model
+    digits : int
+        Significant digits of the parameters.
+    statement : str, optional
+        Statement about the signals; by default that of `describe_signals`, none if it is empty.
+    """
     parts = []
     for position, expression in enumerate(expressions_of_record(model)):
         weight = (
@@ -124,20 +146,40 @@ def latex_equation(model: Model, digits: int = 6) -> str:
         )
         constant = expression == Constant(1.0)
         parts.append(weight if constant else rf"{weight} \, {latex_factor(expression, model.inputs)}")
-    return f"y_{{k}} = {_join_terms(parts)}"
+    line = f"y_{{k}} = {_join_terms(parts)}"
+    statement = describe_signals(model) if statement is None else statement
+    if not statement:
+        return line
+    return f"\\begin{{gathered}} {line} \\\\ {latex_statement(statement)} \\end{{gathered}}"
+
+
+def latex_statement(statement: str) -> str:
+    """Write a statement about the signals of an equation as a text in LaTeX."""
+    escaped = re.sub(r"([%_&#${}])", r"\\\1", statement)
+    return rf"\text{{where {escaped}}}"
 
 
 def _join_terms(terms: Sequence[str]) -> str:
     return " + ".join(terms).replace("+ -", "- ")
 
 
-def mathml_equation(model: Model, digits: int = 6) -> str:
+def mathml_equation(model: Model, digits: int = 6, statement: str | None = None) -> str:
     """Write a model as a ``math`` element in ASCII that browsers render without a library.
 
-    Browsers do not break the lines of an equation, so a long equation is a table of several rows.
+    Browsers do not break the lines of an equation, so a long equation is a table of several rows. The last
+    rows state the signals, unless they are those of the record.
+
+    Parameters
+    ----------
+    model : Model
+    digits : int
+        Significant digits of the parameters.
+    statement : str, optional
+        Statement about the signals; by default that of `describe_signals`, none if it is empty.
     """
     left = f"{mathml(Lagged(0, 0))}<mo>=</mo>"
-    rows = _break_rows(_mathml_terms(model, digits))
+    statement = describe_signals(model) if statement is None else statement
+    rows = [*_break_rows(_mathml_terms(model, digits)), *mathml_statement(statement)]
     if len(rows) == 1:
         return f'<math display="block"><mrow>{left}{rows[0]}</mrow></math>'
     lines = [
@@ -145,6 +187,12 @@ def mathml_equation(model: Model, digits: int = 6) -> str:
         for index, row in enumerate(rows)
     ]
     return f'<math display="block"><mtable>{"".join(lines)}</mtable></math>'
+
+
+def mathml_statement(statement: str) -> list[str]:
+    """Return the rows of a statement about the signals of an equation; none if it is empty."""
+    lines = wrap(f"where {statement}", _ROW_CHARACTERS, break_on_hyphens=False) if statement else []
+    return [f"<mtext>{escape(line).encode('ascii', 'xmlcharrefreplace').decode()}</mtext>" for line in lines]
 
 
 def _mathml_terms(model: Model, digits: int) -> list[str]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from islands.data.compatibility import ColumnReference, match_record
 from islands.data.coupled_record import CoupledRecord
-from islands.data.signal_map import match_rate
+from islands.data.signal_map import map_signals, match_rate
 from islands.errors import RecordError, SettingsError
 from islands.kernels.interpreter import Program
 from islands.kernels.simulation.simulate_coupled import LANES, simulate_coupled
@@ -70,7 +70,7 @@ class CoupledSimulator:
         interval: int | None = None,
         warm_up: int | None = None,
     ) -> None:
-        record = match_coupled(model, record)
+        record, self._offsets = _map_signals(model, match_coupled(model, record))
         self._warm_up = model.maximum_lag if warm_up is None else warm_up
         if self._warm_up < model.maximum_lag:
             raise SettingsError(
@@ -121,8 +121,8 @@ class CoupledSimulator:
             sample, output = min(failures)
             reason = f"|y{output + 1}| left {self._bounds[output]:.3g} at sample {sample}"
             outcome = EvaluationOutcome(Status.DIVERGED, reason)
-            return CoupledSimulation(predicted, (np.inf,) * outputs, outcome)
-        return CoupledSimulation(predicted, self._mean_squares(predicted), OK)
+            return CoupledSimulation(predicted + self._offsets, (np.inf,) * outputs, outcome)
+        return CoupledSimulation(predicted + self._offsets, self._mean_squares(predicted), OK)
 
     def _mean_squares(self, predicted: NDArray[np.float64]) -> tuple[float, ...]:
         known = ~np.isnan(predicted[:, 0])
@@ -135,7 +135,8 @@ def coupled_free_run(
 ) -> CoupledSimulation:
     """Simulate every segment from its first samples; the outputs are only read during the warm-up.
 
-    Samples are averaged if the model describes means of samples (see `match_rate`).
+    A record as measured is filtered, decimated and averaged as that of the model (see `match_rate`), and the
+    offsets of the model are subtracted from it and added to the simulation.
 
     Raises
     ------
@@ -148,6 +149,21 @@ def coupled_free_run(
     """
     theta = np.array(model.parameters)
     return CoupledSimulator(model, record.map(lambda each: match_rate(model, each)), None, warm_up)(theta)
+
+
+def _map_signals(model: CoupledModel, record: CoupledRecord) -> tuple[CoupledRecord, NDArray[np.float64]]:
+    """Return the signals that the equations read, and the offset that is added to every output."""
+    mapped = [
+        map_signals(
+            ColumnReference(
+                *(model.input_names, each.output_name, model.dt, model.average),
+                model.output_preprocessing(place),
+            ),
+            each,
+        )
+        for place, each in enumerate(record.records)
+    ]
+    return CoupledRecord(tuple(each for each, _ in mapped)), np.array([offset for _, offset in mapped])
 
 
 def match_coupled(model: CoupledModel, record: CoupledRecord) -> CoupledRecord:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.model.expression import Apply, Expression, Lagged
-from islands.model.model import Model
+from islands.model.model import Model, measured_model
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,8 @@ class CoupledModel:
     Raises
     ------
     ModelError
-        There are fewer than two equations, or their outputs, inputs, sampling times or averages do not agree.
+        There are fewer than two equations, or their outputs, inputs, sampling times, averages or
+        preprocessing do not agree.
     """
 
     models: tuple[Model, ...]
@@ -45,6 +46,13 @@ class CoupledModel:
                 raise ModelError(
                     f"the equations of {first.output_name} and {model.output_name} have different sampling "
                     "times: estimate both at the same rate"
+                )
+        described = [self._describe_signals(place) for place in range(len(names))]
+        for name, each in zip(names, described, strict=True):
+            if each != described[0]:
+                raise ModelError(
+                    f"the equations of {first.output_name} and {name} read signals of another preprocessing: "
+                    "estimate both from one record"
                 )
 
     @property
@@ -70,8 +78,21 @@ class CoupledModel:
 
     @property
     def preprocessing(self) -> Preprocessing | None:
-        """None: the equations of several outputs describe signals as measured."""
-        return None
+        """Steps before the means, and offsets of the inputs and the first output. None if there were none."""
+        return self.output_preprocessing(0)
+
+    def output_preprocessing(self, place: int) -> Preprocessing | None:
+        """Return the preprocessing with the offsets of the inputs and of one output."""
+        done = self.models[place].preprocessing
+        return done and done.select_inputs(range(len(self.input_names)))
+
+    def _describe_signals(self, place: int) -> tuple[object, ...]:
+        """Return the preprocessing of one equation: steps, sampling time, offsets of all channels."""
+        done = self.models[place].preprocessing
+        if done is None:
+            return ()
+        offsets = zip(self.channels(place), (done.output_offset, *done.input_offsets), strict=True)
+        return done.steps, done.dt, sorted(offsets)
 
     @property
     def maximum_lag(self) -> int:
@@ -120,6 +141,11 @@ class CoupledModel:
         """Return the terms of one equation, without parameters, in the channels of the coupled model."""
         channels = self.channels(place)
         return [_read_channels(item.expression, channels) for item in self.models[place].regressors]
+
+
+def measured_coupled_model(model: CoupledModel) -> CoupledModel:
+    """Return a model of several outputs with its offsets inside its expressions; see `measured_model`."""
+    return CoupledModel(tuple(map(measured_model, model.models)))
 
 
 def _read_channels(expression: Expression, channels: Sequence[int]) -> Expression:

@@ -19,7 +19,7 @@ from islands.model.candidate_library import LIBRARIES
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, progress
 from islands_api.cli.output_folder import check_folder, show_result
-from islands_api.cli.preprocessing_options import check_one_output, with_preprocessing_options
+from islands_api.cli.preprocessing_options import with_preprocessing_options
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
 from islands_api.cli.runs.coupled_run import couple_data, coupled_options, join_columns, show_coupled
@@ -95,8 +95,10 @@ def fit(
     check_folder(out, force)
     outputs = options.columns(output_columns)
     names, output_column = join_columns(options.columns(inputs), outputs)
-    check_one_output(steps, len(outputs))
-    recordings = Recordings(records, names, output_column, dt, reading, steps)
+    # The outputs of one system have one filter and offsets each, see `couple_data`.
+    recordings = Recordings(
+        records, names, output_column, dt, reading, steps if len(outputs) == 1 else NO_STEPS
+    )
     compile_kernels()
     with progress("fit") as show, stop_requests([signal.SIGINT] if len(outputs) == 1 else []) as stop:
         show("reading", 0.0)
@@ -122,7 +124,7 @@ def fit(
             if dead_time:
                 raise SettingsError("--dead-time is for one output: leave it out")
             given["library"] = SEVERAL_OUTPUTS if library == AUTO else library
-            pair = couple_data(data, held_out, len(outputs))
+            pair = couple_data(data, held_out, len(outputs), steps)
             coupled = islands.fit_coupled(pair[0], validation=pair[1], **coupled_options(given))
             show("figures", 1.0)
             coupled.save(out)

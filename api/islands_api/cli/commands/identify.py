@@ -13,7 +13,7 @@ from islands.io.records import fingerprint
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands_api.cli import options
 from islands_api.cli.output_folder import check_folder
-from islands_api.cli.preprocessing_options import check_one_output, with_preprocessing_options
+from islands_api.cli.preprocessing_options import with_preprocessing_options
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
 from islands_api.cli.runs.coupled_run import couple_data, identify_several, join_columns
@@ -93,13 +93,12 @@ def identify(
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
         check_folder(out, force)
         names, output_column = join_columns(options.columns(inputs), outputs)
-        check_one_output(steps, len(outputs))
         if len(outputs) > 1:
             if test is not None or wall_time is not None:
                 raise SettingsError("--test and --wall-time are for one output: leave them out")
             recordings = Recordings(records, names, output_column, dt, reading)
             data = couple_data(
-                recordings.read(rows), recordings.read_held_out(validation, rows), len(outputs)
+                recordings.read(rows), recordings.read_held_out(validation, rows), len(outputs), steps
             )
             preset = COUPLED_PRESET if search.preset == AUTO else search.preset
             identify_several(run_options, out, data, preset, search.seed, search.changes)

@@ -8,7 +8,8 @@ import typer
 from islands.io.export import EXPORTS, FILE_EXPORTS, export, write_export
 from islands.io.export.closed_form import closed_form
 from islands.io.export.extension import export_extended
-from islands.io.result_text.text_layout import term_table
+from islands.io.result_text.text_layout import term_table, wrap
+from islands.model.equations import named_signals
 from islands_api.cli import options
 from islands_api.cli.runs.coupled_run import read_coupled
 
@@ -37,7 +38,9 @@ def show(
     """
     coupled, extended = read_coupled(model), options.extended(model)
     if kind is None and out is None and coupled is None and extended is None:
-        typer.echo("\n".join(term_table(options.model(model))))
+        found = options.model(model)
+        stated = named_signals(found)
+        typer.echo("\n".join([*term_table(found), *(wrap(f"where {stated}") if stated else [])]))
         return
     kind = kind or "plain"
     if extended is not None and kind not in FILE_EXPORTS:

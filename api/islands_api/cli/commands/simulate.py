@@ -8,7 +8,6 @@ import typer
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.data.preprocessing_steps import Preprocessing
 from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
 from islands.facade.library_fit import SHOOTING
@@ -26,6 +25,7 @@ from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.factory import simulate_spec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost
+from islands.model.equations import named_signals
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 from islands_api.cli import options
@@ -109,14 +109,9 @@ def simulate(
     )
     for step in recorded.reading:
         output.print(step, markup=False)
-    done = chosen.preprocessing
-    if done is not None:
-        output.print(_describe_steps(done), markup=False)
     data = match_rate(chosen, recorded)
-    if chosen.average > 1 and data is not recorded:
-        output.print(
-            f"averaged {chosen.average} samples of {data.dt / chosen.average:g} s each: dt {data.dt:g} s"
-        )
+    if statement := named_signals(chosen):
+        output.print(f"as in the model, {statement}", markup=False)
     compile_kernels()
     reported = read_error_measurement(find_model_file(model)) or ErrorMeasurement(None, SHOOTING)
     interval = reported.shooting if shooting is None else shooting
@@ -128,15 +123,6 @@ def simulate(
     _print_metrics(
         data, simulation.y, f"{mode} after a warm-up of {first} samples: {simulation.outcome}", out, band
     )
-
-
-def _describe_steps(done: Preprocessing) -> str:
-    """Return the steps that a record was preprocessed with as text."""
-    steps = done.steps
-    parts = [f"low-pass {steps.lowpass:g} Hz"] if steps.lowpass is not None else []
-    parts += [f"every {steps.decimate} samples"] if steps.decimate > 1 else []
-    parts += ["offsets of the estimation data, added to the simulation"] if steps.detrend != "none" else []
-    return f"preprocessed as the record of the model: {', '.join(parts)}"
 
 
 def _simulate_extended(

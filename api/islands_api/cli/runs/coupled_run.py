@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,13 @@ import islands
 from islands.data.averaging import AUTO
 from islands.data.coupled_record import CoupledRecord, check_outputs, couple
 from islands.data.dataset import Dataset
+from islands.data.preprocessing import preprocess
+from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.io.export.coupled.coupled_document import is_coupled
+from islands.io.export.coupled.coupled_equations import coupled_signals
 from islands.io.records import read_dataset
 from islands.io.records.reading_options import ReadingOptions
 from islands.io.records.writer import write_coupled_simulation
@@ -39,10 +43,14 @@ def join_columns(inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[st
 
 
 def couple_data(
-    data: Dataset, held_out: Dataset | float, outputs: int
+    data: Dataset, held_out: Dataset | float, outputs: int, steps: PreprocessingSteps
 ) -> tuple[CoupledRecord, CoupledRecord | float]:
-    """Return the coupled records of data that were read with `join_columns`."""
-    return couple(data, outputs), held_out if isinstance(held_out, float) else couple(held_out, outputs)
+    """Return the coupled records of measured data that were read with `join_columns`, preprocessed."""
+    prepared = couple(data, outputs).map(lambda each: preprocess(each, **asdict(steps)))
+    if isinstance(held_out, float):
+        return prepared, held_out
+    pairs = zip(couple(held_out, outputs).records, prepared.records, strict=True)
+    return prepared, CoupledRecord(tuple(preprocess(each, like=like) for each, like in pairs))
 
 
 def coupled_options(given: dict[str, Any]) -> dict[str, Any]:
@@ -128,8 +136,8 @@ def simulate_coupled(
         )
     )
     data = match_coupled(model, recorded.map(lambda each: match_rate(model, each)))
-    if data.dt != recorded.dt:
-        output.print(f"averaged {model.average} samples of {recorded.dt:g} s each: dt {data.dt:g} s")
+    if statement := coupled_signals(model):
+        output.print(f"as in the model, {statement}", markup=False)
     compile_kernels()
     simulation = coupled_free_run(model, data, warm_up)
     if out is not None:

@@ -12,9 +12,9 @@ from islands.data.coupled_record import CoupledRecord
 from islands.facade.results.result import Result
 from islands.io.export import export
 from islands.io.export.coupled.coupled_document import coupled_json
-from islands.io.export.coupled.coupled_equations import coupled_equation
+from islands.io.export.coupled.coupled_equations import coupled_equation, coupled_signals
 from islands.io.result_folder import record_document
-from islands.io.result_text.text_layout import term_table
+from islands.io.result_text.text_layout import term_table, wrap
 from islands.simulation.coupled_free_run import CoupledSimulation, coupled_free_run
 from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.predictors import one_step_ahead
@@ -133,6 +133,7 @@ class CoupledResult:
             "warm_up": self.warm_up,
             "refined": self.refined,
             "equation": self.equation,
+            "signals": coupled_signals(self.model),
             "outputs": [
                 {
                     "name": name,
@@ -159,8 +160,7 @@ class CoupledResult:
             f"{len(self.model.models)} outputs, {self.model.size} terms, parameters {refined}:",
             "",
             *(line for single in self.model.models for line in [*term_table(single), ""]),
-            f"k counts samples of {self.validation.dt:g} s"
-            + (f", means of {self.model.average} samples of the record." * (self.model.average > 1) or "."),
+            *wrap(f"{coupled_signals(self.model) or f'k counts samples of {self.validation.dt:g} s'}."),
             "",
             "Validation data; all outputs are simulated together, from the inputs alone:",
             f"{'output':20} {'free-run RMSE':>18} {'% of range':>10} {'R2':>8} {'one-step RMSE':>18}",

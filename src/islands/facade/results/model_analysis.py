@@ -11,6 +11,7 @@ from islands.errors import ModelError
 from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
 from islands.model.operating_point import differentiate_model, static_characteristic
+from islands.model.signal_statement import describe_signals
 from islands.model.sympy_expression import to_sympy
 from islands.simulation.step_response import StepResponse, step_response
 
@@ -46,6 +47,11 @@ class AnalysedModel:
     def latex(self) -> str:
         """Equation in LaTeX."""
         return latex_equation(self.model)
+
+    @property
+    def signals(self) -> str:
+        """Signals that the equation reads: deviations, filtered samples or means; empty for the record's."""
+        return describe_signals(self.model)
 
     def to_sympy(self) -> "sympy.Eq":
         """Return the model as a SymPy equation; see `to_sympy` (extra ``sympy``)."""

@@ -18,13 +18,13 @@ from islands.io.export.modelica import modelica_source
 from islands.io.export.python import python_source
 from islands.io.export.s_function import s_function_source
 from islands.io.models import model_json
-from islands.model.equations import equation, latex_equation, mathml_equation
+from islands.model.equations import latex_equation, mathml_equation, plain_text
 from islands.model.model import Model, measured_model
-from islands.simulation.coupled_model import CoupledModel
+from islands.simulation.coupled_model import CoupledModel, measured_coupled_model
 
 EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(
     {
-        "plain": equation,
+        "plain": plain_text,
         "latex": latex_equation,
         "mathml": mathml_equation,
         "python": python_source,
@@ -37,6 +37,8 @@ EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(
     }
 )
 
+#: Formats that state the offsets of a model beside its equation. Programs have them in the equation.
+_OF_DEVIATIONS = ("plain", "latex", "mathml", "json")
 
 #: Formats that are not text.
 FILE_EXPORTS: Mapping[str, Callable[[Model | CoupledModel], bytes]] = MappingProxyType(
@@ -55,10 +57,9 @@ def export(model: Model | CoupledModel, kind: str) -> str:
     if kind in FILE_EXPORTS:
         raise SettingsError(f"the format {kind} is not text: write a file with --out or write_export")
     if isinstance(model, CoupledModel):
-        return export_coupled(model, kind)
+        return export_coupled(model if kind in _OF_DEVIATIONS else measured_coupled_model(model), kind)
     lookup({**EXPORTS, **FILE_EXPORTS}, kind, "format")
-    # A model file has the offsets as values; all other formats have them in the equation.
-    return EXPORTS[kind](model if kind == "json" else measured_model(model))
+    return EXPORTS[kind](model if kind in _OF_DEVIATIONS else measured_model(model))
 
 
 def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> None:
@@ -70,7 +71,7 @@ def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> No
         The format is unknown.
     """
     if kind in FILE_EXPORTS:
-        written = model if isinstance(model, CoupledModel) else measured_model(model)
+        written = measured_coupled_model(model) if isinstance(model, CoupledModel) else measured_model(model)
         Path(path).write_bytes(FILE_EXPORTS[kind](written))
         return
     Path(path).write_text(f"{export(model, kind).rstrip()}\n", encoding="utf-8")

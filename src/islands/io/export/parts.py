@@ -6,12 +6,12 @@ import re
 import textwrap
 from collections.abc import Callable
 
-from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.io.export.infix import OPERATORS, infix
 from islands.model.equations import equation
 from islands.model.expression import Apply, Constant, Primitive, walk
 from islands.model.model import Model
+from islands.model.signal_statement import describe_values, symbols
 
 #: C and MATLAB distinguish the first 63 characters of a name and allow ASCII letters only.
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,59}")
@@ -22,7 +22,7 @@ _EXAMPLES = {"c": "return a / (1.0 + fabs(a));", "matlab": "r = a / (1 + abs(a))
 
 def signals(model: Model) -> list[str]:
     """Return the names of the output and the inputs: y and u, or y, u1, u2 .. for several inputs."""
-    return ["y", "u"] if model.inputs == 1 else ["y", *(f"u{index + 1}" for index in range(model.inputs))]
+    return list(symbols(model.inputs))
 
 
 def terms(model: Model, sample: Callable[[str, int], str], function: Callable[[Primitive], str]) -> list[str]:
@@ -100,20 +100,8 @@ def description(model: Model, quote: Callable[[str], str]) -> str:
     names = zip(signals(model)[1:], model.column_names, strict=True)
     inputs = ", ".join(f"{signal} = {quote(name)}" for signal, name in names)
     dt = "any" if model.dt is None else f"{float(model.dt)!r} s"
-    means = f", means of {model.average} samples" if model.average > 1 else ""
-    rate = describe_steps(model.preprocessing)
-    return f"Inputs {inputs}; output y = {quote(model.output_name)}; sampling time {dt}{means}{rate}."
-
-
-def describe_steps(preprocessing: Preprocessing | None) -> str:
-    """Describe the filter and the decimation of the signals that a program reads, empty for none."""
-    if preprocessing is None:
-        return ""
-    steps = preprocessing.steps
-    text = "" if steps.lowpass is None else f", behind a zero-phase low-pass filter of {steps.lowpass:g} Hz"
-    if steps.decimate > 1:
-        text += f", every sample number {steps.decimate} of {preprocessing.dt:g} s behind a low-pass filter"
-    return text
+    stated = [f"Inputs {inputs}", f"output y = {quote(model.output_name)}", f"sampling time {dt}"]
+    return f"{'; '.join(filter(None, [*stated, describe_values(model)]))}."
 
 
 def heading(model: Model, mark: str) -> str:

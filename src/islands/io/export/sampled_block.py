@@ -23,6 +23,7 @@ from islands.io.export.parts import functions, heading, signals, terms
 from islands.model.equations import equation
 from islands.model.expression import Expression, Lagged, Primitive, walk
 from islands.model.model import Model
+from islands.model.signal_statement import describe_values
 from islands.simulation.coupled_model import CoupledModel
 
 #: Writes the terms of an equation; the arguments are those of `terms`.
@@ -47,8 +48,8 @@ class SampledBlock:
         Whether an equation reads sample k of the signal, which is possible for inputs only.
     dt : float
         Sampling time in seconds.
-    average : int
-        Number of samples of a recording whose mean is one sample of the block.
+    values : str
+        What a sample of the block is, see `describe_values`; empty for a sample of the record.
     equations : tuple of str
         Text of the equation of each output.
     terms : tuple of callable
@@ -65,7 +66,7 @@ class SampledBlock:
     depths: tuple[int, ...]
     feedthrough: tuple[bool, ...]
     dt: float
-    average: int
+    values: str
     equations: tuple[str, ...]
     terms: tuple[_TermWriter, ...]
     primitives: tuple[Primitive, ...]
@@ -136,7 +137,7 @@ def make_block(model: Model | CoupledModel) -> SampledBlock:
         tuple(max(depth, int(channel < len(outputs))) for channel, depth in enumerate(depths)),
         tuple((channel, 0) in lags for channel in range(len(names))),
         float(model.dt),
-        model.average,
+        describe_values(model),
         equations,
         writers,
         tuple(primitives),

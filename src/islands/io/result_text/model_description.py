@@ -7,7 +7,14 @@ import numpy as np
 
 from islands.estimation.constraints.constraint_checks import ConstraintCheck
 from islands.evolution.search_result import RankedModel, SearchResult
-from islands.model.equations import named_equation, named_statement, named_term, signal_names
+from islands.model.equations import (
+    named_equation,
+    named_signals,
+    named_statement,
+    named_term,
+    signal_names,
+)
+from islands.model.signal_statement import describe_values
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE, ResidualStructure
 from islands.validation.prediction_bands import LEVEL
 
@@ -62,7 +69,7 @@ def describe_choice(found: SearchResult) -> str:
 
 
 def describe_units(found: SearchResult) -> str:
-    """State the units of the columns, the sampling time and direct feedthrough."""
+    """State the units of the columns, the signals that the equation reads and direct feedthrough."""
     record = found.record
     columns = zip(
         signal_names(found.recommended.model), (record.output_unit, *record.input_units), strict=True
@@ -104,13 +111,12 @@ def _describe_feedthrough(found: SearchResult) -> str:
 
 
 def _describe_rate(found: SearchResult) -> str:
-    record, dt = found.record, found.split.estimation.dt
-    if found.average == 1:
-        return f"k counts samples of {dt:g} s"
-    return (
-        f"k counts steps of {dt:g} s: each value is the mean of {found.average} samples of the record, and "
-        f"simulate averages a record of {record.dt:g} s in the same way"
-    )
+    model, record = found.recommended.model, found.record
+    statement, done = named_signals(model), record.preprocessing
+    if not describe_values(model):
+        return "; ".join(filter(None, [statement, f"k counts samples of {found.split.estimation.dt:g} s"]))
+    dt = record.dt if done is None else done.dt
+    return f"{statement}, and simulate prepares a record of {dt:g} s in the same way"
 
 
 def _describe_error(found: SearchResult, entry: RankedModel) -> str:

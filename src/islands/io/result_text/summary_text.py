@@ -5,7 +5,7 @@ from islands.io.certificates import summarise_certificates
 from islands.io.result_text.model_description import describe_choice, describe_findings, describe_units
 from islands.io.result_text.model_table import LEGEND, table
 from islands.io.result_text.text_layout import term_table, wrap
-from islands.model.equations import named_equation
+from islands.model.equations import named_equation, named_signals
 
 
 def summary(found: SearchResult) -> str:
@@ -36,10 +36,17 @@ def method_text(found: SearchResult) -> str:
         f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB",
         *(line for text in summarise_certificates(found) for line in wrap(text)),
         "",
-        "Equations by rank, with the columns of the record:",
+        *wrap(_describe_names(found)),
         *(f"{rank:2d}  {named_equation(entry.model)}" for rank, entry in enumerate(found.models, start=1)),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _describe_names(found: SearchResult) -> str:
+    """Return the heading of the equations, with the signals that they read."""
+    statement = named_signals(found.recommended.model)
+    where = f", where {statement}" if statement else ""
+    return f"Equations by rank, with the columns of the record{where}:"
 
 
 def _describe_settings(found: SearchResult) -> str:

@@ -17,6 +17,7 @@ from islands.io.models import model_from_json, model_json
 from islands.model.model import make_model, measured_model
 from islands.model.operating_point import static_characteristic
 from islands.model.parsing import parse
+from islands.model.signal_statement import describe_values
 from islands.simulation.predictors import free_run
 from islands.simulation.step_response import step_response
 from support.block_cases import model_case
@@ -129,8 +130,8 @@ BLOCKS = {
         lambda case, folder: run_s_function(case, case.past, folder)[1], marks=needs_compiler
     ),
     "matlab-system": pytest.param(run_matlab_system, marks=needs_octave),
-    "fmu": pytest.param(lambda case, folder: run_fmu(case, "fmu", folder), marks=needs_compiler),
-    "fmu2": pytest.param(lambda case, folder: run_fmu(case, "fmu2", folder), marks=needs_compiler),
+    "fmu": pytest.param(lambda case, folder: run_fmu(case, folder, "fmu"), marks=needs_compiler),
+    "fmu2": pytest.param(lambda case, folder: run_fmu(case, folder, "fmu2"), marks=needs_compiler),
 }
 
 
@@ -177,4 +178,4 @@ def test_offsets_belong_to_equilibria_and_step_responses():
 def test_programs_state_the_filter_and_the_decimation():
     _, model = fitted({"lowpass": 5.0, "decimate": 3})
     for kind in ("python", "c", "matlab"):
-        assert "low-pass filter of 5 Hz, every sample number 3 of 0.01 s" in export(model, kind)
+        assert f"{describe_values(model)}." in export(model, kind)

@@ -67,8 +67,8 @@ def test_a_result_has_every_field_of_the_contract(findings):
     assert set(result["search"]["full_set"]) == {"candidates", "bytes"}
     for model in result["models"]:
         assert list(model) == [
-            *("rank", "recommended", "size", "equation", "latex", "terms", "bands", "metrics", "outcomes"),
-            *("recordings", "warm_up", "information", "constraints", "physics", "residual_tests"),
+            *("rank", "recommended", "size", "equation", "latex", "signals", "terms", "bands", "metrics"),
+            *("outcomes", "recordings", "warm_up", "information", "constraints", "physics", "residual_tests"),
         ]
         for term in model["terms"]:
             assert list(term) == ["regressor", "parameter", "standard_error", "inclusion"]

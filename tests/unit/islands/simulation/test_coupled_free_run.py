@@ -1,19 +1,27 @@
 """Free runs of coupled models: exact for the true model, and equal to those of single models."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
+import islands
 from islands.data.averaging import average_samples
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
+from islands.data.preprocessing import preprocess
+from islands.data.signal_map import match_rate
 from islands.errors import RecordError, SettingsError
-from islands.simulation.coupled_free_run import CoupledSimulator, coupled_free_run
-from islands.simulation.coupled_model import CoupledModel
+from islands.io.export import export
+from islands.io.export.coupled.coupled_document import read_coupled_model, write_coupled_model
+from islands.simulation.coupled_free_run import CoupledSimulator, coupled_free_run, match_coupled
+from islands.simulation.coupled_model import CoupledModel, measured_coupled_model
 from islands.simulation.outcome import Status
 from islands.simulation.predictors import free_run
+from support.block_cases import coupled_case
 from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record, simulate_scalar
+from support.exported_programs import needs_compiler, needs_octave, run_fmu, run_matlab_system
 
 #: Equations that do not read the other output, with products, calls and constants.
 DECOUPLED = CoupledModel(
@@ -111,3 +119,87 @@ def test_a_short_warm_up_and_a_bad_interval_are_refused() -> None:
         coupled_free_run(TWO_MASSES, record, warm_up=1)
     with pytest.raises(SettingsError, match="at least 1 sample"):
         CoupledSimulator(TWO_MASSES, record, 0)
+
+
+# Preprocessing: the measured record gives the simulation of the search with the offsets of the outputs.
+
+STEPS = ({"detrend": "constant"}, {"lowpass": 1.0}, {"lowpass": 1.0, "decimate": 3, "detrend": "constant"})
+
+
+def measured_record():
+    record = make_coupled_record(TWO_MASSES, noise=0.01)
+    return record.map(
+        lambda each: replace(each, u=each.u + 4.0, y=each.y + 7.0 * (1 + (each.output_name == "y2")))
+    )
+
+
+def preprocessed(steps, average=1):
+    """Return the record of a search, a model of it, and its simulation with the offsets of the outputs."""
+    prepared = measured_record().map(lambda each: average_samples(preprocess(each, **steps), average))
+    dt = prepared.dt
+    model = CoupledModel(
+        tuple(
+            replace(single, dt=dt, average=average, preprocessing=prepared.separate(place).preprocessing)
+            for place, single in enumerate(TWO_MASSES.models)
+        )
+    )
+    without = CoupledModel(tuple(replace(single, preprocessing=None, average=1) for single in model.models))
+    offsets = [each.preprocessing.output_offset for each in prepared.records]
+    return prepared, model, coupled_free_run(without, prepared).y + offsets
+
+
+def written_and_read(model, folder):
+    write_coupled_model(model, folder / "model.json")
+    return read_coupled_model(folder / "model.json")
+
+
+def run_python(model, record, _folder):
+    module = {}
+    exec(export(model, "python"), module)
+    data = match_coupled(model, record.map(lambda each: match_rate(model, each)))
+    found = np.transpose(module["simulate"](*data.records[0].u.T.tolist(), *data.y.T.tolist()))
+    found[: model.maximum_lag] = np.nan
+    return found
+
+
+def run_block(run, model, record, folder):
+    data = match_coupled(model, record.map(lambda each: match_rate(model, each)))
+    found = run(coupled_case(model, data), folder)
+    return np.vstack([np.full((model.maximum_lag, found.shape[1]), np.nan), found])
+
+
+COUPLED_PATHS = {
+    "measured record": lambda model, record, _: coupled_free_run(model, record).y,
+    "at the rate of the model": lambda model, record, _: (
+        coupled_free_run(model, record.map(lambda each: match_rate(model, each))).y
+    ),
+    "outputs in another order": lambda model, record, _: (
+        coupled_free_run(model, CoupledRecord(record.records[::-1])).y
+    ),
+    "file": lambda model, record, folder: coupled_free_run(written_and_read(model, folder), record).y,
+    "measured units": lambda model, record, _: coupled_free_run(measured_coupled_model(model), record).y,
+    "python": run_python,
+    "fmu": pytest.param(
+        partial(run_block, partial(run_fmu, kind="fmu")), marks=[pytest.mark.ci, needs_compiler]
+    ),
+    "matlab-system": pytest.param(
+        partial(run_block, run_matlab_system), marks=[pytest.mark.ci, needs_octave]
+    ),
+}
+
+
+@pytest.mark.parametrize("path", COUPLED_PATHS.values(), ids=COUPLED_PATHS)
+@pytest.mark.parametrize("average", [1, 2])
+@pytest.mark.parametrize("steps", STEPS, ids=str)
+def test_every_path_gives_the_outputs_of_the_search(steps, average, path, tmp_path) -> None:
+    _, model, expected = preprocessed(steps, average)
+    np.testing.assert_allclose(path(model, measured_record(), tmp_path), expected, rtol=1e-9)
+
+
+def test_a_coupled_fit_of_deviations_simulates_the_measured_record() -> None:
+    prepared = measured_record().map(lambda each: preprocess(each, detrend="constant"))
+    result = islands.fit_coupled(prepared, validation=0.25, max_terms=3, certificate=0)
+    assert any(result.model.preprocessing.input_offsets)
+    offsets = [each.preprocessing.output_offset for each in prepared.records]
+    expected = result.simulate(prepared).y + offsets
+    np.testing.assert_allclose(result.simulate(measured_record()).y, expected, rtol=1e-9)

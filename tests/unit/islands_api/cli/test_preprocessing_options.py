@@ -55,7 +55,9 @@ def test_result_states_the_steps(folder):
 def test_simulation_repeats_the_steps_and_restores_the_offset(folder):
     other = write(folder / "other.csv", 1, offset=0.2)
     printed = succeed("simulate", folder / "out", other, "--out", folder / "sim.csv")
-    assert "every 4 samples" in printed
+    stated = " ".join(printed.split())
+    assert "u_V from" in stated
+    assert "one of 4 samples of 0.01 s behind a zero-phase low-pass filter of 10 Hz" in stated
     simulated = np.genfromtxt(folder / "sim.csv", delimiter=",", names=True)
     measured = np.genfromtxt(other, delimiter=",", names=True)
     values = simulated[simulated.dtype.names[1]]

@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 from islands.errors import SettingsError
 from islands.io.export.coupled.coupled_document import coupled_json
-from islands.io.export.coupled.coupled_equations import coupled_equation, coupled_latex, coupled_mathml
+from islands.io.export.coupled.coupled_equations import coupled_latex, coupled_mathml, coupled_text
 from islands.io.export.coupled.coupled_programs import coupled_c, coupled_matlab, coupled_python
 from islands.io.export.matlab_system import matlab_system_source
 from islands.io.export.modelica import modelica_source
@@ -15,7 +15,7 @@ from islands.simulation.coupled_model import CoupledModel
 #: Export formats of a coupled model by name.
 COUPLED_EXPORTS: Mapping[str, Callable[[CoupledModel], str]] = MappingProxyType(
     {
-        "plain": coupled_equation,
+        "plain": coupled_text,
         "latex": coupled_latex,
         "mathml": coupled_mathml,
         "python": coupled_python,

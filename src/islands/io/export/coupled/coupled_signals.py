@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from islands.io.export.parts import functions, quote_name, signals, terms
 from islands.model.equations import equation
 from islands.model.expression import Primitive
+from islands.model.signal_statement import describe_values, join_statements
 from islands.simulation.coupled_model import CoupledModel
 
 
@@ -56,8 +57,23 @@ def coupled_description(model: CoupledModel, quote: Callable[[str], str]) -> str
     inputs = _list_names(input_signals(model), first.column_names, quote)
     outputs = _list_names(output_signals(model), model.output_names, quote)
     dt = "any" if model.dt is None else f"{float(model.dt)!r} s"
-    means = f", means of {model.average} samples" if model.average > 1 else ""
-    return f"Inputs {inputs}; outputs {outputs}; sampling time {dt}{means}."
+    stated = [f"Inputs {inputs}", f"outputs {outputs}", f"sampling time {dt}"]
+    return f"{'; '.join(filter(None, [*stated, describe_values(model)]))}."
+
+
+def describe_coupled_signals(model: CoupledModel, names: Sequence[str]) -> str:
+    """State which signals the equations read; see `describe_signals`.
+
+    Parameters
+    ----------
+    model : CoupledModel
+    names : sequence of str
+        Names of the outputs and of the inputs in the equations.
+    """
+    offsets = [each.preprocessing.output_offset for each in model.models if each.preprocessing]
+    offsets += model.preprocessing.input_offsets if model.preprocessing else ()
+    inputs = model.models[0].column_names[: len(model.input_names)]
+    return join_statements(model, names, (*model.output_names, *inputs), offsets)
 
 
 def _list_names(names: Sequence[str], columns: Sequence[str], quote: Callable[[str], str]) -> str:

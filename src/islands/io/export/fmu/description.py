@@ -161,14 +161,13 @@ def describe_build(block: SampledBlock) -> str:
 
 
 def _make_root(block: SampledBlock, version: str, identity: dict[str, str]) -> Element:
-    means = f"; a sample is the mean of {block.average} samples of the recording" if block.average > 1 else ""
     return Element(
         "fmiModelDescription",
         {
             "fmiVersion": version,
             "modelName": f"NARX model of {block.title}",
             **identity,
-            "description": f"{'; '.join(block.equations)}{means}",
+            "description": "; ".join(filter(None, [*block.equations, block.values])),
             "generationTool": "islands",
             "variableNamingConvention": "flat",
         },

@@ -103,7 +103,7 @@ def test_the_result_states_the_averages(averaged):
     assert document["preprocessing"].items() >= {"average": count, "dt": dt}.items()
     assert document["settings"]["average"] == "auto"
     assert f"the mean of {count} samples of the record" in " ".join(summary(averaged.search_result).split())
-    assert f"sampling time {dt} s, means of {count} samples" in averaged.best.export("c")
+    assert f"sampling time {dt} s; each value is the mean of {count} samples" in averaged.best.export("c")
 
 
 def test_simulation_of_the_validation_data_has_the_reported_errors(averaged):

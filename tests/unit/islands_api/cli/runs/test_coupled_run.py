@@ -6,6 +6,9 @@ import json
 import numpy as np
 import pytest
 
+import islands
+from islands.data.coupled_record import CoupledRecord
+from islands.simulation.coupled_free_run import coupled_free_run
 from support.command_line import fail, succeed
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures
@@ -46,6 +49,26 @@ def test_a_fitted_model_is_simulated_and_shown(record, tmp_path) -> None:
     assert "write a file with --out" in fail("show", folder, "--format", "fmu")
     assert "free runs only" in fail("simulate", folder, record, "--mode", "one-step")
     assert "as many --output" in fail("simulate", folder, record, "--output", "y1")
+
+
+@pytest.mark.ci
+def test_preprocessed_outputs_are_simulated_as_measured(record, tmp_path) -> None:
+    folder, out = tmp_path / "result", tmp_path / "simulated.csv"
+    with undrawn_figures():
+        succeed("fit", record, *COLUMNS, *SMALL, "--detrend", "constant", "--lowpass", "1", "--out", folder)
+    printed = " ".join(succeed("simulate", folder, record, "--out", out).split())
+    assert "y1 is the deviation from" in printed
+    assert "behind a zero-phase low-pass filter of 1 Hz" in printed
+    model = islands.read_coupled_model(folder)
+    assert all(each.preprocessing.output_offset for each in model.models)
+    assert model.preprocessing.input_offsets[0] != 0.0
+    data = CoupledRecord(tuple(islands.read_record(record, "u", name) for name in ("y1", "y2")))
+    simulated = np.genfromtxt(out, delimiter=",", skip_header=1)[:, 1:]
+    warm_up = json.loads((folder / "result.json").read_text())["warm_up"]
+    expected = coupled_free_run(model, data, warm_up).y[warm_up:]
+    np.testing.assert_allclose(simulated[-len(expected) :], expected, rtol=1e-9)
+    # The offsets belong to the outputs as measured.
+    assert np.abs(expected.mean(axis=0) - data.y[warm_up:].mean(axis=0)).max() < 0.05 * np.ptp(data.y)
 
 
 @pytest.mark.ci

@@ -33,7 +33,7 @@ ESSENTIAL = ("many parts", "several inputs", "two masses")
 )
 def test_fmpy_simulates_like_the_free_run(name, kind, tmp_path):
     case = block_case(name)
-    found = run_fmu(case, kind, tmp_path)
+    found = run_fmu(case, tmp_path, kind)
     np.testing.assert_allclose(found, case.outputs[: len(found)], rtol=1e-12, atol=0)
 
 
