@@ -108,7 +108,7 @@ def test_run_stopped_by_ctrl_c_resumes_to_the_same_models(folder: Path) -> None:
     finally:
         running.kill()
     assert running.returncode == 130, complaints
-    assert f"stopped: {out} has the best models so far" in complaints
+    assert f"stopped: {out} has the result so far, without search from generation " in complaints
     assert f"continue with --resume {out}" in complaints
     assert "Traceback" not in complaints
     assert "MAPE val. %" in printed

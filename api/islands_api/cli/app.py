@@ -14,10 +14,9 @@ from typer.core import TyperCommand, TyperGroup
 
 from islands.distribution import describe_missing_extra, read_version
 from islands.errors import IslandsError, SettingsError
-from islands.evolution.progress import StoppedError
 from islands_api.cli.console import errors, exit_with_closed_output
 from islands_api.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
-from islands_api.cli.stop_requests import INTERRUPTED
+from islands_api.cli.stop_requests import INTERRUPTED, TERMINATED, Terminated, raise_on_signals
 from islands_service.process.process_settings import limit_threads
 
 #: Commands and their descriptions, in the order of the help. Each is a file with a function or a group of the
@@ -78,7 +77,7 @@ class Commands(TyperGroup):
     _is_listing = False
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command. Report an error in one line and exit with code 2, or 130 if interrupted."""
+        """Run the command. Report an error in one line; exit with code 2, or 130 or 143 after a signal."""
         try:
             try:
                 return super().invoke(ctx)
@@ -86,15 +85,12 @@ class Commands(TyperGroup):
                 raise explain_missing_package(error, str(ctx.invoked_subcommand)) from error
         except BrokenPipeError:
             exit_with_closed_output()
-        except StoppedError as stopped:
-            errors.print(str(stopped), markup=False)
-            sys.exit(INTERRUPTED)
         except (IslandsError, OSError) as error:
             errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False)
             sys.exit(2)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
             errors.print("stopped")
-            sys.exit(INTERRUPTED)
+            sys.exit(TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command of the arguments; for an unknown name, an error suggests similar ones."""
@@ -197,7 +193,8 @@ def main() -> None:
     limit_threads()
     try:
         try:
-            app()
+            with raise_on_signals():
+                app()
         finally:
             sys.stdout.flush()
     except BrokenPipeError:

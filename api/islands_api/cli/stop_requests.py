@@ -1,23 +1,70 @@
-"""Requests to stop a long command: Ctrl-C, and SIGTERM for a search."""
+"""Requests to stop a command: Ctrl-C and SIGTERM.
+
+A step with results so far polls the requests of `stop_requests` and keeps its results. Everywhere else a
+signal ends the command at once, as an exception.
+"""
 
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, NoReturn
 
 import typer
 
+from islands.evolution.progress import StoppedError
 from islands_api.cli.console import errors
 
-#: Exit code after Ctrl-C.
-INTERRUPTED = 130
+#: How to get the complete result of a command that cannot be resumed.
+REPEAT = "repeat the command with --force for the complete result"
+
+#: Exit codes after Ctrl-C, and after SIGTERM without a result: 128 and the number of the signal.
+INTERRUPTED, TERMINATED = 130, 143
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM has arrived."""
+
+
+#: Signals that have raised an exception. Python ignores one that is raised in a callback of an import.
+_raised: list[int] = []
+
+
+@contextmanager
+def raise_on_signals() -> Iterator[None]:
+    """Let SIGTERM raise `Terminated` and SIGINT `KeyboardInterrupt` while the block runs.
+
+    A signal that the parent process has set to be ignored is ignored.
+    """
+
+    def receive(number: int, _frame: object) -> NoReturn:
+        _raised.append(number)
+        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+
+    with _handle(receive):
+        yield
+    _raised.clear()
+
+
+@contextmanager
+def _handle(receive: Callable[[int, Any], None]) -> Iterator[None]:
+    """Handle the signals that are not ignored by a function while the block runs."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    handled = [number for number, handler in before.items() if handler != signal.SIG_IGN]
+    for number in handled:
+        signal.signal(number, receive)
+    try:
+        yield
+    finally:
+        for number in handled:
+            signal.signal(number, before[number])
 
 
 class StopRequests:
     """Whether a signal has requested a stop. Calling it returns whether one has."""
 
     def __init__(self) -> None:
-        self.number: int | None = None
+        self.number: int | None = _raised[-1] if _raised else None
 
     def __call__(self) -> bool:
         """Return whether a stop is requested."""
@@ -29,29 +76,45 @@ class StopRequests:
             raise KeyboardInterrupt
         self.number = number
 
-    def explain(self, folder: Path, next_step: str) -> None:
-        """Say what a stopped result lacks."""
-        errors.print(
-            f"stopped: {folder} has the best models so far, without the steps that were left out: "
-            f"refinement, prediction bands or figures; {next_step}",
-            markup=False,
-        )
+    def end(self, folder: Path | None, left_out: Sequence[str], next_step: str) -> None:
+        """Say what a stopped result lacks, and end the command; return if no stop is requested.
 
-    def exit(self) -> None:
-        """End the command with exit code 130 if Ctrl-C has stopped it."""
-        if self.number == signal.SIGINT:
-            raise typer.Exit(INTERRUPTED)
+        Parameters
+        ----------
+        folder : Path or None
+            Folder or file with the result; None if it was printed only.
+        left_out : sequence of str
+            Steps that were left out.
+        next_step : str
+            How to get the complete result.
+        """
+        if not self():
+            return
+        kept = "the result so far is above" if folder is None else f"{folder} has the result so far"
+        steps = f", without {', '.join(left_out)}" if left_out else ", which is complete"
+        advice = f"; {next_step}" if left_out else ""
+        errors.print(f"stopped: {kept}{steps}{advice}", markup=False)
+        raise typer.Exit(INTERRUPTED if self.number == signal.SIGINT else 0)
 
 
 @contextmanager
-def stop_requests(
-    signals: Sequence[signal.Signals] = (signal.SIGINT, signal.SIGTERM),
-) -> Iterator[StopRequests]:
-    """Yield the stop requests by signals that arrive while the block runs."""
-    requests = StopRequests()
-    before = {number: signal.signal(number, requests.receive) for number in signals}
+def stop_requests(before_block: StopRequests | None = None) -> Iterator[StopRequests]:
+    """Yield the stop requests by signals that arrive while the block runs.
+
+    If the block raises `StoppedError`, there is no result, and the command ends.
+
+    Parameters
+    ----------
+    before_block : StopRequests, optional
+        Requests of an earlier block, which hold for this one as well.
+    """
+    requests = before_block or StopRequests()
     try:
-        yield requests
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        with _handle(requests.receive):
+            yield requests
+    except StoppedError as stopped:
+        if not requests():
+            raise
+        errors.print(f"{stopped}; there is no result to keep", markup=False)
+        code = INTERRUPTED if requests.number == signal.SIGINT else TERMINATED
+        raise typer.Exit(code) from stopped

@@ -11,7 +11,7 @@ import structlog
 from islands.data.dataset import Dataset
 from islands.evolution.engine import Engine
 from islands.evolution.presets import AUTO
-from islands.evolution.progress import StoppedError, stop_between_steps
+from islands.evolution.progress import StoppedError
 from islands.evolution.search_result import SearchResult
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
@@ -25,7 +25,7 @@ from islands.io.result_folder import result_document
 from islands.io.result_text.model_description import describe
 from islands.model.equations import equation
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
-from islands_service.coordinator.heartbeat import RunTimeLimitError
+from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import JobOutcome, JobState, Lease, ProgressReport
@@ -53,6 +53,8 @@ def run_identification_job(
 ) -> JobOutcome:
     """Run an identification job from its last checkpoint.
 
+    A job that is cancelled ends between two steps, with the models found so far.
+
     Parameters
     ----------
     check : callable
@@ -64,9 +66,11 @@ def run_identification_job(
 
     Raises
     ------
+    JobCancelled
+        The job was cancelled before the first model.
     IslandsError
-        The record or the settings are unusable, the cluster failed, or any error that ``check`` raises. At
-        the limit of run time the search ends with its best models so far; the error is raised if it has none.
+        The record or the settings are unusable, the cluster failed, or any other error that ``check``
+        raises. At the limit of run time the search also ends with its models; without any it is an error.
     """
     job = lease.job
     spec = parse_identification(job.spec)
@@ -75,68 +79,71 @@ def run_identification_job(
     checkpoints = JobCheckpoints(job, blobs)
     start = checkpoints.read()
     notes = notes or JobNotes(lease, store)
-    stop = StopAtLimit(check)
+    stop = SearchStop(check)
     reporter = ProgressReporter(lease, store, checkpoints, stop, every, start, notes)
     try:
-        result = _search(spec, record, validation, start, engine, reporter, stop)
+        found = _identify(record, validation, spec, start, engine, reporter, stop)
     except StoppedError as stopped:
-        raise stop.reached or stopped from stopped
-    reached = stop.reached
-    reporter.flush()
-    found = result.with_wall_time(reporter.spent).search_result
-    if reached is None:
+        raise stop.reason or stopped from stopped
+    if not found.search.left_out:
         return make_outcome(found, start.note)
+    if not isinstance(stop.reason, RunTimeLimitError):
+        return replace(make_outcome(found, start.note), state=JobState.CANCELLED)
     note = (
-        f"the search ended at the limit of the run time of one job, {reached.limit} s, with its best models "
-        "so far; the operator can raise the limit"
+        f"the search ended at the limit of the run time of one job, {stop.reason.limit} s, with its "
+        "best models so far; the operator can raise the limit"
     )
     ended = replace(found, search=replace(found.search, ended_by="run time"))
     return make_outcome(ended, "; ".join(filter(None, [start.note, note])))
 
 
-class StopAtLimit:
-    """Request to stop a search at the limit of its run time; `reached` is the error once it is reached.
+class SearchStop:
+    """Stop request of a search: its job is cancelled, or at its limit of run time.
 
     Parameters
     ----------
     check : callable
         Raises the reason if the job must end early.
+
+    Attributes
+    ----------
+    reason : JobCancelled or RunTimeLimitError
+        Why the search is stopped; None before.
     """
 
     def __init__(self, check: Callable[[], None]) -> None:
         self._check = check
-        self.reached: RunTimeLimitError | None = None
+        self.reason: JobCancelled | RunTimeLimitError | None = None
 
     def __call__(self) -> bool:
-        """Return whether the limit is reached; raise any other reason why the job must end."""
+        """Return whether the search is stopped; raise any other reason why the job must end."""
         try:
             self._check()
-        except RunTimeLimitError as error:
-            self.reached = error
-        return self.reached is not None
+        except (JobCancelled, RunTimeLimitError) as error:
+            self.reason = error
+        return self.reason is not None
 
 
-def _search(
-    spec: Identification,
+def _identify(
     record: Dataset,
     validation: Dataset | float,
+    spec: Identification,
     start: JobStart,
     engine: Engine,
     reporter: "ProgressReporter",
-    stop: StopAtLimit,
-) -> Result:
+    stop: SearchStop,
+) -> SearchResult:
     preset: str | Choice = spec.preset
     if preset == AUTO and start.state is not None:
         # A job of an earlier version without preset stored no choice, and had this default.
         preset = start.choice or "hysteresis"
     elif preset == AUTO:
         try:
-            stage = stop_between_steps(reporter.report_stage, stop)
-            preset = choose_preset(record, validation, spec.changes, stage)
+            preset = choose_preset(record, validation, spec.changes, reporter.report_stage, stop)
         except StoppedChoiceError as stopped:
-            return Result(stopped.found)
+            return Result(stopped.found).with_wall_time(reporter.spent).search_result
     reporter.choice = preset if isinstance(preset, Choice) else None
-    return identify(
+    result = identify(
         record,
         validation=validation,
         preset=preset,
@@ -148,6 +155,8 @@ def _search(
         engine=engine,
         **spec.changes,
     )
+    reporter.flush()
+    return result.with_wall_time(reporter.spent).search_result
 
 
 def make_outcome(found: SearchResult, note: str = "") -> JobOutcome:
@@ -182,13 +191,13 @@ class ProgressReporter:
         lease: Lease,
         store: Store,
         checkpoints: JobCheckpoints,
-        check: StopAtLimit,
+        stop: SearchStop,
         every: float,
         start: JobStart,
         notes: JobNotes,
     ) -> None:
         self._lease, self._store, self._checkpoints, self._notes = lease, store, checkpoints, notes
-        self._check, self._every = check, every
+        self._stop, self._every = stop, every
         self._started_at = monotonic() - start.spent
         state = start.state
         self._first = (monotonic(), 0 if state is None else state.evaluations)
@@ -208,14 +217,14 @@ class ProgressReporter:
 
     def __call__(self, state: SearchState, settings: Settings) -> None:
         """Store the state of the search if a report is due."""
-        self._check()
+        self._stop()
         self._last = state, settings
         if monotonic() >= min(self._report_at, self._checkpoint_at):
             self._report(state, settings)
 
     def report_stage(self, message: str, _fraction: float | None = None, /) -> None:
         """Store the stage before or after the epochs as the phase."""
-        self._check()
+        self._stop()
         reached = self._progress(*self._last) if self._last else self._reached_before()
         try:
             progress = self._notes.complete({**reached, "phase": message})
@@ -231,9 +240,8 @@ class ProgressReporter:
         return {**before, **self._note}
 
     def flush(self) -> None:
-        """Store the last state. Retry while the store is unavailable."""
-        while self._last is not None and not self._report(*self._last):
-            self._check()
+        """Store the last state. Retry while the store is unavailable, unless the job is cancelled."""
+        while self._last is not None and not self._report(*self._last) and not self._stop():
             sleep(REPORT_EVERY)
 
     def _report(self, state: SearchState, settings: Settings) -> bool:

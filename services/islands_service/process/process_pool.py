@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import lru_cache, partial
@@ -18,6 +18,9 @@ from islands.errors import IslandsError
 
 #: Seconds of a computation before the first process is used. Shorter ones need none.
 START_AFTER = 1.0
+
+#: Seconds between two checks.
+_CHECK_SECONDS = 0.1
 
 #: Modules that are imported once, in the process from which the others are forked.
 _PRELOADED = [
@@ -36,7 +39,11 @@ class ProcessPoolError(IslandsError):
 
 
 @contextmanager
-def process_pool(workers: int | None = None, start_after: float = START_AFTER) -> Iterator[ParallelMap]:
+def process_pool(
+    workers: int | None = None,
+    start_after: float = START_AFTER,
+    check: Callable[[], object] = lambda: None,
+) -> Iterator[ParallelMap]:
     """Provide a parallel map on processes of this computer while the block runs.
 
     Functions and arguments may be of any type, with functions that are defined in functions.
@@ -47,6 +54,9 @@ def process_pool(workers: int | None = None, start_after: float = START_AFTER) -
         Largest number of processes; None for one per core. One computes in this process.
     start_after : float
         Seconds for which calls are evaluated in this process, one after the other.
+    check : callable
+        Called before each evaluation in this process, and many times a second while others evaluate. It may
+        raise an error.
 
     Raises
     ------
@@ -55,7 +65,7 @@ def process_pool(workers: int | None = None, start_after: float = START_AFTER) -
     """
     workers = workers or len(os.sched_getaffinity(0))
     if workers == 1:
-        yield map
+        yield partial(_map_here, check)
         return
     began, others = monotonic(), set(active_children())
     context = get_context("forkserver")
@@ -67,8 +77,9 @@ def process_pool(workers: int | None = None, start_after: float = START_AFTER) -
         waiting = iter(arguments)
         for argument in waiting:
             if monotonic() - began > start_after:
-                yield from _map_on(pool, function, [argument, *waiting])
+                yield from _map_on(pool, function, [argument, *waiting], check)
                 return
+            check()
             yield function(argument)
 
     try:
@@ -79,10 +90,27 @@ def process_pool(workers: int | None = None, start_after: float = START_AFTER) -
             process.kill()  # its result is not needed any more
 
 
-def _map_on(pool: ProcessPoolExecutor, function: Callable[[A], R], arguments: Iterable[A]) -> Iterator[R]:
+def _map_here(
+    check: Callable[[], object], function: Callable[[A], R], arguments: Iterable[A], /
+) -> Iterator[R]:
+    for argument in arguments:
+        check()
+        yield function(argument)
+
+
+def _map_on(
+    pool: ProcessPoolExecutor,
+    function: Callable[[A], R],
+    arguments: Iterable[A],
+    check: Callable[[], object],
+) -> Iterator[R]:
     call: Any = partial(_call, cloudpickle.dumps(function))
     try:
-        yield from pool.map(call, map(cloudpickle.dumps, arguments))
+        for result in [pool.submit(call, cloudpickle.dumps(argument)) for argument in arguments]:
+            check()
+            while not wait([result], _CHECK_SECONDS).done:
+                check()
+            yield result.result()
     except BrokenProcessPool as error:
         raise ProcessPoolError(
             "a process has ended, perhaps because memory was full: repeat the command with fewer --workers"

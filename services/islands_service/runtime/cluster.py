@@ -4,6 +4,7 @@ import logging
 import os
 import secrets
 import shutil
+import signal
 import socket
 import stat
 import tempfile
@@ -11,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from math import inf
 from pathlib import Path
+from threading import current_thread, main_thread
 
 import ray
 from filelock import FileLock, Timeout
@@ -89,7 +91,10 @@ def cluster(address: str | None = None, cpus: int | None = None, jobs: int = 1) 
             "this process is already connected to Ray: disconnect first, or give the address of that cluster"
         )
     logging.getLogger("ray").setLevel(logging.CRITICAL)
+    handler = signal.getsignal(signal.SIGTERM)
     with _local_ray(cpus or count_cpus(), jobs) if address is None else _remote_cluster(address):
+        if callable(handler) and current_thread() is main_thread():
+            signal.signal(signal.SIGTERM, handler)  # Ray has replaced it by its own
         yield
 
 

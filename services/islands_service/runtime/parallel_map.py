@@ -20,7 +20,9 @@ R = TypeVar("R")
 
 
 @contextmanager
-def ray_pool(workers: int | None = None, address: str | None = None) -> Iterator[ParallelMap]:
+def ray_pool(
+    workers: int | None = None, address: str | None = None, check: Callable[[], object] = lambda: None
+) -> Iterator[ParallelMap]:
     """Provide a parallel map on a Ray cluster while the block runs.
 
     Parameters
@@ -29,6 +31,8 @@ def ray_pool(workers: int | None = None, address: str | None = None) -> Iterator
         Concurrent calls; None for one per core.
     address : str or None
         ``HOST:PORT`` of a cluster; None starts a local Ray.
+    check : callable
+        See `ray_map`.
 
     Raises
     ------
@@ -36,7 +40,7 @@ def ray_pool(workers: int | None = None, address: str | None = None) -> Iterator
         Ray is unavailable or failed. Errors of the function itself are raised unchanged.
     """
     with cluster(address):
-        yield ray_map(workers)
+        yield ray_map(workers, check)
 
 
 def ray_map(workers: int | None = None, check: Callable[[], object] = lambda: None) -> ParallelMap:

@@ -5,6 +5,8 @@ and the coupled simulation feeds errors from one equation to the other. Damped G
 (Levenberg 1944, Marquardt 1963) minimise the error of the simulation that the model is used for.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,6 +36,7 @@ def refine_coupled(
     warm_up: int,
     constraints: str = "none",
     max_steps: int = 20,
+    stop: Callable[[], bool] = lambda: False,
 ) -> CoupledModel | None:
     """Refine the parameters of all equations on the simulation error of all outputs.
 
@@ -53,6 +56,8 @@ def refine_coupled(
         Constraints of every equation. The refined equations meet them.
     max_steps : int
         Maximum number of accepted steps.
+    stop : callable
+        Called before each step. Once it returns true, the refinement ends with the parameters so far.
 
     Returns
     -------
@@ -68,7 +73,7 @@ def refine_coupled(
         return None
     damping, steps = _DAMPING, 0
     normal, gradient = residual.normal_equations(theta, error, directions)
-    while steps < max_steps and damping < _MAX_DAMPING:
+    while steps < max_steps and damping < _MAX_DAMPING and not stop():
         damped = normal + damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
         candidate = theta - directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
         trial = residual(candidate)

@@ -5,6 +5,7 @@ Gauss-Newton steps (Levenberg 1944, Marquardt 1963). The constraints remain sati
 restricted to their null space.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,6 +55,7 @@ def refine(
     warm_up: int | None = None,
     max_steps: int = 30,
     standard_errors: bool = True,
+    stop: Callable[[], bool] = lambda: False,
 ) -> RefinedModel | EvaluationOutcome:
     """Refine the parameters of a model on the multiple-shooting error.
 
@@ -72,6 +74,8 @@ def refine(
         Maximum number of accepted steps. With 0 the parameters stay, and the model gets standard errors.
     standard_errors : bool
         Whether the model has standard errors, which take as long as two steps.
+    stop : callable
+        Called before each step. Once it returns true, the refinement ends with the parameters so far.
 
     Returns
     -------
@@ -117,7 +121,7 @@ def refine(
     before = residual.mean_square(error)
     damping, steps = _INITIAL_DAMPING, 0
     normal, gradient = residual.normal_equations(theta, error, directions)
-    while steps < max_steps and damping < _MAX_DAMPING:
+    while steps < max_steps and damping < _MAX_DAMPING and not stop():
         damped = normal + damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
         candidate = theta - directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
         trial = residual(candidate) if constrained.has_signs(candidate) else None

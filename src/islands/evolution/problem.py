@@ -13,7 +13,7 @@ from islands.evolution.generation.swap_search import swap_search
 from islands.evolution.generation.variation import Genes
 from islands.evolution.gp.gene_structure import with_phi
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.progress import Steps
 from islands.evolution.settings import Settings
 from islands.model.expression import Expression, height
 from islands.model.regressor import Regressor
@@ -49,9 +49,7 @@ class Problem:
         return replace(self.settings, **ISLAND_PROFILES[profiles[island % len(profiles)]])
 
 
-def make_problem(
-    record: Dataset, settings: Settings, progress: ProgressCallback = ignore_progress
-) -> Problem:
+def make_problem(record: Dataset, settings: Settings, steps: Steps | None = None) -> Problem:
     """Make a search problem; run the forward selection if the settings have a library.
 
     Regressors of the library that exceed the maximum height of a gene are left out.
@@ -60,16 +58,19 @@ def make_problem(
     ----------
     record : Dataset
     settings : Settings
-    progress : ProgressCallback
-        Called before each step of the selection and of the swap search.
+    steps : Steps, optional
+        Steps of the selection and of the swap search.
 
     Raises
     ------
+    StoppedError
+        A stop is requested before the selection.
     SettingsError
         The library has too many candidates, or a constraint refers to an input that the record lacks.
     RecordError
         The record is incomplete, or not longer than the largest lag of the library.
     """
+    steps = steps or Steps()
     constraint(settings.constraints).check_inputs(record.inputs)
     if not settings.library:
         return Problem(record, settings)
@@ -86,7 +87,7 @@ def make_problem(
     library = [item for item in regressors if height(genes[item]) <= settings.max_height and admits(item)]
     seeds: tuple[Genes, ...] = ()
     exchanged: Sequence[Regressor] = library
-    progress(f"forward selection among {len(library)} candidates", 0.0)
+    steps(f"forward selection among {len(library)} candidates", 0.0)
     selection = make_selection_problem(library, record, settings.constraints)
     if not isinstance(selection, EvaluationOutcome):
         structures = select_forward(selection, settings.max_terms)
@@ -95,6 +96,6 @@ def make_problem(
             exchanged = select_pool(library, selection, settings.max_terms)
     if settings.swap_search:
         pool = [genes[item] for item in exchanged]
-        by_size = swap_search(Evaluator(record, settings), pool, seeds, progress=progress)
+        by_size = swap_search(Evaluator(record, settings), pool, seeds, steps=steps)
         seeds = tuple(each.genes for rank in zip_longest(*by_size) for each in rank if each is not None)
     return Problem(record, settings, seeds, tuple(genes[item] for item in library))

@@ -34,23 +34,60 @@ def never_stop() -> bool:
 
 
 class StoppedError(IslandsError):
-    """A computation was stopped before it had its result."""
+    """A computation was stopped.
+
+    Attributes
+    ----------
+    step : str
+        Step that was left out.
+    """
 
     def __init__(self, step: str) -> None:
-        super().__init__(f"stopped before the first models were found ({step}): there is no model to keep")
+        super().__init__(f"stopped before this step: {step}")
         self.step = step
 
 
-def stop_between_steps(progress: ProgressCallback, stop: Stop) -> ProgressCallback:
-    """Return a progress callback that raises `StoppedError` once a stop is requested.
+class Steps:
+    """Steps of a long computation, which a stop request ends between two of them.
 
-    Long computations report progress at the start of every step. Those with results so far catch the error
-    and return them.
+    A computation calls this object at the start of every step without which it has no result, and `skip` at
+    the start of every other step.
+
+    Parameters
+    ----------
+    progress : ProgressCallback
+    stop : callable
+        Returns true once a stop is requested, and from then on.
     """
 
-    def report(message: str, fraction: float | None = None, /) -> None:
-        if stop():
-            raise StoppedError(message)
-        progress(message, fraction)
+    def __init__(self, progress: ProgressCallback = ignore_progress, stop: Stop = never_stop) -> None:
+        self.report, self.stop = progress, stop
+        self._left_out: dict[str, None] = {}
 
-    return report
+    def __call__(self, message: str, fraction: float | None = None, /) -> None:
+        """Report a step that the result needs.
+
+        Raises
+        ------
+        StoppedError
+            A stop is requested.
+        """
+        self.check(message)
+        self.report(message, fraction)
+
+    def check(self, step: str) -> None:
+        """Raise `StoppedError` if a stop is requested within a step that the result needs."""
+        if self.stop():
+            raise StoppedError(step)
+
+    def skip(self, step: str) -> bool:
+        """Return whether a step must be left out because a stop is requested, and record its name."""
+        if not self.stop():
+            return False
+        self._left_out[step] = None
+        return True
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the steps that were left out, each once, in their order."""
+        return tuple(self._left_out)

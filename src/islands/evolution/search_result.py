@@ -15,13 +15,16 @@ from islands.data.loops import has_loops
 from islands.data.split import Split
 from islands.estimation.structure_selection.certificate import Certificate
 from islands.evolution.history import HistoryPoint
-from islands.evolution.progress import ProgressCallback, StoppedError, ignore_progress
+from islands.evolution.progress import Steps
 from islands.model.equations import equation
 from islands.model.model import Model
 from islands.validation.assessment import Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
 from islands.validation.prediction_bands import PredictionBands, calibrate_bands
 from islands.validation.recommendation import Recommendation, recommend
+
+#: Name of the step that makes the ensemble and the prediction bands.
+_BANDS = "prediction bands"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +73,8 @@ class SearchStatistics:
     ended_by : str or None
         Budget that an evolution used up, or ``stopped`` if a request ended the computation; None for a
         complete search that is not an evolution.
+    left_out : tuple of str
+        Steps that a request to stop has left out.
     certificates : mapping
         Certificate of the candidate library by number of terms; empty if none was computed.
     """
@@ -84,6 +89,7 @@ class SearchStatistics:
     history: tuple[HistoryPoint, ...] = ()
     caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     ended_by: str | None = None
+    left_out: tuple[str, ...] = ()
     certificates: Mapping[int, Certificate] = field(default_factory=dict)
 
     @property
@@ -172,23 +178,27 @@ def with_bands(
     candidates: Sequence[ValidatedModel],
     constraints: str,
     warm_up: int,
-    progress: ProgressCallback = ignore_progress,
+    steps: Steps,
 ) -> SearchResult:
     """Return a search result with the ensemble of the candidates and with calibrated bands of its models.
 
-    If ``progress`` raises `StoppedError`, the result has neither and is marked as stopped.
+    Once a stop is requested, the result has neither. It is marked as stopped if any step was left out.
     """
-    report = partial(progress, "prediction bands", 1.0)
-    try:
-        ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed, report)
-        report()
-    except StoppedError:
-        return replace(found, search=replace(found.search, ended_by="stopped"))
-    if ensemble is None:
-        return found
+    steps.report(_BANDS, 1.0)
+    skip = partial(steps.skip, _BANDS)
+    ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed, skip)
+    if skip() or ensemble is None:
+        return _mark_stopped(found, steps)
     calibrated = calibrate_bands([entry.model for entry in found.models], ensemble, found.split, warm_up)
     models = tuple(replace(entry, bands=bands) for entry, bands in zip(found.models, calibrated, strict=True))
-    return replace(found, models=models, ensemble=ensemble)
+    return _mark_stopped(replace(found, models=models, ensemble=ensemble), steps)
+
+
+def _mark_stopped(found: SearchResult, steps: Steps) -> SearchResult:
+    """Return a search result with the steps that were left out; the same result if there are none."""
+    if not steps.left_out:
+        return found
+    return replace(found, search=replace(found.search, ended_by="stopped", left_out=steps.left_out))
 
 
 def with_average(found: SearchResult, average: int) -> SearchResult:

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from math import isfinite
 from typing import Protocol, TypeVar
 
@@ -18,7 +19,7 @@ from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.individual import Individual, unique_structures
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.problem import Problem
-from islands.evolution.progress import ProgressCallback, Stop, ignore_progress, never_stop
+from islands.evolution.progress import Steps
 from islands.evolution.search_result import RankedModel, rank_models
 from islands.evolution.settings import Settings
 from islands.model.model import Model
@@ -37,6 +38,9 @@ _INTERVALS = (0.3, 3.0)
 #: Structures of every size that are refined over all intervals.
 _MOST_PROMISING = 3
 
+#: Name of the step that refines parameters.
+_REFINEMENT = "refinement of parameters"
+
 
 class _HasSize(Protocol):
     @property
@@ -47,20 +51,20 @@ _Sized = TypeVar("_Sized", bound=_HasSize)
 
 
 def select_final_models(
-    candidates: Iterable[ValidatedModel], problem: Problem, split: Split, stop: Stop = never_stop
+    candidates: Iterable[ValidatedModel], problem: Problem, split: Split, steps: Steps
 ) -> tuple[RankedModel, ...]:
     """Assess the candidates and return the best model of every size, best first.
 
     If the parameters are constrained, a model must have Property 1; a size without such a model is left out.
-    Once ``stop`` returns true, the remaining models have no standard errors.
+    Once a stop is requested, the remaining models have no standard errors.
     """
     settings = problem.settings
     kept = []
     for entries in _group_by_size(each for each in candidates if isfinite(each.error)):
         for candidate in sorted(entries, key=lambda entry: entry.order):
-            model = (
-                candidate.model if stop() else _with_standard_errors(candidate, settings, split.estimation)
-            )
+            model = candidate.model
+            if model.standard_errors is None and not steps.skip("standard errors"):
+                model = _with_standard_errors(candidate, settings, split.estimation)
             assessment = assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
             if _is_valid(assessment, settings):
                 kept.append(RankedModel(model, assessment))
@@ -71,8 +75,6 @@ def select_final_models(
 def _with_standard_errors(candidate: ValidatedModel, settings: Settings, record: Dataset) -> Model:
     """Return the model with standard errors; most candidates do not need them, so they have none."""
     model = candidate.model
-    if model.standard_errors is not None:
-        return model
     limits = settings.constraints, settings.maximum_lag
     if candidate.interval == 1:
         estimated = estimate(model.regressors, record, *limits)
@@ -93,25 +95,24 @@ def estimate_candidates(
     problem: Problem,
     split: Split,
     offsets: Offsets,
-    progress: ProgressCallback = ignore_progress,
-    stop: Stop = never_stop,
+    steps: Steps,
 ) -> list[ValidatedModel]:
     """Estimate and refine the best structures of every size, and validate them.
 
     Structures are those of the hall of fame and those that seeded the search, so that the result is never
     worse than the seeds. All of them are simulated on the validation data with the parameters of the search.
     The best of every size are estimated again in the units of the record and, if the settings ask for it,
-    refined over several shooting intervals. An estimator in the settings replaces both. Once ``stop`` returns
-    true, the best structure of every remaining size is estimated only.
+    refined over several shooting intervals. An estimator in the settings replaces both. Once a stop
+    is requested, the best structure of every remaining size is estimated only.
     """
     settings, validation = problem.settings, subtract_offsets(split.validation, offsets)
     found = []
     groups = _group_by_size(_evaluate_structures(hall_of_fame, problem))
     for done, individuals in enumerate(groups):
-        progress(f"estimation of the final models of {individuals[0].size} terms", done / len(groups))
-        count = (1, 0) if stop() else _REFINED
+        steps.report(f"estimation of the final models of {individuals[0].size} terms", done / len(groups))
+        count = (1, 0) if steps.skip("estimation of further structures") else _REFINED
         kept = screen(individuals, validation, settings.maximum_lag, *count)
-        found += _estimate_models(kept, settings, split, offsets, stop)
+        found += _estimate_models(kept, settings, split, offsets, steps)
     return found
 
 
@@ -158,7 +159,7 @@ def screen(
 
 
 def _estimate_models(
-    individuals: list[Individual], settings: Settings, split: Split, offsets: Offsets, stop: Stop
+    individuals: list[Individual], settings: Settings, split: Split, offsets: Offsets, steps: Steps
 ) -> list[ValidatedModel]:
     """Return models with estimated and with refined parameters in the units of the record."""
     found = (
@@ -177,18 +178,18 @@ def _estimate_models(
         for each in found
         if not isinstance(each, EvaluationOutcome) and each.model.size <= settings.max_terms
     ]
-    if settings.estimator and not stop():
+    if settings.estimator and not steps.skip(f"estimator {settings.estimator}"):
         return _estimate_with_choice(fitted, settings, split)
     estimated = [each.model for each in fitted]
     validated = _validate(estimated, 1, split.validation, settings.maximum_lag)
-    if settings.refine and not stop():
+    if settings.refine and not steps.skip(_REFINEMENT):
         interval = FITNESSES[settings.fitness](settings.shooting)
-        refined = _refine(estimated, interval, settings, split, stop)
+        refined = _refine(estimated, interval, settings, split, steps)
         validated += refined
         best = [each.model for each in refined[:_MOST_PROMISING]]
         lengths = [max(1, round(factor * interval)) for factor in _INTERVALS] if interval else []
         for length in lengths:
-            validated += _refine(best, length, settings, split, stop)
+            validated += _refine(best, length, settings, split, steps)
     return validated
 
 
@@ -213,12 +214,12 @@ def _estimate_with_choice(
 
 
 def _refine(
-    models: list[Model], interval: int | None, settings: Settings, split: Split, stop: Stop
+    models: list[Model], interval: int | None, settings: Settings, split: Split, steps: Steps
 ) -> list[ValidatedModel]:
     """Refine models over shooting intervals and validate them; the kernels run in parallel threads."""
 
     def refine_one(model: Model) -> Model | None:
-        if stop():
+        if steps.skip(_REFINEMENT):
             return None
         refined = refine(
             model,
@@ -227,6 +228,7 @@ def _refine(
             settings.constraints,
             settings.maximum_lag,
             standard_errors=False,
+            stop=partial(steps.skip, _REFINEMENT),
         )
         return None if isinstance(refined, EvaluationOutcome) else refined.model
 

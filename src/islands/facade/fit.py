@@ -14,7 +14,6 @@ from islands.evolution.progress import (
     Stop,
     ignore_progress,
     never_stop,
-    stop_between_steps,
 )
 from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
@@ -127,10 +126,9 @@ def fit(
         certificate=certificate,
     )
     split = split_data(record, validation)
-    progress = stop_between_steps(progress, stop)
     try:
         found = fit_chosen_library(
-            record, split, library, degree, lags, constraints, delays, settings, seed, progress
+            record, split, library, degree, lags, constraints, delays, settings, seed, progress, stop
         )
     except StoppedChoiceError as stopped:
         found = stopped.found

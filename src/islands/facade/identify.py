@@ -27,11 +27,11 @@ from islands.evolution.presets import AUTO, resolve_kind, resolve_settings, with
 from islands.evolution.problem import Problem, make_problem
 from islands.evolution.progress import (
     ProgressCallback,
+    Steps,
     Stop,
     StoppedError,
     ignore_progress,
     never_stop,
-    stop_between_steps,
 )
 from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
@@ -141,10 +141,10 @@ def identify(
     record, validation = read_data(record, y, dt, inputs, output, validation)
     if seed < 0:
         raise SettingsError(f"a seed is not negative, got {seed}")
-    report, stage = stage, stop_between_steps(stage, stop)
+    steps = Steps(stage, stop)
     if preset == AUTO:
         try:
-            preset = choose_preset(record, validation, changes, stage)
+            preset = choose_preset(record, validation, changes, stage, stop)
         except StoppedChoiceError as stopped:
             return Result(stopped.found)
     if isinstance(preset, Choice):
@@ -153,9 +153,9 @@ def identify(
         settings = resolve_settings(preset, with_tuples(changes))
     for entry in _own_primitives(settings):
         row_address(entry)  # compile it before the search starts
-    stage("sampling rate and direct feedthrough", 0.0)
+    steps("sampling rate and direct feedthrough", 0.0)
     trial, least = make_trial_library(settings), settings.maximum_lag + _MIN_RESIDUALS
-    split, count = select_rate(split_data(record, validation), settings.average, trial, least)
+    split, count = select_rate(split_data(record, validation), settings.average, trial, least, steps)
     split = select_feedthrough(split, settings.feedthrough, trial.at_rate(count))
     _check_validation_length(split.validation, settings)
     offsets = _find_search_offsets(split.estimation, settings)
@@ -164,7 +164,7 @@ def identify(
         shooting=count_means(settings.shooting, count),
         library_delays=tuple(delay // count for delay in settings.library_delays),
     )
-    search_problem = make_problem(subtract_offsets(split.estimation, offsets), scaled, stage)
+    search_problem = make_problem(subtract_offsets(split.estimation, offsets), scaled, steps)
     state = start or SearchState(empty_archipelago(settings.islands, seed))
     if [(island.index, island.seed) for island in state.archipelago.islands] != [
         (index, seed) for index in range(settings.islands)
@@ -172,21 +172,14 @@ def identify(
         raise SettingsError(
             "the start state has other islands or another seed: pass the settings and the seed of its run"
         )
-    with (
-        open_engine(engine, report) as opened,
-        closing(opened.run(search_problem, state.archipelago, stop)) as epochs,
-    ):
-        # Epochs after the last one are never requested, so work that an engine does in advance has no effect.
-        while not (stop() or stop_reason(state, settings)) and (epoch := next(epochs, None)):
-            state = advance(state, epoch)
-            if progress is not None:
-                progress(state, settings)
+    with open_engine(engine, stage) as opened:
+        state = _evolve(search_problem, state, settings, opened, steps, progress or _ignore_epoch)
     if state.archipelago.generation < 0 and not search_problem.seeds:
         raise StoppedError("first populations")
     hall_of_fame = state.archipelago.hall_of_fame
-    candidates = estimate_candidates(hall_of_fame, search_problem, split, offsets, report, stop)
-    report("assessment of the final models", 1.0)
-    models = select_final_models(candidates, search_problem, split, stop)
+    candidates = estimate_candidates(hall_of_fame, search_problem, split, offsets, steps)
+    stage("assessment of the final models", 1.0)
+    models = select_final_models(candidates, search_problem, split, steps)
     if not models:
         raise SettingsError(
             f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
@@ -196,10 +189,34 @@ def identify(
     if isinstance(preset, Choice):
         described.update(preset=AUTO, choice=preset.to_document())
     described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
-    statistics = _make_statistics(state, hall_of_fame, search_problem, stop())
+    statistics = _make_statistics(state, hall_of_fame, search_problem)
     found = SearchResult(record, split, seed, described, statistics, models)
-    banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag, stage)
+    banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag, steps)
     return Result(with_average(banded, count))
+
+
+def _evolve(
+    problem: Problem,
+    state: SearchState,
+    settings: Settings,
+    engine: Engine,
+    steps: Steps,
+    progress: SearchCallback,
+) -> SearchState:
+    """Run the epochs, which are an optional step; return the state after the last one."""
+    with closing(engine.run(problem, state.archipelago, steps.stop)) as epochs:
+        # Epochs after the last one are never requested, so work that an engine does in advance has no effect.
+        while not (steps.stop() or stop_reason(state, settings)) and (epoch := next(epochs, None)):
+            state = advance(state, epoch)
+            progress(state, settings)
+    if not stop_reason(state, settings):
+        done = max(0, state.archipelago.generation)
+        steps.skip(f"search from generation {done} to {settings.generations}")
+    return state
+
+
+def _ignore_epoch(_state: SearchState, _settings: Settings) -> None:
+    """Ignore the state after an epoch."""
 
 
 def _own_primitives(settings: Settings) -> list[Primitive]:
@@ -233,9 +250,7 @@ def _find_search_offsets(record: Dataset, settings: Settings) -> Offsets:
     return find_offsets(record, LARGE_OFFSET) if shiftable else no_offsets(record)
 
 
-def _make_statistics(
-    state: SearchState, hall_of_fame: HallOfFame, problem: Problem, stopped: bool
-) -> SearchStatistics:
+def _make_statistics(state: SearchState, hall_of_fame: HallOfFame, problem: Problem) -> SearchStatistics:
     maximum_lag, degree = _maximum_lag_and_degree(hall_of_fame)
     inputs = problem.record.inputs
     count = full_set(degree, maximum_lag, maximum_lag, inputs)
@@ -250,7 +265,7 @@ def _make_statistics(
         sum(state.outcomes.get(name, 0) for name in FEASIBLE_OUTCOMES) / max(1, state.evaluations),
         state.history,
         state.caches,
-        "stopped" if stopped else stop_reason(state, problem.settings) or "stopped",
+        stop_reason(state, problem.settings) or "stopped",
     )
 
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 
 from islands.data.averaging import AUTO, count_means
 from islands.data.dataset import Dataset
@@ -29,7 +30,7 @@ from islands.estimation.structure_selection.deviations import (
 )
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.swap_search import swap_search
-from islands.evolution.progress import ProgressCallback, StoppedError, ignore_progress
+from islands.evolution.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.evolution.search_result import (
     RankedModel,
     SearchResult,
@@ -54,6 +55,9 @@ SHOOTING = 500
 
 #: Structures of every size that are simulated on the validation data.
 _SCREENED = 150
+
+#: Name of the step that computes bounds on the error of all models.
+_CERTIFICATES = "bounds of the errors of all models"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +88,7 @@ def fit_library(
     settings: FitSettings,
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
+    stop: Stop = never_stop,
 ) -> SearchResult:
     """Fit models of increasing size from one library and rank them on the validation data.
 
@@ -98,13 +103,15 @@ def fit_library(
     seed : int
         Stored in the result.
     progress : callable, optional
-        Called with a message and the completed fraction. If it raises `StoppedError`, the result has the
-        models found so far, without prediction bands, and is marked as stopped.
+        Called with a message and the completed fraction.
+    stop : callable, optional
+        Called between all steps. Once it returns true and structures are known, the best one of every size
+        is estimated, and the other steps are left out; the result is marked as stopped and names them.
 
     Raises
     ------
     StoppedError
-        ``progress`` raised it before the first model.
+        ``stop`` returned true before a structure was known.
     SettingsError
         No model could be estimated.
     RecordError
@@ -112,15 +119,16 @@ def fit_library(
     """
     constraints = library.constraints
     shooting = settings.shooting or min(SHOOTING, max(1, split.estimation.samples // 10))
-    progress("sampling rate and direct feedthrough", 0.0)
+    steps = Steps(progress, stop)
+    steps("sampling rate and direct feedthrough", 0.0)
     least = library.lags + 3 + max(library.delays, default=0)
-    split, samples = select_rate(split, settings.average, library, least)
+    split, samples = select_rate(split, settings.average, library, least, steps)
     rated = library.at_rate(samples)
     split = select_feedthrough(split, settings.feedthrough, rated)
     interval = count_means(shooting, samples)
     swaps = rated.make_settings(settings.max_terms, interval)
-    structures, certificates, warm_up = _select(split, rated, swaps, settings.certificate, progress)
-    models, outcomes, stopped = _estimate(structures, split, settings, swaps, warm_up, progress)
+    structures, certificates, warm_up = _select(split, rated, swaps, settings.certificate, steps)
+    models, outcomes = _estimate(structures, split, settings, swaps, warm_up, steps)
     best_of_size: dict[int, RankedModel] = {}
     for ranked in rank_models(models):
         best_of_size.setdefault(ranked.model.size, ranked)
@@ -130,7 +138,6 @@ def fit_library(
         sum(outcomes.values()),
         dict(outcomes),
         {"candidates": count, "bytes": 8 * count * rows},
-        ended_by="stopped" if stopped else None,
         certificates={found.terms: found for found in certificates},
     )
     described = {
@@ -144,14 +151,12 @@ def fit_library(
         "shooting": shooting,
     }
     result = SearchResult(record, split, seed, described, search, tuple(best_of_size.values()))
-    if stopped:
-        return with_average(result, samples)
     minimised = ESTIMATORS[settings.estimator].interval(interval)
     estimates = [
         ValidatedModel(entry.model, minimised, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
         for entry in models
     ]
-    return with_average(with_bands(result, estimates, constraints, warm_up, progress), samples)
+    return with_average(with_bands(result, estimates, constraints, warm_up, steps), samples)
 
 
 def _estimate(
@@ -160,24 +165,22 @@ def _estimate(
     settings: FitSettings,
     swaps: Settings,
     warm_up: int,
-    progress: ProgressCallback,
-) -> tuple[list[RankedModel], Counter[str], bool]:
-    """Estimate and assess a model of every structure.
+    steps: Steps,
+) -> tuple[list[RankedModel], Counter[str]]:
+    """Estimate and assess a model of every structure; return the models and the number of each outcome.
 
-    Return the models, the number of each outcome, and whether `StoppedError` ended the loop.
+    Once a stop is requested, only the last structure of every size that has no model is estimated.
     """
     constraints, interval = swaps.constraints, swaps.shooting
     outcomes: Counter[str] = Counter()
     models: list[RankedModel] = []
-    stopped = False
+    last = {len(structure): place for place, (structure, _) in enumerate(structures)}
     for done, (structure, offsets) in enumerate(structures):
-        try:
-            progress(f"estimation of {len(structure)} terms", done / len(structures))
-        except StoppedError:
-            if not models:
-                raise
-            stopped = True
-            break
+        size = len(structure)
+        is_needed = done == last[size] and size not in {entry.model.size for entry in models}
+        if not is_needed and steps.skip("estimation of further structures"):
+            continue
+        steps.report(f"estimation of {size} terms", done / len(structures))
         estimated = estimate_deviations(structure, offsets, split.estimation, constraints, warm_up)
         if not isinstance(estimated, EvaluationOutcome):
             estimated = estimate_with(
@@ -195,11 +198,11 @@ def _estimate(
         raise SettingsError(
             f"no model could be estimated: {dict(outcomes)}; take another library or a longer record"
         )
-    return models, outcomes, stopped
+    return models, outcomes
 
 
 def _select(
-    split: Split, library: TrialLibrary, settings: Settings, nodes: int, progress: ProgressCallback
+    split: Split, library: TrialLibrary, settings: Settings, nodes: int, steps: Steps
 ) -> tuple[list[tuple[Structure, Offsets]], tuple[Certificate, ...], int]:
     """Return structures, each with the offsets of its signals, the certificates, and the largest lag."""
     # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
@@ -215,16 +218,19 @@ def _select(
         deviations = Split(*(subtract_offsets(part, offsets) for part in (record, split.validation)))
         pool = library.screen(deviations.estimation)
         warm_up = max(item.maximum_lag for item in pool)
-        progress(f"inner products of {len(pool)} candidates", 0.0)
+        if structures and steps.skip("structures in deviations from the operating point"):
+            break
+        steps(f"inner products of {len(pool)} candidates", 0.0)
         problem = make_selection_problem(pool, deviations.estimation, constraints)
         if isinstance(problem, EvaluationOutcome):
             raise SettingsError(f"nothing can be fitted with these settings: {problem}")
-        progress(f"best subsets of {len(pool)} candidates", 0.0)
-        found = certify(problem, settings.max_terms, nodes)
+        starts = list(select_forward(problem, settings.max_terms))
+        steps.report(f"best subsets of {len(pool)} candidates", 0.0)
+        found = certify(problem, settings.max_terms, nodes, partial(steps.skip, _CERTIFICATES))
         certificates = combine_certificates(certificates, found)
-        starts = [*select_forward(problem, settings.max_terms), *(entry.structure for entry in found)]
+        starts += [entry.structure for entry in found]
         exchanged = select_pool(pool, problem, settings.max_terms)
-        chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, progress)]
+        chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, steps)]
         structures += [(structure, offsets) for structure in chosen]
     return list(dict.fromkeys(structures)), certificates or (), warm_up
 
@@ -234,7 +240,7 @@ def _search_swaps(
     starts: Sequence[Structure],
     split: Split,
     settings: Settings,
-    progress: ProgressCallback,
+    steps: Steps,
 ) -> list[Structure]:
     """Return, for every size, the structure of a swap search with the least error on the validation data."""
     by_size = swap_search(
@@ -242,7 +248,7 @@ def _search_swaps(
         [item.expression for item in pool],
         [tuple(item.expression for item in structure) for structure in starts],
         depth=_SCREENED,
-        progress=progress,
+        steps=steps,
     )
     return [
         each.regressors

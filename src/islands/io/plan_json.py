@@ -45,6 +45,7 @@ def plan_document(plan: ExperimentPlan) -> dict[str, Any]:
         "pair": list(plan.pair),
         "alternatives": [_describe_alternative(each) for each in plan.alternatives],
         "cheapest_alternative": None if cheapest is None else cheapest.change,
+        "left_out": list(plan.left_out),
         "decisive_experiment": None if plan.decisive is None else _describe_decisive(plan.decisive),
     }
 

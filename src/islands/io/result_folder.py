@@ -55,6 +55,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
             "full_set": dict(search.full_set),
             "generations": search.generations,
             "ended_by": search.ended_by,
+            "left_out": list(search.left_out),
             "duplicates": search.duplicates,
             "feasible_share": search.feasible_share,
             "certificates": certificates_document(found),

@@ -27,7 +27,9 @@ class Callee(CPUDispatcher):
         their values; other integers have one type, also if the caller passes a literal.
     """
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any], constants: tuple[str, ...]) -> None:
+    def __init__(
+        self, function: Callable[..., Any], options: dict[str, Any], constants: tuple[str, ...]
+    ) -> None:
         super().__init__(function, targetoptions=options)
         self._compiler = _CalleeCompiler(function, self.targetdescr, options, {}, Compiler)
         self._compiler.constants = constants

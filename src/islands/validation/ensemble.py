@@ -163,7 +163,7 @@ def make_ensemble(
     constraints: str,
     warm_up: int,
     seed: int,
-    report: Callable[[], None] = lambda: None,
+    skip: Callable[[], bool] = lambda: False,
 ) -> Ensemble | None:
     """Make the ensemble of the candidates.
 
@@ -181,19 +181,20 @@ def make_ensemble(
         Number of samples before the first prediction of every free run.
     seed : int
         Seed of the random generator.
-    report : callable
-        Called before each structure; it may raise an error to end the computation.
+    skip : callable
+        Called before each structure. Once it returns true, there is no ensemble.
 
     Returns
     -------
     Ensemble or None
-        None if the free run of every candidate diverges on the validation data.
+        None if the free run of every candidate diverges on the validation data, or if ``skip`` returned true.
     """
     structures = []
     floor = (_ROUNDING * split.validation.output_range) ** 2
     kept = _weigh(_best_of_each_structure(candidates), split.validation, floor, warm_up)
     for position, (candidate, weight) in enumerate(kept):
-        report()
+        if skip():
+            return None
         model, count = candidate.model, max(1, round(MEMBERS * weight))
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(position,)))
         drawn = draw_parameters(model, split.estimation, candidate.interval, constraints, warm_up, count, rng)

@@ -1,7 +1,9 @@
 """``islands diagnose``: errors of a simulation on a record, their causes, and the gain of a correction."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -15,10 +17,10 @@ from islands.discrepancy.diagnosis import diagnose as run_diagnosis
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.planning.experiment_plan import plan_experiment
 from islands.errors import SettingsError
+from islands.evolution.progress import Steps, StoppedError
 from islands.facade.explain_residual import explain_residual
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
@@ -27,11 +29,11 @@ from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import EXTENDED_FILE, ColumnSpec, innermost, parse_spec
 from islands_api.cli import options
-from islands_api.cli.console import Display, compile_kernels, output, progress
+from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
-from islands_api.cli.runs.diagnosis_fits import keep_fits
+from islands_api.cli.runs.diagnosis_fits import keep_fits, write_fits
 from islands_api.cli.runs.plan_run import (
     PLAN,
     PlanOptions,
@@ -40,6 +42,7 @@ from islands_api.cli.runs.plan_run import (
     with_plan_options,
     write_plan,
 )
+from islands_api.cli.stop_requests import REPEAT, stop_requests
 from islands_service.process.process_pool import process_pool
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
@@ -48,6 +51,9 @@ RESULT = "discrepancy.json"
 
 #: File of the report.
 REPORT = "report.html"
+
+#: Names of steps without which a diagnosis is complete.
+FORMULA, SELF_TEST = "a formula for the unexplained residual", "self-test"
 
 #: Options of a diagnosis.
 NO_PLAN = PlanOptions()
@@ -92,15 +98,24 @@ def diagnose(
         compile_kernels()
         columns_of_input = [options.single_input(options.columns(inputs)), *(channels or [])]
         data = read_input(records or [], columns_of_input, output_column, dt, rows, reading, planning)
-        with progress("plan") as show, process_pool(workers) as parallel:
-            simulator = make_simulator(parse_spec(simulated), data)
-            plan = plan_experiment(
-                *(data, simulator, planning.noise_std, options.tolerances(tolerance or []), planning.pair),
-                *(planning.limits, seed, parallel, show),
-            )
+        simulator = make_simulator(parse_spec(simulated), data)
+        with progress("plan") as show, stop_requests() as stop:
+            steps = Steps(show, stop)
+            with process_pool(workers, check=partial(steps.check, "comparison of the causes")) as parallel:
+                plan = plan_experiment(
+                    *(
+                        data,
+                        simulator,
+                        planning.noise_std,
+                        options.tolerances(tolerance or []),
+                        planning.pair,
+                    ),
+                    *(planning.limits, seed, parallel, steps),
+                )
             show("figure", 1.0)
             write_plan(plan, out)
         show_plan(plan, out)
+        stop.end(out, plan.left_out, REPEAT)
         return
     planning.check_unused()
     if not records or output_column is None:
@@ -118,25 +133,34 @@ def diagnose(
         )
         simulator = make_simulator(spec, data, columns)
         tolerances = options.tolerances(tolerance or [])
-        with process_pool(workers) as parallel:
-            began = perf_counter()
-            with keep_fits(out) as fits:
-                diagnosis = run_diagnosis(data, simulator, tolerances, seed, show, fits.record(parallel))
-            show("a formula for the unexplained residual", 0.8)
-            formula = explain_residual(diagnosis, seed)
+        began = perf_counter()
+        with keep_fits(out) as fits, process_pool(workers) as parallel:
+            diagnosis = run_diagnosis(data, simulator, tolerances, seed, show, fits.record(parallel))
+        with stop_requests() as stop:
+            steps = Steps(show, stop)
+            show(FORMULA, 0.8)
+            formula = _find_formula(diagnosis, seed, steps)
             wall = perf_counter() - began
-            limits = (
-                _run_self_test(diagnosis, simulator, tolerances, seed, parallel, show)
-                if tested and diagnosis.verdict != Verdict.GROSS_ERROR
-                else None
-            )
-        show("figures", 0.9)
-        write(diagnosis, out, ", ".join(path.name for path in records), wall, limits, formula)
+            limits = None
+            if tested and diagnosis.verdict != Verdict.GROSS_ERROR:
+                limits = _run_self_test(diagnosis, simulator, tolerances, seed, workers, steps)
+            show(REPORT, 0.9)
+            write(diagnosis, out, ", ".join(path.name for path in records), wall, limits, formula, steps)
+            if steps.left_out:
+                write_fits(out, fits)
     for paragraph in summarise(diagnosis, formula).splitlines():
         output.print("\n".join(wrap(paragraph, "    ")), markup=False)
     if limits is not None:
         output.print(summarise_self_test(limits), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
+    stop.end(out, steps.left_out, "repeat the command with --force, which continues with its fits")
+
+
+def _find_formula(diagnosis: Diagnosis, seed: int, steps: Steps) -> ResidualFormula | None:
+    """Search for a formula of the residual, as an optional step."""
+    with suppress(StoppedError):
+        return explain_residual(diagnosis, seed, stop=partial(steps.skip, FORMULA))
+    return None
 
 
 def write(
@@ -146,12 +170,17 @@ def write(
     wall_s: float,
     tested: SelfTest | None = None,
     formula: ResidualFormula | None = None,
+    steps: Steps | None = None,
 ) -> None:
-    """Write a diagnosis into a folder. The document is written last: if it exists, the folder is complete."""
+    """Write a diagnosis into a folder. The document is written last: if it exists, the folder is complete.
+
+    The report is an optional step.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    for path in (folder / EXTENDED_FILE, folder / RESULT):
+    for path in (folder / EXTENDED_FILE, folder / RESULT, folder / REPORT):
         path.unlink(missing_ok=True)
-    (folder / REPORT).write_bytes(diagnosis_report(name, diagnosis, tested, formula))
+    if steps is None or not steps.skip(REPORT):
+        (folder / REPORT).write_bytes(diagnosis_report(name, diagnosis, tested, formula))
     if diagnosis.gain is not None:
         (folder / EXTENDED_FILE).write_text(extended_json(diagnosis.best, diagnosis.record))
     document = diagnosis_document(diagnosis, wall_s, tested, formula)
@@ -163,18 +192,24 @@ def _run_self_test(
     simulator: Simulator,
     tolerance: Mapping[str, float],
     seed: int,
-    parallel: ParallelMap,
-    show: Display,
-) -> SelfTest:
-    """Run the self-test and show the remaining time."""
-    show("self-test", 0.0)
+    workers: int | None,
+    steps: Steps,
+) -> SelfTest | None:
+    """Run the self-test, as an optional step, and show the remaining time."""
+    steps.report(SELF_TEST, 0.0)
     began = perf_counter()
+
+    def check() -> None:
+        if steps.skip(SELF_TEST):
+            raise StoppedError(SELF_TEST)
 
     def update(message: str, fraction: float | None = None, /) -> None:
         left = (perf_counter() - began) * (1 / fraction - 1) if fraction else 0.0
-        show(f"self-test, {message}, {_format_duration(left)} left", fraction)
+        steps.report(f"{SELF_TEST}, {message}, {_format_duration(left)} left", fraction)
 
-    return self_test(diagnosis, simulator, tolerance, seed, parallel, progress=update)
+    with suppress(StoppedError), process_pool(workers, check=check) as parallel:
+        return self_test(diagnosis, simulator, tolerance, seed, parallel, progress=update)
+    return None
 
 
 def _format_duration(seconds: float) -> str:

@@ -1,6 +1,6 @@
 """``islands fit``: forward selection from a library with (constrained) least squares."""
 
-import signal
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -14,6 +14,7 @@ from islands.errors import SettingsError
 from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.evolution.progress import Steps
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.model.candidate_library import LIBRARIES
 from islands_api.cli import options
@@ -22,8 +23,8 @@ from islands_api.cli.output_folder import check_folder, show_result
 from islands_api.cli.preprocessing_options import with_preprocessing_options
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
-from islands_api.cli.runs.coupled_run import couple_data, coupled_options, join_columns, show_coupled
-from islands_api.cli.stop_requests import stop_requests
+from islands_api.cli.runs.coupled_run import couple_data, coupled_options, join_columns, keep_coupled
+from islands_api.cli.stop_requests import REPEAT, stop_requests
 
 #: Default library for several outputs.
 SEVERAL_OUTPUTS = "polynomial"
@@ -100,10 +101,11 @@ def fit(
         records, names, output_column, dt, reading, steps if len(outputs) == 1 else NO_STEPS
     )
     compile_kernels()
-    with progress("fit") as show, stop_requests([signal.SIGINT] if len(outputs) == 1 else []) as stop:
+    with progress("fit") as show:
         show("reading", 0.0)
         data = recordings.read(rows)
         held_out = recordings.read_held_out(validation, rows)
+    with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()
         given: dict[str, Any] = {
             "library": library,
@@ -119,24 +121,20 @@ def fit(
             "certificate": certificate,
             "seed": seed,
             "progress": show,
+            "stop": stop,
         }
         if len(outputs) > 1:
             if dead_time:
                 raise SettingsError("--dead-time is for one output: leave it out")
             given["library"] = SEVERAL_OUTPUTS if library == AUTO else library
             pair = couple_data(data, held_out, len(outputs), steps)
-            coupled = islands.fit_coupled(pair[0], validation=pair[1], **coupled_options(given))
-            show("figures", 1.0)
-            coupled.save(out)
-        else:
-            result = islands.fit(data, validation=held_out, stop=stop, **given)
-            result = result.with_wall_time(perf_counter() - began)
-            show("figures", 1.0)
-            result.save(out, stop)
-    if len(outputs) > 1:
-        show_coupled(coupled, out)
-    else:
-        show_result(result, out)
-        if stop():
-            stop.explain(out, "repeat the command with --force for the complete result")
-        stop.exit()
+            fit_all = partial(islands.fit_coupled, pair[0], validation=pair[1], **coupled_options(given))
+            keep_coupled(fit_all, out, show, stop)
+            return
+        result = islands.fit(data, validation=held_out, **given)
+        result = result.with_wall_time(perf_counter() - began)
+        show("figures", 1.0)
+        drawing = Steps(stop=stop)
+        result.save(out, drawing)
+    show_result(result, out)
+    stop.end(out, (*result.left_out, *drawing.left_out), REPEAT)

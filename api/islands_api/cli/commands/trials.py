@@ -2,7 +2,9 @@
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +14,7 @@ import typer
 from rich.table import Table
 
 from islands.errors import SettingsError, lookup
+from islands.evolution.progress import Steps, StoppedError
 from islands.figures.matrices.confusion import draw_confusion
 from islands.figures.style import save
 from islands.performance.trials.cases import CASES, SimulatedCase
@@ -26,6 +29,7 @@ from islands.performance.trials.scoring import (
 )
 from islands.performance.trials.trial import Trial, TrialOutcome, run_trial
 from islands_api.cli.console import compile_kernels, output, progress
+from islands_api.cli.stop_requests import stop_requests
 
 #: Bands of the misfit of an effect, in standard deviations of the noise; used in turn.
 BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
@@ -110,14 +114,19 @@ def trials(
             for turn in range(mixed)
         ]
     compile_kernels()
-    found = []
+    found: list[TrialOutcome] = []
     # Imported here: the help of the command must not need Ray.
     from islands_service.runtime.parallel_map import ray_pool  # noqa: PLC0415
 
-    with progress("trials") as show, ray_pool(workers, address) as parallel_map:
-        for outcome in parallel_map(run_trial, planned):
-            found.append(outcome)
-            show(f"{len(found)} of {len(planned)}", len(found) / len(planned))
+    with progress("trials") as show, stop_requests() as stop:
+        steps = Steps(show, stop)
+        check = partial(steps.check, "the first trial")
+        with suppress(StoppedError), ray_pool(workers, address, check) as parallel_map:
+            for outcome in parallel_map(run_trial, planned):
+                found.append(outcome)
+                show(f"{len(found)} of {len(planned)}", len(found) / len(planned))
+        if not found:
+            check()
     document: dict[str, Any] = {"cores": {}, "outcomes": [asdict(each) for each in found]}
     for core, simulated in cases.items():
         outcomes = [each for each in found if each.trial.core == core]
@@ -128,6 +137,8 @@ def trials(
             save(draw_confusion(confusion(outcomes), simulated.nameable, title), path)
     if out is not None:
         out.write_text(json.dumps(document, indent=1))
+    left_out = [f"{len(planned) - len(found)} of {len(planned)} trials"] * (len(found) < len(planned))
+    stop.end(out, left_out, "repeat the command for all trials")
 
 
 def _report_case(core: str, simulated: SimulatedCase, outcomes: Sequence[TrialOutcome]) -> dict[str, Any]:

@@ -1,8 +1,9 @@
 """Several outputs on the command line: a coupled model is identified, fitted and simulated."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,9 @@ from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
 from islands.evolution.presets import resolve_settings
+from islands.evolution.progress import Steps
+from islands.facade.coupled.coupled_identification import StoppedCouplingError
+from islands.facade.coupled.coupled_result import list_folders
 from islands.io.export.coupled.coupled_document import is_coupled
 from islands.io.export.coupled.coupled_equations import coupled_signals
 from islands.io.records import read_dataset
@@ -23,9 +27,10 @@ from islands.io.records.writer import write_coupled_simulation
 from islands.simulation.coupled_free_run import coupled_free_run, match_coupled
 from islands.validation.metrics import metrics
 from islands_api.cli import options
-from islands_api.cli.console import compile_kernels, output, print_message, progress
+from islands_api.cli.console import Display, compile_kernels, output, print_message, progress
 from islands_api.cli.runs.identify_run import RunOptions
 from islands_api.cli.search_progress import search_progress
+from islands_api.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands_service.engines import ENGINES
 
 
@@ -75,28 +80,46 @@ def identify_several(
     compile_kernels()
     with (
         progress("identify") as show,
+        # Ray installs a handler for SIGTERM when it starts, so it starts before our handlers are installed.
         ENGINES[run_options.engine_for(settings.islands)](run_options.address, print_message) as engine,
+        stop_requests() as stop,
     ):
-        result = islands.identify_coupled(
+        identify_all = partial(
+            islands.identify_coupled,
             data[0],
             validation=data[1],
             preset=preset,
             seed=seed,
             progress=search_progress(show),
             stage=show,
+            stop=stop,
             engine=engine,
             **coupled_options(dict(changes)),
         )
-        show("figures", 1.0)
-        result.save(folder)
-    show_coupled(result, folder)
+        keep_coupled(identify_all, folder, show, stop)
 
 
-def show_coupled(result: "islands.CoupledResult", folder: Path) -> None:
-    """Print the summary and the files of a result."""
+def keep_coupled(
+    search: Callable[[], "islands.CoupledResult"], folder: Path, show: Display, stop: StopRequests
+) -> None:
+    """Search several outputs, write the result and print it. A stopped search keeps its results so far."""
+    drawing = Steps(stop=stop)
+    try:
+        result = search()
+    except StoppedCouplingError as stopped:
+        if not stopped.found:
+            raise
+        left_out = [f"models of {name}" for name in stopped.outputs[len(stopped.found) :]]
+        for name, found in zip(list_folders(stopped.outputs), stopped.found, strict=False):
+            found.save(folder / "outputs" / name, drawing)
+        stop.end(folder / "outputs", (*left_out, "the common model", *drawing.left_out), REPEAT)
+        raise
+    show("figures", 1.0)
+    result.save(folder, drawing)
     output.print(str(result), markup=False)
     files = "result.json, model.json, summary.txt, figures/, outputs/ (the result of each output)"
     output.print(f"{folder}/: {files}", markup=False)
+    stop.end(folder, (*result.left_out, *drawing.left_out), REPEAT)
 
 
 def read_coupled(text: str) -> "islands.CoupledModel | None":

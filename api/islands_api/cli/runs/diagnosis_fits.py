@@ -24,11 +24,16 @@ def keep_fits(folder: Path) -> Iterator[FitJournal]:
     try:
         yield journal
     except KeyboardInterrupt:
-        folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(journal.to_document()))
+        write_fits(folder, journal)
         errors.print(f"interrupted; {path} keeps what is known: the same command continues", markup=False)
         raise
     path.unlink(missing_ok=True)
+
+
+def write_fits(folder: Path, journal: FitJournal) -> None:
+    """Write the fits into the output folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / FITS).write_text(json.dumps(journal.to_document()))
 
 
 def _read(path: Path) -> FitJournal:

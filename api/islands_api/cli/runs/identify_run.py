@@ -14,7 +14,7 @@ from islands.data.signal_map import match_rate
 from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
-from islands.evolution.progress import stop_between_steps
+from islands.evolution.progress import Steps
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError, choice_from_document
@@ -34,7 +34,7 @@ from islands_api.cli.output_folder import show_result
 from islands_api.cli.recordings import Recordings
 from islands_api.cli.runs.timed_engine import TimedEngine
 from islands_api.cli.search_progress import search_progress
-from islands_api.cli.stop_requests import StopRequests, stop_requests
+from islands_api.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands_service.engines import ENGINES, default_engine, has_ray, serial_notice
 
 #: File of the search state.
@@ -145,10 +145,9 @@ def run(
             checkpoints.write()
         result = result.with_wall_time(perf_counter() - began)
         show("figures", 1.0)
-        result.save(folder, stop)
-    if stop():
-        stop.explain(folder, f"continue with --resume {folder}")
-    elif result.search_result.search.ended_by == "stopped":
+        drawing = Steps(stop=stop)
+        result.save(folder, drawing)
+    if not stop() and result.search_result.search.ended_by == "stopped":
         errors.print(f"stopped: the result is the best so far; continue with --resume {folder}", markup=False)
         if run_options.wall_time is not None:
             errors.print(
@@ -160,7 +159,7 @@ def run(
             output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
     if test_data is not None:
         _evaluate_test(result, test_data, folder)
-    stop.exit()
+    stop.end(folder, (*result.left_out, *drawing.left_out), f"continue with --resume {folder}")
 
 
 def _choose_preset(
@@ -171,13 +170,14 @@ def _choose_preset(
     stop: StopRequests,
     folder: Path,
 ) -> Choice:
-    """Choose the preset. If a stop is requested, save the best model of the kinds that were fitted."""
+    """Choose the preset. If a stop is requested, save the models of the kinds that were fitted, and end."""
     try:
-        return choose_preset(data, held_out, changes, stop_between_steps(show, stop))
+        return choose_preset(data, held_out, changes, show, stop)
     except StoppedChoiceError as stopped:
-        islands.Result(stopped.found).save(folder, stop)
-        stop.explain(folder, "the preset was not chosen yet, so repeat the command with --force")
-        stop.exit()
+        result, drawing = islands.Result(stopped.found), Steps(stop=stop)
+        result.save(folder, drawing)
+        show_result(result, folder)
+        stop.end(folder, (*result.left_out, "the search", *drawing.left_out), REPEAT)
         raise
 
 

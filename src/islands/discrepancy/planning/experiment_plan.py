@@ -1,6 +1,7 @@
 """Plan of an experiment: separable causes, changes that separate more, and the decisive experiment."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -24,7 +25,7 @@ from islands.discrepancy.planning.pair_separation import CausePair
 from islands.discrepancy.planning.planned_input import find_limits
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.errors import SettingsError, lookup
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.progress import ProgressCallback, StoppedError, ignore_progress
 
 #: Maximum number of pairs that an experiment is optimised for, if none is given.
 MAX_PAIRS = 8
@@ -67,7 +68,10 @@ class ExperimentPlan:
     alternatives : tuple of AlternativeExperiment
         Changes of the experiment that may separate the pair, the cheapest first; empty without a pair.
     decisive : DecisiveExperiment or None
-        None if there is nothing to be separated: no pair is given, and the experiment separates all causes.
+        None if there is nothing to be separated: no pair is given, and the experiment separates all causes;
+        or if it was left out.
+    left_out : tuple of str
+        Steps that a request to stop has left out.
     """
 
     record: Dataset
@@ -77,6 +81,7 @@ class ExperimentPlan:
     pair: tuple[str, ...]
     alternatives: tuple[AlternativeExperiment, ...]
     decisive: DecisiveExperiment | None
+    left_out: tuple[str, ...] = ()
 
     @property
     def noise_std(self) -> float:
@@ -116,6 +121,9 @@ def plan_experiment(
         Seed of the decisive experiment.
     parallel_map : ParallelMap
         The result does not depend on it.
+    progress : ProgressCallback
+        If it or ``parallel_map`` raises `StoppedError` after the causes were compared, the plan ends without
+        the other steps.
 
     Raises
     ------
@@ -141,19 +149,33 @@ def plan_experiment(
     bounds = find_limits(context.u, context.dt, limits.amplitude, limits.rate) if pairs else None
     alternatives: tuple[AlternativeExperiment, ...] = ()
     decisive = None
+    left_out = []
     if bounds is not None:
-        if pair:
-            progress("comparing changes of the experiment", 0.6)
-            free = replace(bounds, rate=np.inf if limits.rate is None else limits.rate)
-            alternatives = compare_alternatives(experiment, pairs[0], free, parallel_map)
         duration = context.dt * context.u.size if limits.duration is None else limits.duration
         samples = _count_samples(duration, context.dt)
-        decisive = design_experiment(
-            *(experiment, pairs, bounds, samples, seed, parallel_map),
-            progress=lambda message, done=None: progress(message, 0.7 + 0.3 * (done or 0.0)),
-        )
+        if pair:
+            left_out.append("changes of the experiment")
+        left_out.append("decisive experiment")
+        with suppress(StoppedError):
+            if pair:
+                progress("comparing changes of the experiment", 0.6)
+                free = replace(bounds, rate=np.inf if limits.rate is None else limits.rate)
+                alternatives = compare_alternatives(experiment, pairs[0], free, parallel_map)
+                left_out.remove("changes of the experiment")
+            decisive = design_experiment(
+                *(experiment, pairs, bounds, samples, seed, parallel_map),
+                progress=lambda message, done=None: progress(message, 0.7 + 0.3 * (done or 0.0)),
+            )
+            left_out.clear()
     return ExperimentPlan(
-        record, simulator.name, experiment.noise, isolability, tuple(pair), alternatives, decisive
+        record,
+        simulator.name,
+        experiment.noise,
+        isolability,
+        tuple(pair),
+        alternatives,
+        decisive,
+        tuple(left_out),
     )
 
 

@@ -5,6 +5,7 @@ that it meets. With enough nodes the structure is proved to be the best one. The
 rounding of the inner products: a candidate that depends on others except for rounding counts as one of them.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import sqrt
 
@@ -54,7 +55,9 @@ class Certificate:
         return self.gap(error) <= ROUNDING
 
 
-def certify(problem: SelectionProblem, max_terms: int, nodes: int) -> tuple[Certificate, ...]:
+def certify(
+    problem: SelectionProblem, max_terms: int, nodes: int, skip: Callable[[], bool] = lambda: False
+) -> tuple[Certificate, ...]:
     """Compute a certificate for every number of terms up to a maximum.
 
     Parameters
@@ -64,6 +67,8 @@ def certify(problem: SelectionProblem, max_terms: int, nodes: int) -> tuple[Cert
     nodes : int
         Nodes of the search for each number of terms; fewer are evaluated if the library is large. The result
         depends on it, and not on the time.
+    skip : callable
+        Called before each number of terms. Once it returns true, the remaining certificates are missing.
 
     Returns
     -------
@@ -85,6 +90,8 @@ def certify(problem: SelectionProblem, max_terms: int, nodes: int) -> tuple[Cert
     selection = froe(problem.gram, max_terms=max_terms)
     certificates = []
     for terms in range(max(1, always), max_terms + 1):
+        if skip():
+            break
         size = terms - always
         positions = np.full(max(1, size), -1)
         greedy = selection.order[:size]

@@ -6,7 +6,6 @@ continues with the next size. Its structures seed the evolution, which is not bo
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from functools import partial
 from math import inf, isfinite
 
@@ -15,7 +14,7 @@ import numpy as np
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.variation import Genes, with_required_genes
 from islands.evolution.gp.individual import Individual, Population
-from islands.evolution.progress import ProgressCallback, StoppedError, ignore_progress
+from islands.evolution.progress import Steps
 from islands.model.expression import Expression
 
 #: Smallest relative reduction of the squared error for which an exchange continues.
@@ -36,7 +35,7 @@ def swap_search(
     pool: Sequence[Expression],
     starts: Iterable[Genes] = (),
     depth: int = 40,
-    progress: ProgressCallback = ignore_progress,
+    steps: Steps | None = None,
 ) -> tuple[Population, ...]:
     """Search structures over a pool of genes.
 
@@ -50,9 +49,8 @@ def swap_search(
         Further structures; the exchanges start from one of them if it is better than the forward step.
     depth : int
         Number of structures that are returned for every size.
-    progress : ProgressCallback
-        Called before each size and each exchange. If it raises `StoppedError`, the search ends with the
-        structures found so far.
+    steps : Steps, optional
+        The search is an optional step, which ends with the structures so far before a size or an exchange.
 
     Returns
     -------
@@ -65,18 +63,18 @@ def swap_search(
     exact = _ROUNDING * float(np.mean(evaluator.record.y**2))
     first = search.evaluate([best], inf) if best else None
     error = inf if first is None else first.fitness
-    with suppress(StoppedError):
-        while error > exact > 0.0 and len(best) < evaluator.settings.max_terms and not search.is_exhausted:
-            step = f"swap search among {len(pool)} candidates: {len(best) + 1} terms"
-            progress(step, None)
-            found = search.evaluate(((*best, gene) for gene in pool if gene not in best), inf)
-            start = min(
-                (each for each in (found, search.best(len(best) + 1)) if each), key=_order, default=None
-            )
-            if start is None or start.size <= len(best):
-                break
-            exchanged = search.exchange(start, partial(progress, step, None))
-            best, error = exchanged.genes, exchanged.fitness
+    steps = steps or Steps()
+    skip = partial(steps.skip, f"swap search among {len(pool)} candidates")
+    while error > exact > 0.0 and len(best) < evaluator.settings.max_terms and not search.is_exhausted:
+        if skip():
+            break
+        steps.report(f"swap search among {len(pool)} candidates: {len(best) + 1} terms", None)
+        found = search.evaluate(((*best, gene) for gene in pool if gene not in best), inf)
+        start = min((each for each in (found, search.best(len(best) + 1)) if each), key=_order, default=None)
+        if start is None or start.size <= len(best):
+            break
+        exchanged = search.exchange(start, skip)
+        best, error = exchanged.genes, exchanged.fitness
     return search.ranked(depth)
 
 
@@ -104,12 +102,11 @@ class _SwapSearch:
             self._seen.setdefault(each.size, {}).setdefault(each.key, each)
         return min(found, key=_order, default=None)
 
-    def exchange(self, start: Individual, report: Callable[[], None]) -> Individual:
+    def exchange(self, start: Individual, skip: Callable[[], bool]) -> Individual:
         """Exchange single genes, each time the best exchange of all, as long as the error falls."""
         best = start
         required = with_required_genes((), self._evaluator.settings)
-        while not self.is_exhausted:
-            report()
+        while not (self.is_exhausted or skip()):
             genes = best.genes
             free = [place for place, gene in enumerate(genes) if gene not in required]
             exchanged = self.evaluate(

@@ -5,7 +5,7 @@ models are compared on the validation data.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from types import MappingProxyType
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.progress import ProgressCallback, StoppedError
+from islands.evolution.progress import Steps, StoppedError
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.facade.automatic.kind_trials import NO_DEAD_TIME, ROUNDING, KindTrials, percent, try_kinds
 from islands.facade.trials.trial_library import TrialLibrary
@@ -23,6 +23,9 @@ from islands.validation.recommendation import recommend
 #: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
 #: models keep that property.
 _CLOSE = 1.25
+
+#: Name of the step that compares the fits of the kinds.
+CHOICE = "choice of the kind of record"
 
 #: Fits the library of a kind with the dead times of the trials.
 FitKind = Callable[[TrialLibrary], SearchResult]
@@ -109,7 +112,7 @@ def choose_kind(
     libraries: Mapping[str, TrialLibrary],
     delays: Sequence[int] | None,
     fit_kind: FitKind,
-    progress: ProgressCallback,
+    steps: Steps,
 ) -> tuple[Choice, Mapping[str, SearchResult]]:
     """Choose the kind of a record.
 
@@ -127,13 +130,12 @@ def choose_kind(
         Dead times; None estimates them.
     fit_kind : callable
         Fits a library to the data; it is called for every kind that the trials do not exclude.
-    progress : callable
-        Called with a message and the completed fraction.
+    steps : Steps
 
     Raises
     ------
     StoppedError
-        ``progress`` has requested a stop. If a kind was fitted before, the error is a `StoppedChoiceError`.
+        A stop is requested. If a kind was fitted before, the error is a `StoppedChoiceError`.
 
     Returns
     -------
@@ -146,8 +148,8 @@ def choose_kind(
         sentence = f"{_describe(libraries[kind], kind)}, because the output is constant."
         nothing: Mapping[str, float] = MappingProxyType({})
         return Choice(kind, tuple(delays or ()), (sentence, NO_DEAD_TIME), nothing, nothing), {}
-    trials = try_kinds(record, libraries, delays, progress)
-    results = _fit_promising(trials, libraries, fit_kind, progress)
+    trials = try_kinds(record, libraries, delays, steps)
+    results = _fit_promising(trials, libraries, fit_kind, steps)
     compared = {kind: result.recommended for kind, result in results.items() if _is_bounded(result)}
     errors = {kind: _measure(model, record) for kind, model in compared.items()}
     kind, reason = _select_kind(record, libraries, trials, compared, errors)
@@ -171,7 +173,7 @@ def _fit_promising(
     trials: KindTrials,
     libraries: Mapping[str, TrialLibrary],
     fit_kind: FitKind,
-    progress: ProgressCallback,
+    steps: Steps,
 ) -> dict[str, SearchResult]:
     """Return the result of every promising kind; none if there is nothing to compare."""
     promising = [kind for kind in trials.promising if isfinite(trials.errors[kind])]
@@ -179,18 +181,26 @@ def _fit_promising(
     if len(promising) > 1:
         for kind in promising:
             try:
-                progress(f"preset auto: fit of {kind}", None)
+                steps(f"preset auto: fit of {kind}", None)
                 results[kind] = fit_kind(libraries[kind].with_delays(trials.delays))
                 if results[kind].search.ended_by is not None:
                     raise StoppedError(f"preset auto: fit of {kind}")
             except StoppedError as stopped:
                 if not results:
                     raise
-                found = min(results.values(), key=_validation_error)
-                raise StoppedChoiceError(stopped.step, found) from stopped
+                missing = [f"fit of {each}" for each in promising if each not in results]
+                raise StoppedChoiceError(stopped.step, _take_best(results, missing)) from stopped
             except (SettingsError, RecordError, ModelError):
                 continue  # Another kind may have a model. If none has, the search reports what is wrong.
     return results
+
+
+def _take_best(results: Mapping[str, SearchResult], missing: Sequence[str]) -> SearchResult:
+    """Return the result with the least error on the validation data, with the steps that were left out."""
+    left_out = dict.fromkeys([each for found in results.values() for each in found.search.left_out])
+    best = min(results.values(), key=_validation_error)
+    search = replace(best.search, ended_by="stopped", left_out=(*left_out, *missing, CHOICE))
+    return replace(best, search=search)
 
 
 def _validation_error(result: SearchResult) -> float:

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
-from islands.evolution.progress import ProgressCallback
+from islands.evolution.progress import Steps
 from islands.facade.trials.held_out_error import hold_out, measure_library
 from islands.facade.trials.trial_library import TrialLibrary
 from islands.inspection.dead_time import estimate_dead_time
@@ -60,7 +60,7 @@ def try_kinds(
     record: Dataset,
     libraries: Mapping[str, TrialLibrary],
     delays: Sequence[int] | None,
-    progress: ProgressCallback,
+    steps: Steps,
 ) -> KindTrials:
     """Compare small models of every kind, with dead times if they reduce the error of the simplest kind.
 
@@ -72,14 +72,13 @@ def try_kinds(
         Library and constraints of each kind that may be chosen, the simplest first.
     delays : sequence of int or None
         Dead times; None estimates them.
-    progress : callable
-        Called with a message and the completed fraction.
+    steps : Steps
     """
     splits = hold_out(record)
 
     def measure(kind: str, delays: Sequence[int]) -> float:
-        progress(f"preset auto: trial of {kind}", None)
-        parts = measure_library(splits, libraries[kind].with_delays(delays))
+        steps(f"preset auto: trial of {kind}", None)
+        parts = measure_library(splits, libraries[kind].with_delays(delays), steps)
         error = (sum(part**2 for part in parts) / len(parts)) ** 0.5 / record.output_range
         return float(max(error, ROUNDING)) if isfinite(error) else inf
 
@@ -88,7 +87,7 @@ def try_kinds(
     errors = {simplest: measure(simplest, chosen)}
     sentence = f"The dead times are as given: {list(chosen)}."
     if delays is None:
-        progress("preset auto: dead times", None)
+        steps("preset auto: dead times", None)
         estimated = _estimate_delays(record)
         sentence = NO_DEAD_TIME
         if any(estimated):

@@ -10,7 +10,7 @@ from islands.data.split import Split, split_data
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_delays import check_delays
 from islands.evolution.presets import AUTO, resolve_kinds, with_tuples
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.evolution.search_result import SearchResult
 from islands.facade.automatic.kind_choice import Choice, choose_kind
 from islands.facade.library_fit import FitSettings, fit_library
@@ -22,6 +22,7 @@ def choose_preset(
     validation: Dataset | float,
     changes: Mapping[str, Any],
     progress: ProgressCallback = ignore_progress,
+    stop: Stop = never_stop,
 ) -> Choice:
     """Choose the kind of record and the dead times of the preset ``auto`` for ``identify``.
 
@@ -32,9 +33,15 @@ def choose_preset(
         Validation data or fraction.
     changes : mapping
         Settings of the user, which take precedence over the choice.
+    progress : callable, optional
+        Called with a message and the completed fraction.
+    stop : callable, optional
+        Called between all steps.
 
     Raises
     ------
+    StoppedError
+        ``stop`` returned true; see `choose_kind`.
     SettingsError, RecordError
         As in `islands.identify`.
     """
@@ -43,8 +50,9 @@ def choose_preset(
     libraries = {kind: make_trial_library(each) for kind, each in resolve_kinds(changes).items()}
     split = split_data(record, validation)
     common = {name: changes[name] for name in ("average", "feedthrough", "shooting") if name in changes}
-    fit_kind = partial(fit_library, record, split, settings=FitSettings(**common))
-    return choose_kind(split.estimation, libraries, changes.get("library_delays"), fit_kind, progress)[0]
+    fit_kind = partial(fit_library, record, split, settings=FitSettings(**common), stop=stop)
+    steps = Steps(progress, stop)
+    return choose_kind(split.estimation, libraries, changes.get("library_delays"), fit_kind, steps)[0]
 
 
 def fit_chosen_library(
@@ -58,6 +66,7 @@ def fit_chosen_library(
     settings: FitSettings,
     seed: int,
     progress: ProgressCallback,
+    stop: Stop,
 ) -> SearchResult:
     """Fit a library, or the one that is chosen if its name is ``auto``; see `islands.fit`.
 
@@ -70,11 +79,11 @@ def fit_chosen_library(
     """
     check_delays(delays or ())
     constraint(constraints or "none").check_inputs(record.inputs)
-    fit_one = partial(fit_library, record, split, settings=settings, seed=seed, progress=progress)
+    fit_one = partial(fit_library, record, split, settings=settings, seed=seed, progress=progress, stop=stop)
     if library != AUTO:
         return fit_one(take_library(library, degree, lags, constraints, delays or ()))
     kinds = resolve_kinds({} if constraints is None else {"constraints": constraints})
     libraries = {kind: take_library(each.library, degree, lags, constraints) for kind, each in kinds.items()}
-    choice, results = choose_kind(split.estimation, libraries, delays, fit_one, progress)
+    choice, results = choose_kind(split.estimation, libraries, delays, fit_one, Steps(progress, stop))
     found = results.get(choice.kind) or fit_one(libraries[choice.kind].with_delays(choice.delays))
     return replace(found, settings={**found.settings, "choice": choice.to_document()})

@@ -14,7 +14,14 @@ from islands.estimation.coupled_refinement import refine_coupled
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.engine import Engine
 from islands.evolution.presets import resolve_settings
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.evolution.progress import (
+    ProgressCallback,
+    Steps,
+    Stop,
+    StoppedError,
+    ignore_progress,
+    never_stop,
+)
 from islands.facade.coupled.coupled_result import CoupledResult
 from islands.facade.coupled.coupled_selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
@@ -29,6 +36,25 @@ from islands.simulation.coupled_model import CoupledModel
 
 if TYPE_CHECKING:
     from islands.io.data_frames import FrameLike
+
+#: Names of the steps after the searches of the outputs.
+_CHOICE, _REFINEMENT = "choice of the equations", "refinement of all equations"
+
+
+class StoppedCouplingError(StoppedError):
+    """A search was stopped before every output had models.
+
+    Attributes
+    ----------
+    outputs : tuple of str
+        Names of all outputs.
+    found : tuple of Result
+        Results of the first outputs; there may be none.
+    """
+
+    def __init__(self, step: str, outputs: Sequence[str], found: Sequence[Result]) -> None:
+        super().__init__(step)
+        self.outputs, self.found = tuple(outputs), tuple(found)
 
 
 class FitOptions(TypedDict, total=False):
@@ -56,6 +82,7 @@ def fit_coupled(
     refine_together: bool = True,
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
+    stop: Stop = never_stop,
     **options: Unpack[FitOptions],
 ) -> CoupledResult:
     """Fit one equation per output by subset selection, for a simulation of all outputs together.
@@ -81,6 +108,9 @@ def fit_coupled(
         Seed of the results.
     progress : callable, optional
         Called with a message and the completed fraction.
+    stop : callable, optional
+        Called between all steps. Once it returns true and every output has models, the fit ends with the best
+        ones so far; ``left_out`` of the result names the steps that are missing.
     **options
         Options of `fit`. The default library is ``polynomial``; ``constraints`` are an entry of
         ``CONSTRAINTS`` and hold for every equation; ``feedthrough`` is ``no``.
@@ -91,6 +121,8 @@ def fit_coupled(
 
     Raises
     ------
+    StoppedError
+        ``stop`` returned true before every output had models.
     SettingsError
         A setting is unknown, out of range or not for several outputs, or an output has no model.
     RecordError
@@ -101,9 +133,11 @@ def fit_coupled(
     _check_constraints(chosen.get("constraints"), chosen)
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
     trial = take_library(chosen["library"], degree, lags, constraints)
-    find = partial(fit, seed=seed)
+    find = partial(fit, seed=seed, stop=stop)
     data = _read_data(record, inputs, outputs, dt, validation)
-    return _couple(data, chosen, trial, trial.lags + 3, refine_together, progress, "progress", find)
+    return _couple(
+        data, chosen, trial, trial.lags + 3, refine_together, Steps(progress, stop), "progress", find
+    )
 
 
 def identify_coupled(
@@ -118,6 +152,7 @@ def identify_coupled(
     seed: int = 0,
     progress: SearchCallback | None = None,
     stage: ProgressCallback = ignore_progress,
+    stop: Stop = never_stop,
     engine: Engine | Ray | str | None = None,
     **changes: Unpack[SettingChanges],
 ) -> CoupledResult:
@@ -137,6 +172,8 @@ def identify_coupled(
         Called with the `SearchState` and the `Settings` after every epoch of the search of each output.
     stage : callable, optional
         Called with a message and the completed fraction of each stage.
+    stop : callable, optional
+        As for `fit_coupled`.
     engine : str, Ray or Engine, optional
         What runs the islands, as for `identify`.
     **changes
@@ -148,7 +185,7 @@ def identify_coupled(
 
     Raises
     ------
-    SettingsError, RecordError
+    SettingsError, RecordError, StoppedError
         As `fit_coupled`.
     """
     chosen: dict[str, Any] = dict(changes)
@@ -158,10 +195,12 @@ def identify_coupled(
     )
     _check_constraints(settings.constraints, chosen)
     chosen.setdefault("average", settings.average)
-    find = partial(identify, preset=preset, seed=seed, progress=progress, engine=engine)
+    find = partial(identify, preset=preset, seed=seed, progress=progress, stop=stop, engine=engine)
     trial = make_trial_library(settings)
     data = _read_data(record, inputs, outputs, dt, validation)
-    return _couple(data, chosen, trial, settings.maximum_lag + 3, refine_together, stage, "stage", find)
+    return _couple(
+        data, chosen, trial, settings.maximum_lag + 3, refine_together, Steps(stage, stop), "stage", find
+    )
 
 
 def _check_constraints(constraints: str | None, options: dict[str, Any]) -> None:
@@ -206,7 +245,7 @@ def _couple(
     trial: TrialLibrary,
     least: int,
     refine_together: bool,
-    progress: ProgressCallback,
+    steps: Steps,
     callback: str,
     find: Callable[..., Result],
 ) -> CoupledResult:
@@ -214,30 +253,45 @@ def _couple(
     estimation, validation = data
     names = estimation.output_names
     splits = [Split(estimation.separate(place), validation.separate(place)) for place in range(len(names))]
-    progress("sampling rate", 0.0)
+    steps("sampling rate", 0.0)
     # The equations have one sampling time: the shortest that one of them needs.
     average = options.get("average", AUTO)
-    options["average"] = min(select_rate(split, average, trial, least)[1] for split in splits)
+    options["average"] = min(select_rate(split, average, trial, least, steps)[1] for split in splits)
     results = []
     for name, split in zip(names, splits, strict=True):
-        shown = {callback: partial(_report, progress, name)}
-        results.append(find(split.estimation, validation=split.validation, **shown, **options))
-    progress("choice of the equations", 0.0)
+        shown = {callback: partial(_report, steps.report, name)}
+        try:
+            results.append(find(split.estimation, validation=split.validation, **shown, **options))
+        except StoppedError as stopped:
+            raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
+    steps.report("choice of the equations", 0.0)
     estimation, validation = (
         part.map(partial(average_samples, count=options["average"])) for part in (estimation, validation)
     )
     warm_up = max(entry.ranked_model.assessment.warm_up for result in results for entry in result.models)
     ranked = [[entry.model for entry in result.models] for result in results]
-    choice = choose_equations(ranked, [result.best.rank for result in results], validation, warm_up)
+    best = [result.best.rank for result in results]
+    choice = choose_equations(ranked, best, validation, warm_up, partial(steps.skip, _CHOICE))
     model = CoupledModel(tuple(models[rank - 1] for models, rank in zip(ranked, choice.ranks, strict=True)))
     refined = None
-    if refine_together and choice.error < inf:
-        progress("refinement of all equations", 0.0)
+    if refine_together and choice.error < inf and not steps.skip(_REFINEMENT):
+        steps.report(_REFINEMENT, 0.0)
+        skip = partial(steps.skip, _REFINEMENT)
         shooting = results[0].search_result.shooting_interval
         constraints = str(results[0].search_result.settings["constraints"])
-        refined = _refine(model, estimation, validation, shooting, warm_up, constraints, choice.error)
+        refined = _refine(model, estimation, validation, shooting, warm_up, constraints, choice.error, skip)
+    left_out = [
+        f"{name}: {step}" for name, found in zip(names, results, strict=True) for step in found.left_out
+    ]
     return CoupledResult(
-        refined or model, tuple(results), choice.ranks, refined is not None, estimation, validation, warm_up
+        refined or model,
+        tuple(results),
+        choice.ranks,
+        refined is not None,
+        estimation,
+        validation,
+        warm_up,
+        (*left_out, *steps.left_out),
     )
 
 
@@ -249,11 +303,14 @@ def _refine(
     warm_up: int,
     constraints: str,
     error: float,
+    skip: Callable[[], bool],
 ) -> CoupledModel | None:
     """Refine first over shooting intervals and then over the free run; return the model if it is better."""
     best, started = None, model
     for interval in (shooting, None):
-        found = refine_coupled(started, estimation, interval, warm_up, constraints)
+        if skip():
+            break
+        found = refine_coupled(started, estimation, interval, warm_up, constraints, stop=skip)
         if found is None:
             continue
         started = found

@@ -2,13 +2,14 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from islands.data.coupled_record import CoupledRecord
+from islands.evolution.progress import Steps
 from islands.facade.results.result import Result
 from islands.io.export import export
 from islands.io.export.coupled.coupled_document import coupled_json
@@ -44,6 +45,8 @@ class CoupledResult:
         Data with the sampling time of the model.
     warm_up : int
         Number of samples before the first prediction. The errors depend on it.
+    left_out : tuple of str
+        Steps that a request to stop has left out; empty for a complete result.
     """
 
     model: CoupledModel
@@ -53,6 +56,7 @@ class CoupledResult:
     estimation: CoupledRecord
     validation: CoupledRecord
     warm_up: int
+    left_out: tuple[str, ...] = ()
 
     @property
     def equation(self) -> str:
@@ -105,25 +109,31 @@ class CoupledResult:
         """Return the coupled model as text in a format of ``COUPLED_EXPORTS``."""
         return export(self.model, kind)
 
-    def save(self, folder: str | Path) -> Path:
+    def save(self, folder: str | Path, steps: Steps | None = None) -> Path:
         """Write ``result.json``, ``model.json``, ``summary.txt``, ``figures/`` and ``outputs/``.
 
-        ``outputs/`` has a folder with the complete result of every output.
+        ``outputs/`` has a folder with the complete result of every output. The figures are optional
+        ``steps``, which a stop request leaves out.
         """
-        from islands.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
-
+        steps = steps or Steps()
         folder = Path(folder)
-        figures = folder / "figures"
-        figures.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         for directory, name, result in zip(
-            list_folders(self.model), self.model.output_names, self.results, strict=True
+            list_folders(self.model.output_names), self.model.output_names, self.results, strict=True
         ):
-            result.save(folder / "outputs" / directory)
-            save(self.plot(name), figures / f"free-run-{directory}.svg")
+            result.save(folder / "outputs" / directory, steps)
+            if not steps.skip("figures"):
+                self._draw_figure(name, folder / "figures" / f"free-run-{directory}.svg")
         (folder / "model.json").write_text(coupled_json(self.model), encoding="utf-8")
         (folder / "summary.txt").write_text(f"{self}\n", encoding="utf-8")
         (folder / "result.json").write_text(f"{json.dumps(self._document(), indent=2)}\n", encoding="utf-8")
         return folder
+
+    def _draw_figure(self, output: str, path: Path) -> None:
+        from islands.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
+
+        path.parent.mkdir(exist_ok=True)
+        save(self.plot(output), path)
 
     def _document(self) -> dict[str, Any]:
         return {
@@ -132,13 +142,14 @@ class CoupledResult:
             "average": self.model.average,
             "warm_up": self.warm_up,
             "refined": self.refined,
+            "left_out": list(self.left_out),
             "equation": self.equation,
             "signals": coupled_signals(self.model),
             "outputs": [
                 {
                     "name": name,
                     "unit": self.validation.records[place].output_unit,
-                    "folder": f"outputs/{list_folders(self.model)[place]}",
+                    "folder": f"outputs/{list_folders(self.model.output_names)[place]}",
                     "rank": self.ranks[place],
                     "metrics": {
                         part: {mode: _finite(asdict(each)) for mode, each in by_mode.items()}
@@ -179,12 +190,9 @@ class CoupledResult:
         return f"<CoupledResult of {names}: {equations}>"
 
 
-def list_folders(model: CoupledModel) -> list[str]:
+def list_folders(outputs: Sequence[str]) -> list[str]:
     """Return the name of the folder of every output, such as ``1-level_cm``."""
-    return [
-        f"{place}-{re.sub(r'[^A-Za-z0-9_.-]', '_', name)}"
-        for place, name in enumerate(model.output_names, start=1)
-    ]
+    return [f"{place}-{re.sub(r'[^A-Za-z0-9_.-]', '_', name)}" for place, name in enumerate(outputs, start=1)]
 
 
 def _finite(values: Mapping[str, float]) -> dict[str, float | None]:

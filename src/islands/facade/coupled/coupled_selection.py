@@ -1,6 +1,6 @@
 """Choice of one equation per output by the error of their common free run."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
@@ -34,7 +34,11 @@ class CoupledChoice:
 
 
 def choose_equations(
-    ranked: Sequence[Sequence[Model]], recommended: Sequence[int], validation: CoupledRecord, warm_up: int
+    ranked: Sequence[Sequence[Model]],
+    recommended: Sequence[int],
+    validation: CoupledRecord,
+    warm_up: int,
+    skip: Callable[[], bool] = lambda: False,
 ) -> CoupledChoice:
     """Choose one of the ranked models of every output.
 
@@ -52,6 +56,8 @@ def choose_equations(
         Validation data with the sampling time of the models.
     warm_up : int
         Number of samples before the first prediction.
+    skip : callable
+        Called before each comparison. Once it returns true, the choice is the best one so far.
     """
     errors: dict[tuple[int, ...], float] = {}
 
@@ -74,6 +80,8 @@ def choose_equations(
         for _ in range(_PASSES):
             before = places
             for output, models in enumerate(ranked):
+                if skip():
+                    return places
                 places = prefer(
                     [(*places[:output], place, *places[output + 1 :]) for place in range(len(models))]
                 )

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from islands.evolution.progress import Stop, never_stop
+from islands.evolution.progress import Steps
 from islands.evolution.search_result import SearchResult
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
@@ -39,21 +39,35 @@ class Result(RankedModels[FittedModel]):
         """Rank of the recommended model, and the reasons for the choice."""
         return self.search_result.recommendation
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Steps that a request to stop has left out; empty for a complete result."""
+        return self.search_result.search.left_out
+
     def with_wall_time(self, seconds: float) -> "Result":
         """Return a copy of the result with the duration of the search in seconds."""
         return Result(replace(self.search_result, search=replace(self.search_result.search, wall_s=seconds)))
 
-    def save(self, folder: str | Path, stop: Stop = never_stop) -> Path:
+    def save(self, folder: str | Path, steps: Steps | None = None) -> Path:
         """Write ``result.json``, the models, the figures of the recommended model, and the texts.
 
-        Once ``stop`` returns true, the remaining figures are left out.
+        The figures are optional ``steps``, which a stop request leaves out.
         """
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        self._draw_figures(folder / "figures", steps or Steps())
+        write_result(self.search_result, folder)
+        return folder
+
+    def _draw_figures(self, figures: Path, steps: Steps) -> None:
+        if steps.skip("figures"):  # before matplotlib is loaded, which takes a second
+            for path in figures.glob("*.svg"):
+                path.unlink()  # of an earlier result
+            return
         from islands.figures.model_responses import RESPONSES, draw_responses  # noqa: PLC0415
         from islands.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
         from islands.figures.style import save  # noqa: PLC0415
 
-        folder = Path(folder)
-        figures = folder / "figures"
         figures.mkdir(parents=True, exist_ok=True)
         # An earlier result in the folder may have had a loop or an equilibrium.
         for name in ("loop", *RESPONSES):
@@ -64,13 +78,13 @@ class Result(RankedModels[FittedModel]):
         for name in search_figures(self.search_result):
             drawn[name] = partial(SEARCH_FIGURES[name], self.search_result)
         for name, draw in drawn.items():
-            if not stop():
+            if steps.skip(f"figure {name}"):
+                (figures / f"{name}.svg").unlink(missing_ok=True)
+            else:
                 save(draw(), figures / f"{name}.svg")
-        if not stop():
+        if not steps.skip("figures of responses"):
             for name, figure in draw_responses(self.best.model, self.search_result.split.estimation).items():
                 save(figure, figures / f"{name}.svg")
-        write_result(self.search_result, folder)
-        return folder
 
     def __str__(self) -> str:
         return summary(self.search_result)

@@ -22,6 +22,7 @@ from islands.estimation.structure_selection.deviations import (
 )
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.swap_search import swap_search
+from islands.evolution.progress import Steps, StoppedError
 from islands.facade.trials.trial_library import TrialLibrary
 from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
@@ -38,6 +39,9 @@ _FORWARD_TERMS, _SWAP_TERMS = 10, 6
 
 #: Structures of each size of the swap search that are simulated.
 _DEPTH = 3
+
+#: Name of the step in an error.
+_STEP = "trial of a library"
 
 #: Samples of a shooting interval, at most a tenth of the record.
 _SHOOTING = 500
@@ -56,7 +60,9 @@ def hold_out(record: Dataset) -> tuple[Split, Split]:
     return Split(record[:-held], record[-held:]), Split(record[held:], record[:held])
 
 
-def measure_library(splits: Sequence[Split], library: TrialLibrary) -> tuple[float, ...]:
+def measure_library(
+    splits: Sequence[Split], library: TrialLibrary, steps: Steps | None = None
+) -> tuple[float, ...]:
     """Return the root mean squared error of the best model of each held-out part.
 
     It is infinite if no model can be estimated and simulated, for example because a part is too short.
@@ -66,29 +72,43 @@ def measure_library(splits: Sequence[Split], library: TrialLibrary) -> tuple[flo
     splits : sequence of Split
         Estimation data, and a held-out part as validation data.
     library : TrialLibrary
+    steps : Steps, optional
+        Checked between the estimations.
+
+    Raises
+    ------
+    StoppedError
+        A stop is requested.
     """
-    return tuple(min(_measure_models(split, library), default=inf) ** 0.5 for split in splits)
+    checked = steps or Steps()
+    return tuple(min(_measure_models(split, library, checked), default=inf) ** 0.5 for split in splits)
 
 
-def _measure_models(split: Split, library: TrialLibrary) -> Iterator[float]:
+def _measure_models(split: Split, library: TrialLibrary, steps: Steps) -> Iterator[float]:
     """Yield the mean squared errors of the free runs that do not diverge."""
     try:
+        steps.check(_STEP)
         free = constraint(library.constraints).allows_offsets
         offsets = find_offsets(split.estimation, OPERATING_POINT) if free else no_offsets(split.estimation)
         estimation, held = (subtract_offsets(part, offsets) for part in (split.estimation, split.validation))
         pool = library.screen(estimation)
         warm_up = max(item.maximum_lag for item in pool)
-        for structure in _select(pool, estimation, library):
+        for structure in _select(pool, estimation, library, steps):
+            steps.check(_STEP)
             found = estimate(structure, estimation, library.constraints, warm_up)
             if not isinstance(found, EvaluationOutcome):
                 error = free_run(found.model, held, warm_up).mean_squared_error
                 if isfinite(error):
                     yield error
+    except StoppedError:
+        raise
     except IslandsError:
         return  # The search with this library reports what is wrong.
 
 
-def _select(pool: Sequence[Regressor], record: Dataset, library: TrialLibrary) -> Iterator[Structure]:
+def _select(
+    pool: Sequence[Regressor], record: Dataset, library: TrialLibrary, steps: Steps
+) -> Iterator[Structure]:
     """Yield the structures of a forward selection, and those of a swap search that starts from them."""
     problem = make_selection_problem(pool, record, library.constraints)
     if isinstance(problem, EvaluationOutcome):
@@ -105,6 +125,7 @@ def _select(pool: Sequence[Regressor], record: Dataset, library: TrialLibrary) -
             if len(structure) <= _SWAP_TERMS
         ],
         depth=_DEPTH,
+        steps=Steps(stop=steps.stop),
     )
     for individuals in by_size:
         yield from (each.regressors for each in individuals)

@@ -25,6 +25,7 @@ from islands.estimation.structure_selection.deviations import (
     no_offsets,
     subtract_offsets,
 )
+from islands.evolution.progress import Steps
 from islands.facade.trials.trial_library import TrialLibrary
 from islands.inspection.oversampling import COUNTS, is_noisy, keeps_bandwidth
 from islands.model.model import Model
@@ -47,7 +48,9 @@ _LEAST_SHARE = 0.9
 _TERMS = 10
 
 
-def select_rate(split: Split, average: int | str, library: TrialLibrary, least: int) -> tuple[Split, int]:
+def select_rate(
+    split: Split, average: int | str, library: TrialLibrary, least: int, steps: Steps | None = None
+) -> tuple[Split, int]:
     """Average the data as the setting ``average`` says.
 
     ``auto`` compares small models of the same library at several rates. The measure is the error of their
@@ -63,6 +66,8 @@ def select_rate(split: Split, average: int | str, library: TrialLibrary, least: 
     least : int
         Fewest samples of a segment after averaging that permit a prediction. ``auto`` keeps nine tenths of
         the samples in such segments.
+    steps : Steps, optional
+        Checked before the models of each rate.
 
     Returns
     -------
@@ -71,29 +76,32 @@ def select_rate(split: Split, average: int | str, library: TrialLibrary, least: 
 
     Raises
     ------
+    StoppedError
+        A stop is requested.
     SettingsError
         ``average`` is neither ``auto`` nor a positive integer.
     RecordError
         A recording is too short for the given average, or an input is read one sample early.
     """
     check_average(average)
-    count = _choose_count(split, library, least) if average == AUTO else int(average)
+    count = _choose_count(split, library, least, steps or Steps()) if average == AUTO else int(average)
     return average_split(split, count), count
 
 
-def _choose_count(split: Split, library: TrialLibrary, least: int) -> int:
+def _choose_count(split: Split, library: TrialLibrary, least: int, steps: Steps) -> int:
     # Statistics of very large numbers overflow: such a record is not averaged.
     with np.errstate(over="ignore", invalid="ignore"):
         counts = [count for count in COUNTS if _permits(split, count, least)]
         interval = _limit_interval(split.validation, counts)
         if len(counts) == 1 or not is_noisy(split.estimation):
             return 1
-    squares = np.array(
-        [
-            compute_errors(average_split(split, count), library.at_rate(count), interval // count) ** 2
-            for count in counts
-        ]
-    )
+    errors_at = []
+    for count in counts:
+        steps.check("sampling rate")
+        errors_at.append(
+            compute_errors(average_split(split, count), library.at_rate(count), interval // count)
+        )
+    squares = np.array(errors_at) ** 2
     # Coarse rates have a longer warm-up: compare the intervals that all of them predict.
     compared = squares[:, ~np.isnan(squares).any(axis=0)]
     errors = np.sqrt(compared.mean(axis=1)) if compared.size else np.full(len(counts), inf)

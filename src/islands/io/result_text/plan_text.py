@@ -43,7 +43,9 @@ def plan_text(plan: ExperimentPlan) -> str:
     if plan.alternatives:
         lines += ["", *_format_alternatives(plan)]
     lines.append("")
-    if plan.decisive is None:
+    if plan.left_out:
+        lines += wrap(f"Left out: {', '.join(plan.left_out)}.")
+    elif plan.decisive is None:
         lines += wrap(f"All causes are separable at {REFERENCE_MISFIT:g} sigma: this input is sufficient.")
     else:
         lines += _format_decisive(plan.decisive, _name_unit(plan))

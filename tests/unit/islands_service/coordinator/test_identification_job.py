@@ -11,7 +11,7 @@ import pytest
 
 from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
-from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
+from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError, Submission
 from islands_service.reports.figure_worker import read_search_result
@@ -40,13 +40,15 @@ def get_models(outcome: JobOutcome) -> list[Any]:
 class Interruption:
     """A check that raises when the progress of a job has reached a generation."""
 
-    def __init__(self, store: Store, job: Job, at: int) -> None:
-        self._store, self._job, self._at = store, job.id, at
+    def __init__(
+        self, store: Store, job: Job, at: int, reason: type[Exception] = CoordinatorStopping
+    ) -> None:
+        self._store, self._job, self._at, self._reason = store, job.id, at, reason
 
     def __call__(self) -> None:
         progress = self._store.jobs.get(ALICE, self._job).progress
         if progress is not None and progress.get("generation", -1) >= self._at:
-            raise JobCancelled("enough")
+            raise self._reason("enough")
 
 
 @pytest.mark.ci
@@ -80,7 +82,7 @@ def test_interrupted_job_ends_with_the_same_models_and_history(
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
     for at in (0, 1, 2, 9, 25):
         lease = claim(store)
-        with pytest.raises(JobCancelled):
+        with pytest.raises(CoordinatorStopping):
             run_job(lease, store, blobs, Interruption(store, job, at))
         store.leases.release(lease)
     lease = claim(store)
@@ -92,13 +94,68 @@ def test_interrupted_job_ends_with_the_same_models_and_history(
 
 
 @pytest.mark.ci
+def test_cancelled_job_keeps_the_models_of_its_last_generation(
+    store: Store, blobs: Blobs, job: Job, undisturbed: Found, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    lease = claim(store)
+    outcome = run_job(lease, store, blobs, Interruption(store, job, 2, JobCancelled))
+    assert outcome.state == JobState.CANCELLED
+    assert outcome.document is not None
+    search = outcome.document["search"]
+    assert (search["generations"], search["ended_by"]) == (2, "stopped")
+    assert {"search from generation 2 to 30", "prediction bands"} <= set(search["left_out"])
+    store.leases.finish(lease, outcome)
+    ended = store.jobs.get(ALICE, job.id)
+    assert ended.state == JobState.CANCELLED
+    assert len(store.results.models(job.id)) == len(outcome.models) > 0
+    assert read_search_result(ended, store, blobs, None).models
+    # The resumed job replaces them by those of a job that was never cancelled.
+    store.jobs.resume(ALICE, job.id)
+    assert get_models(run_job(claim(store), store, blobs)) == undisturbed[0]
+
+
+@pytest.mark.ci
+def test_job_that_is_cancelled_at_any_check_ends_at_the_next_one(
+    store: Store, blobs: Blobs, job: Job
+) -> None:
+    """The check stays true. A few steps follow, so that every size has a model."""
+    changed = store.jobs.submit(Submission(ALICE, {**job.spec, "preset": "auto"}))[0]
+    store.jobs.cancel(ALICE, job.id)
+    lease = claim(store)
+    assert lease.job.id == changed.id
+    checks: list[None] = []
+    run_job(lease, store, blobs, lambda: checks.append(None))
+    total, kept = len(checks), [0]
+    for percent in (0, 20, 40, 60, 80, 99):
+        checks.clear()
+
+        def check(percent: int = percent) -> None:
+            checks.append(None)
+            if len(checks) > percent * total // 100:
+                raise JobCancelled("enough")
+
+        try:
+            outcome = run_job(lease, store, blobs, check)
+        except JobCancelled:
+            kept.append(0)
+        else:
+            assert outcome.state == JobState.CANCELLED
+            kept.append(len(outcome.models))
+        assert len(checks) < percent * total // 100 + 200
+    assert kept[1] == 0
+    assert kept[-1] > 1
+    assert sorted(kept, key=bool) == kept  # once there are models, none are lost
+
+
+@pytest.mark.ci
 def test_job_that_continues_keeps_the_choice_of_the_preset_auto(
     store: Store, blobs: Blobs, job: Job, undisturbed: Found, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
     store.jobs.cancel(ALICE, job.id)
     changed = store.jobs.submit(Submission(ALICE, {**job.spec, "preset": "auto"}))[0]
-    with pytest.raises(JobCancelled):
+    with pytest.raises(CoordinatorStopping):
         run_job(lease := claim(store), store, blobs, Interruption(store, changed, 2))
     store.leases.release(lease)
     monkeypatch.delattr(work, "choose_preset")
@@ -158,7 +215,7 @@ def test_wall_time_includes_all_attempts(
         time.sleep(0.005)
         interruption()
 
-    with pytest.raises(JobCancelled):
+    with pytest.raises(CoordinatorStopping):
         run_job(lease := claim(store), store, blobs, slowly)
     store.leases.release(lease)
     kept = store.jobs.get(ALICE, job.id).checkpoint
@@ -195,7 +252,7 @@ def test_stages_of_a_job_are_its_phases_and_keep_its_generation(store: Store, bl
 
 def test_first_populations_are_stored_in_a_checkpoint_at_once(store: Store, blobs: Blobs, job: Job) -> None:
     """Otherwise a job that soon ends its coordinator would never make progress."""
-    with pytest.raises(JobCancelled):
+    with pytest.raises(CoordinatorStopping):
         run_identification_job(
             claim(store), store, blobs, SerialEngine(), Interruption(store, job, 0), 3600.0
         )

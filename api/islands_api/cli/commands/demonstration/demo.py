@@ -10,6 +10,7 @@ from rich.table import Table
 
 import islands
 from islands.data.dataset import Dataset
+from islands.evolution.progress import Steps
 from islands.io.records import write_record
 from islands.model.model import Model
 from islands.simulation.predictors import free_run
@@ -19,6 +20,7 @@ from islands.validation.metrics import Metrics, metrics
 from islands_api.cli.console import compile_kernels, output, print_message, progress
 from islands_api.cli.output_folder import RESULT_FILES, check_folder
 from islands_api.cli.search_progress import search_progress
+from islands_api.cli.stop_requests import stop_requests
 from islands_service.engines import ENGINES, default_engine, has_ray, serial_notice
 
 #: Number of islands: one for each core of the smallest supported machine.
@@ -56,6 +58,7 @@ def demo(
     with (
         progress("demo") as show,
         ENGINES[default_engine(ISLANDS)](None, print_message) as engine,
+        stop_requests() as stop,
     ):
         began = perf_counter()
         found = islands.identify(
@@ -65,15 +68,18 @@ def demo(
             islands=ISLANDS,
             progress=search_progress(show),
             stage=show,
+            stop=stop,
             engine=engine,
         )
         result = found.with_wall_time(perf_counter() - began)
     # The figures take seconds: the equation is shown before.
     output.print(str(result), markup=False)
-    with progress("demo") as show:
+    with progress("demo") as show, stop_requests(stop) as stop:
         show("figures", None)
-        result.save(out)
+        drawing = Steps(stop=stop)
+        result.save(out, drawing)
     output.print(f"{out}/: {RESULT_FILES}", markup=False)
+    stop.end(out, (*result.left_out, *drawing.left_out, "comparison with the paper"), "repeat the command")
 
     # All models start after the same warm-up.
     warm_up = result.best.ranked_model.assessment.warm_up

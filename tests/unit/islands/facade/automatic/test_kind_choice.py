@@ -10,7 +10,7 @@ from islands.data.dataset import Dataset
 from islands.data.split import split
 from islands.errors import SettingsError
 from islands.evolution.presets import KINDS, resolve_kind, resolve_kinds
-from islands.evolution.progress import ignore_progress
+from islands.evolution.progress import ignore_progress, never_stop
 from islands.facade.automatic.kind_choice import choice_from_document
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
 from islands.facade.library_fit import FitSettings
@@ -30,7 +30,7 @@ def choose(data, delays=None):
     """Return the choice of `fit`, and its result."""
     settings = FitSettings(certificate=0)
     result = fit_chosen_library(
-        data, split(data), "auto", 2, None, None, delays, settings, 0, ignore_progress
+        data, split(data), "auto", 2, None, None, delays, settings, 0, ignore_progress, never_stop
     )
     return choice_from_document(result.settings["choice"]), result
 

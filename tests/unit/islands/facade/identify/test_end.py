@@ -176,7 +176,7 @@ def test_stop_after_the_last_epoch_leaves_out_the_steps_after_the_search(data, s
 
 
 def test_search_stopped_before_its_first_population_raises_an_error(data):
-    with pytest.raises(StoppedError, match="there is no model to keep"):
+    with pytest.raises(StoppedError, match="stopped before this step: sampling rate"):
         identify(data, **BUDGET, progress=pytest.fail, stop=lambda: True)
 
 

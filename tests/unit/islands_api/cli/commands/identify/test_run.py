@@ -33,7 +33,8 @@ def test_stopped_run_keeps_the_best_and_resumes_to_the_same_result(
     interrupted(generation, number)
     code, out, error = run("r.csv", *COLUMNS, *budget, "--out", "out")
     assert code == (130 if number == signal.SIGINT else 0)
-    assert error.startswith("stopped: out has the best models so far")
+    left_out = f"search from generation {generation} to 3, estimation of further structures"
+    assert error.startswith(f"stopped: out has the result so far, without {left_out}")
     assert "out/: result.json" in out
     stopped = json.loads((tmp_path / "out/result.json").read_text())
     assert stopped["search"]["generations"] == generation
@@ -47,6 +48,7 @@ def test_stopped_run_keeps_the_best_and_resumes_to_the_same_result(
     assert models(tmp_path / "out") == models(tmp_path / "whole")
     assert (tmp_path / "out/hall.json").read_bytes() == (tmp_path / "whole/hall.json").read_bytes()
     one, other = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("whole", "out"))
+    assert stopped["search"]["left_out"]
     for document in (one, other):
         # Times depend on the machine, and cache sizes on the process.
         for name in ("wall_s", "evaluations_per_second", "caches"):
@@ -59,7 +61,7 @@ def test_ctrl_c_in_the_last_generation_leaves_out_the_refinement(run, interrupte
     interrupted(3)
     code, _, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out")
     assert code == 130
-    assert error.startswith("stopped: out has the best models so far")
+    assert error.startswith("stopped: out has the result so far, without estimation of further structures")
     assert json.loads((tmp_path / "out/result.json").read_text())["search"]["ended_by"] == "stopped"
     interrupted(None)
     assert run("--resume", "out")[0] == 0
