@@ -16,7 +16,7 @@ from islands.distribution import describe_missing_extra, read_version
 from islands.errors import IslandsError, SettingsError
 from islands_api.cli.console import errors, exit_with_closed_output
 from islands_api.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
-from islands_api.cli.stop_requests import INTERRUPTED, TERMINATED, Terminated, raise_on_signals
+from islands_api.cli.stop_requests import exit_code, raise_on_signals
 from islands_service.process.process_settings import limit_threads
 
 #: Commands and their descriptions, in the order of the help. Each is a file with a function or a group of the
@@ -90,7 +90,7 @@ class Commands(TyperGroup):
             sys.exit(2)
         except KeyboardInterrupt as interrupt:
             errors.print("stopped")
-            sys.exit(TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED)
+            sys.exit(exit_code(interrupt))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command of the arguments; for an unknown name, an error suggests similar ones."""

@@ -2,8 +2,10 @@
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
+from threading import Thread
 from typing import NoReturn, Protocol
 
 from rich.console import Console, Group
@@ -88,6 +90,7 @@ def compile_kernels() -> None:
     """Compile the kernels if they are not in the cache, with a progress bar, and prepare for a long run."""
     # Imported here because it loads most of the core: other commands must start fast.
     from islands.facade.warm_up import warm_up  # noqa: PLC0415
+    from islands_api.cli.stop_requests import end_at_once  # noqa: PLC0415 - it imports this module
     from islands_service.process.process_settings import freeze_garbage_collector  # noqa: PLC0415
 
     with ExitStack() as stack:
@@ -96,5 +99,26 @@ def compile_kernels() -> None:
             errors.print(line, markup=False)
             stack.enter_context(progress("kernels"))("", 0.0)
 
-        warm_up(announce)
+        try:
+            _call_in_thread(partial(warm_up, announce))
+        except KeyboardInterrupt as interrupt:
+            stack.close()
+            end_at_once(interrupt)
     freeze_garbage_collector()
+
+
+def _call_in_thread(function: Callable[[], object]) -> None:
+    """Call a function in another thread, so that this one handles signals while a library does not return."""
+    raised: list[BaseException] = []
+
+    def call() -> None:
+        try:
+            function()
+        except BaseException as error:
+            raised.append(error)
+
+    thread = Thread(target=call, daemon=True)
+    thread.start()
+    thread.join()
+    if raised:
+        raise raised[0]

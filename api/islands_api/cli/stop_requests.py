@@ -4,8 +4,10 @@ A step with results so far polls the requests of `stop_requests` and keeps its r
 signal ends the command at once, as an exception.
 """
 
+import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
@@ -26,6 +28,8 @@ class Terminated(KeyboardInterrupt):
     """SIGTERM has arrived."""
 
 
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
 #: Signals that have raised an exception. Python ignores one that is raised in a callback of an import.
 _raised: list[int] = []
 
@@ -41,23 +45,34 @@ def raise_on_signals() -> Iterator[None]:
         _raised.append(number)
         raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
 
-    with _handle(receive):
-        yield
-    _raised.clear()
+    with _handle(receive, [each for each in _SIGNALS if signal.getsignal(each) != signal.SIG_IGN]):
+        try:
+            yield
+        finally:
+            _raised.clear()
 
 
 @contextmanager
-def _handle(receive: Callable[[int, Any], None]) -> Iterator[None]:
-    """Handle the signals that are not ignored by a function while the block runs."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    handled = [number for number, handler in before.items() if handler != signal.SIG_IGN]
-    for number in handled:
-        signal.signal(number, receive)
+def _handle(receive: Callable[[int, Any], None], signals: Iterable[signal.Signals]) -> Iterator[None]:
+    """Handle signals by a function while the block runs."""
+    before = {number: signal.signal(number, receive) for number in signals}
     try:
         yield
     finally:
-        for number in handled:
-            signal.signal(number, before[number])
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def end_at_once(interrupt: KeyboardInterrupt) -> NoReturn:
+    """End this process although another of its threads is in a library that does not return."""
+    errors.print("stopped")
+    sys.stdout.flush()
+    os._exit(exit_code(interrupt))
+
+
+def exit_code(interrupt: KeyboardInterrupt) -> int:
+    """Return the exit code of a command that a signal has ended without a result."""
+    return TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED
 
 
 class StopRequests:
@@ -110,7 +125,7 @@ def stop_requests(before_block: StopRequests | None = None) -> Iterator[StopRequ
     """
     requests = before_block or StopRequests()
     try:
-        with _handle(requests.receive):
+        with _handle(requests.receive, _SIGNALS):
             yield requests
     except StoppedError as stopped:
         if not requests():

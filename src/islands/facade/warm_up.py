@@ -1,11 +1,13 @@
 """Compilation of all kernels before the first use."""
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing import cpu_count
+from threading import Thread
 
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
@@ -71,6 +73,16 @@ def use_kernels_of_one_model() -> None:
         certify(problem, 3, 100)
 
 
+def end_with_parent() -> None:
+    """End this process when its standard input is closed, as by the end of the process that holds it open."""
+
+    def wait() -> None:
+        sys.stdin.read()
+        os._exit(1)
+
+    Thread(target=wait, daemon=True).start()
+
+
 @contextmanager
 def _second_process() -> Iterator[None]:
     """Compile the kernels of one model in another process during the context, if there is a core for it.
@@ -82,10 +94,10 @@ def _second_process() -> Iterator[None]:
     if cpu_count() == 1 or cache_folder() is None:
         yield
         return
-    code = f"from {__name__} import {use_kernels_of_one_model.__name__} as use; use()"
+    code = f"import {__name__} as work; work.end_with_parent(); work.{use_kernels_of_one_model.__name__}()"
     nowhere = subprocess.DEVNULL
     command = [sys.executable, "-c", code]
-    with subprocess.Popen(command, stdin=nowhere, stdout=nowhere, stderr=nowhere) as process:
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=nowhere, stderr=nowhere) as process:
         try:
             yield
             process.wait()

@@ -1,0 +1,91 @@
+"""Stop functions: every computation calls them often enough to end within two seconds."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from time import process_time
+
+import pytest
+
+import islands
+from islands.data.coupled_record import CoupledRecord
+from islands.data.dataset import Dataset
+from islands.evolution.progress import Stop, StoppedError
+from islands.facade.coupled.coupled_identification import StoppedCouplingError
+from islands.systems.catalogue import make_record
+
+#: Seconds of CPU between two calls. Two seconds are promised; slower machines and the saving need the rest.
+LONGEST = 0.7
+
+SEARCH = {"population": 40, "generations": 4, "max_terms": 4, "initial_terms": (1, 4), "max_height": 4}
+
+
+def record(samples: int) -> Dataset:
+    whole = make_record("bouc-wen-piezo", "authors", "estimation")
+    return Dataset(whole.u[:samples], whole.y[:samples], whole.dt)
+
+
+def both(samples: int) -> CoupledRecord:
+    one = record(samples)
+    return CoupledRecord((one, replace(one, y=0.5 * one.y[::-1], output_name="other")))
+
+
+#: Computations with a stop function.
+RUNS: dict[str, Callable[[int, Stop], object]] = {
+    "fit": lambda samples, stop: islands.fit(record(samples), stop=stop),
+    "identify": lambda samples, stop: islands.identify(record(samples), stop=stop, **SEARCH),
+    "fit_coupled": lambda samples, stop: islands.fit_coupled(both(samples), max_terms=4, stop=stop),
+    "identify_coupled": lambda samples, stop: islands.identify_coupled(both(samples), stop=stop, **SEARCH),
+}
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", RUNS)
+def test_stop_function_is_called_at_least_every_second(name: str) -> None:
+    calls = [process_time()]
+
+    def stop() -> bool:
+        calls.append(process_time())
+        return False
+
+    RUNS[name](3000, stop)
+    calls.append(process_time())
+    gaps = [after - before for before, after in pairwise(calls)]
+    assert max(gaps) < LONGEST
+
+
+@pytest.mark.ci
+def test_stopped_search_of_several_outputs_keeps_its_results() -> None:
+    calls: list[None] = []
+
+    def count_results(last: int) -> int:
+        """Return the number of outputs with models after a stop at a call; 3 for a coupled model."""
+        calls.clear()
+
+        def stop() -> bool:
+            calls.append(None)
+            return len(calls) >= last
+
+        try:
+            found = RUNS["fit_coupled"](400, stop)
+        except StoppedCouplingError as stopped:
+            return sum(bool(result.best.equation) for result in stopped.found)
+        except StoppedError:
+            return 0
+        assert isinstance(found, islands.CoupledResult)
+        assert found.equation
+        assert bool(found.left_out) == (last < total)
+        return 3
+
+    total = 10**9
+    assert count_results(total) == 3
+    total = len(calls) + 1
+    kept = [count_results(1 + part * (total - 2) // 8) for part in range(9)]
+    assert kept == sorted(kept)
+    assert {0, 1, 3} <= set(kept)
+
+
+def test_search_that_is_stopped_before_its_first_step_has_no_result() -> None:
+    for run in RUNS.values():
+        with pytest.raises(StoppedError):
+            run(400, lambda: True)
