@@ -34,7 +34,7 @@ RENEWALS_PER_LEASE = 10
 CANCEL_POLL = 0.2
 
 #: Seconds that a job has to end by itself. Then the heartbeat stores the cancellation and abandons the job.
-CANCEL_GRACE = 0.4
+CANCEL_GRACE = 1.5
 
 #: Seconds that a job has to end by itself at its limit of run time, with the models that it has found. Its
 #: owner gets no models afterwards.
