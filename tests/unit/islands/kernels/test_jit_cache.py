@@ -98,7 +98,7 @@ def forks() -> Iterator[Callable[..., Fork]]:
 
 @pytest.fixture
 def sources(tmp_path: Path) -> None:
-    """Copy the files under test, what they import, and a module of kernels to the folder of the test."""
+    """Copy the files under test, their imports, and a module of kernels to the folder of the test."""
     package = tmp_path / "islands"
     (package / "kernels").mkdir(parents=True)
     (package / "__init__.py").touch()
