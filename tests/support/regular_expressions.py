@@ -184,7 +184,7 @@ def list_texts(pattern: re.Pattern[Any]) -> list[tuple[str, str, str]]:
 
 
 def _list_repetitions(sequence: Sequence[Any], before: tuple[Any, ...]) -> Iterator[tuple[Any, Any, Any]]:
-    """Yield what precedes each repetition, what it repeats, and the sequence that contains it."""
+    """Yield the nodes before each repetition, its body, and the sequence that contains it."""
     for place, (code, argument) in enumerate(sequence):
         above = (*before, *list(sequence)[:place])
         for part in _list_parts(code, argument):

@@ -161,7 +161,7 @@ class _FileInspection:
             warnings.append(_NO_SAMPLING_TIME)
         return RecordInspection(
             str(self.path),
-            tuple(self._describe_column(column, values, choice) for column in self.found.columns),
+            self._describe_columns(values, choice),
             sampling,
             choice,
             facts,
@@ -256,12 +256,23 @@ class _FileInspection:
             return None, str(error)
         return record, ""
 
-    def _describe_column(
-        self, column: ColumnPreview, values: Mapping[str, NDArray[np.float64]], choice: ColumnChoice
-    ) -> InspectedColumn:
+    def _describe_columns(
+        self, values: Mapping[str, NDArray[np.float64]], choice: ColumnChoice
+    ) -> tuple[InspectedColumn, ...]:
         inputs = {find_column(name, self.table.names) for name in choice.inputs}
-        role = "time" if column.name == self.found.time else ""
-        role = "input" if column.name in inputs else "output" if column.name == choice.output else role
+        roles: dict[str | None, str] = {
+            self.found.time: "time",
+            choice.output: "output",
+            **dict.fromkeys(inputs, "input"),
+        }
+        return tuple(
+            self._describe_column(column, values, roles.get(column.name, "")) for column in self.found.columns
+        )
+
+    @staticmethod
+    def _describe_column(
+        column: ColumnPreview, values: Mapping[str, NDArray[np.float64]], role: str
+    ) -> InspectedColumn:
         if column.name not in values:
             return InspectedColumn(column.name, column.unit, role, None, None, 0, column.problem)
         return _describe_values(column.name, column.unit, role, values[column.name], column.problem)

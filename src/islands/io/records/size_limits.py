@@ -20,6 +20,16 @@ MOST_COLUMNS = 10_000
 #: Largest number of cells of a sheet of a workbook, with empty ones.
 MOST_CELLS = 2**26
 
+#: Largest number of characters of a cell of text, as in Excel. A number has at most about 1100: 767 digits
+#: and 323 zeros write any number in double precision exactly.
+MOST_CHARACTERS = 32_767
+
+#: Largest number of characters of the name of a column, which messages repeat.
+MOST_NAME = 1000
+
+#: Largest number of characters of a line of text: `MOST_COLUMNS` cells of 100 characters.
+MOST_LINE = 1_000_000
+
 #: Largest number of bytes of the directory of a zip archive: `MOST_COLUMNS` members with long names.
 MOST_DIRECTORY = 2**21
 
@@ -94,6 +104,54 @@ def check_column_count(columns: Sized, file: str) -> None:
     """
     if len(columns) > MOST_COLUMNS:
         raise _too_many_columns(file)
+
+
+def check_line(length: int, place: str) -> None:
+    """Refuse a line of more than `MOST_LINE` characters.
+
+    Parameters
+    ----------
+    length : int
+        Characters of the line.
+    place : str
+        File and line, for the message.
+
+    Raises
+    ------
+    RecordError
+    """
+    if length > MOST_LINE:
+        raise RecordError(
+            f"{place} has {length} characters, and at most {MOST_LINE} are read: write one line per sample"
+        )
+
+
+def check_name(name: str, place: str) -> None:
+    """Refuse a name of a column with more than `MOST_NAME` characters; ``place`` is its file and line.
+
+    Raises
+    ------
+    RecordError
+    """
+    if len(name) > MOST_NAME:
+        raise RecordError(
+            f"{place}: the column {name[:40]}... has a name of {len(name)} characters, and at most "
+            f"{MOST_NAME} are read: give it a shorter one"
+        )
+
+
+def check_cell(length: int, place: str) -> None:
+    """Refuse a cell of more than `MOST_CHARACTERS` characters; ``place`` is its file, line and column.
+
+    Raises
+    ------
+    RecordError
+    """
+    if length > MOST_CHARACTERS:
+        raise RecordError(
+            f"{place}: the cell has {length} characters, and at most {MOST_CHARACTERS} are read: shorten it "
+            "or leave the column out; is a quote never closed?"
+        )
 
 
 def _too_many_columns(file: str) -> RecordError:

@@ -15,6 +15,9 @@ from islands.io.records.table import Columns
 #: small model.
 MIN_SAMPLES = 30
 
+#: Names that a message lists, at most.
+_LISTED = 50
+
 
 def check_unique(names: Sequence[str], file: str) -> None:
     """Refuse a file in which two columns have the same name.
@@ -194,4 +197,6 @@ def _suggest(name: str, names: Sequence[str]) -> str:
 
 
 def _list_names(names: Sequence[str]) -> str:
-    return ", ".join(name for name in names if name) or "(none with a name)"
+    named = [name for name in names if name]
+    more = f" and {len(named) - _LISTED} more" if len(named) > _LISTED else ""
+    return ", ".join(named[:_LISTED]) + more or "(none with a name)"

@@ -15,7 +15,13 @@ from islands.errors import RecordError
 from islands.io.records.formats.text.table_start import has_samples
 from islands.io.records.formats.text.text_table import DelimitedText, split_table
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.size_limits import MOST_CELLS, MOST_COLUMNS, check_archive, check_column_count
+from islands.io.records.size_limits import (
+    MOST_CELLS,
+    MOST_COLUMNS,
+    check_archive,
+    check_column_count,
+    check_unpacked,
+)
 
 #: Rows of a sheet of Excel.
 _MOST_ROWS = 2**20
@@ -106,11 +112,14 @@ def _list_lines(sheet: Any, file: str) -> list[str]:
     Cells and rows that a file leaves out are counted too: one cell can be in any row and column.
     """
     lines = []
-    width = 0
+    width = characters = 0
     rows: list[list[str]] = []
     for row in sheet.iter_rows(values_only=True):
         rows.append([_as_text(value) for value in row])
         width = max(width, len(row))
+        # Cells of a workbook share their texts, which are written out here.
+        characters += sum(map(len, rows[-1]))
+        check_unpacked(characters, file)
         if width > MOST_COLUMNS or len(rows) * max(width, 1) > MOST_CELLS or len(rows) > _MOST_ROWS:
             raise RecordError(
                 f"{file} has a sheet of more than {len(rows) - 1} rows and {width} columns, too many for a "

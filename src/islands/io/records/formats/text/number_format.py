@@ -25,6 +25,9 @@ _AMBIGUOUS = re.compile(r"\s*[+-]?[1-9]\d{0,2}([.,])\d{3}\s*")
 _OTHER = {",": ".", ".": ","}
 _REMEDY = "give --decimal point or --decimal comma (library: decimal=)"
 
+#: Characters of a cell in a message.
+_SHOWN = 40
+
 #: Place of a cell: column, sample and text.
 _Cell = tuple[str, int, str]
 
@@ -145,4 +148,5 @@ def _raise_mixed(cell: _Cell | None, other: _Cell, mark: str, rows: RowRange) ->
 
 def _place(cell: _Cell, rows: RowRange) -> str:
     name, sample, text = cell
-    return f"{rows.place(sample, name)} ({text.strip()})"
+    shown = text.strip()
+    return f"{rows.place(sample, name)} ({shown if len(shown) <= _SHOWN else f'{shown[:_SHOWN]}...'})"

@@ -4,6 +4,7 @@ import csv
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import chain, islice
 
 from islands.data.channel_names import is_unit, spell_unit
@@ -17,6 +18,9 @@ from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 #: Separators in order of preference. The comma follows the others because it may be a decimal mark; runs of
 #: blanks come last.
 SEPARATORS = (";", "\t", "|", ",", " ")
+
+#: Characters of a cell in a message.
+_SHOWN = 40
 
 #: Marks of a comment. numpy.savetxt writes its header as a comment.
 _COMMENTS = "#%!"
@@ -147,9 +151,12 @@ def _read_row(lines: Sequence[str], at: int, separator: str) -> tuple[list[str],
 
     A quoted cell may contain line ends.
     """
-    rows = chain([_uncomment(lines[at])], islice(lines, at + 1, None))
+    rows = chain([_uncomment(lines[at])], (lines[below] for below in range(at + 1, len(lines))))
     reader = csv.reader((collapse_blanks(line, separator) for line in rows), delimiter=separator)
-    return next(reader, []), at + reader.line_num
+    try:
+        return next(reader, []), at + reader.line_num
+    except csv.Error:  # a cell exceeds the limit of the module csv
+        return _split(_uncomment(lines[at]), separator), len(lines) if '"' in lines[at] else at + 1
 
 
 def _uncomment(line: str) -> str:
@@ -157,8 +164,14 @@ def _uncomment(line: str) -> str:
 
 
 def _split(line: str, separator: str) -> list[str]:
-    """Split a line into cells."""
-    return next(csv.reader([collapse_blanks(line, separator)], delimiter=separator), [])
+    """Split a line into cells.
+
+    A line with a cell that exceeds the limit of the module csv is one cell: another separator may fit.
+    """
+    try:
+        return next(csv.reader([collapse_blanks(line, separator)], delimiter=separator), [])
+    except csv.Error:
+        return [line]
 
 
 def collapse_blanks(line: str, separator: str) -> str:
@@ -167,7 +180,7 @@ def collapse_blanks(line: str, separator: str) -> str:
 
 
 def _list_filled(lines: Sequence[str], start: int) -> Iterator[str]:
-    return (line for line in islice(lines, start, None) if line.strip())
+    return (lines[at] for at in range(start, len(lines)) if lines[at].strip())
 
 
 def _infer_separator(header: str, first: Sequence[str]) -> str:
@@ -177,10 +190,9 @@ def _infer_separator(header: str, first: Sequence[str]) -> str:
     preferred.
     """
     blank = not any(mark in header for mark in ";|,")  # "t, u" is separated by its comma
-    usable = [mark for mark in SEPARATORS if len(_split(header, mark)) > 1 and (mark != " " or blank)]
-    agreeing = (
-        mark for mark in usable if all(len(_split(line, mark)) == len(_split(header, mark)) for line in first)
-    )
+    widths = {mark: len(_split(header, mark)) for mark in SEPARATORS}
+    usable = [mark for mark in SEPARATORS if widths[mark] > 1 and (mark != " " or blank)]
+    agreeing = (mark for mark in usable if all(len(_split(line, mark)) == widths[mark] for line in first))
     return next(agreeing, usable[0] if usable else ",")
 
 
@@ -192,18 +204,21 @@ def _fits(width: int, lines: Sequence[str], first: int, separator: str) -> bool:
 
 def _find_samples(lines: Sequence[str], top: int) -> tuple[str, int] | None:
     """Return the separator and the index of the first sample, None if no lines look like samples."""
-    for at in range(top, min(len(lines), top + _MOST_LINES)):
-        if not lines[at].strip():
-            continue
-        block = list(islice(_list_filled(lines, at), _SAMPLES))
+
+    @cache
+    def width(at: int, separator: str) -> int:
+        """Return the number of cells of a sample; 0 if the line is none."""
+        cells = _split(lines[at], separator)
+        return len(cells) if _is_sample(cells) else 0
+
+    filled = (at for at in range(top, len(lines)) if lines[at].strip())
+    block = list(islice(filled, _SAMPLES))
+    while block and block[0] < top + _MOST_LINES:
         for separator in SEPARATORS:
-            cells = [_split(line, separator) for line in block]
-            if (
-                len(cells[0]) > 1
-                and {len(row) for row in cells} == {len(cells[0])}
-                and all(map(_is_sample, cells))
-            ):
-                return separator, _extend_upwards(lines, top, at, separator)
+            first = width(block[0], separator)
+            if first > 1 and all(width(at, separator) == first for at in block):
+                return separator, _extend_upwards(lines, top, block[0], separator)
+        block = [*block[1:], *islice(filled, 1)]
     return None
 
 
@@ -233,8 +248,14 @@ def _is_sample(cells: Sequence[str]) -> bool:
 
     A line of a description begins with text: ``Sample interval,4e-09``.
     """
-    is_text = [not (is_number(cell) or is_missing(cell) or kind_of(cell)) for cell in cells]
-    return any(map(is_number, cells)) and sum(is_text) <= 1 and not is_text[0]
+    if not cells or _is_text(cells[0]):
+        return False
+    others = islice(filter(_is_text, cells), 2)
+    return len(list(others)) < 2 and any(map(is_number, cells))
+
+
+def _is_text(cell: str) -> bool:
+    return not (is_number(cell) or is_missing(cell) or kind_of(cell))
 
 
 def _find_header(lines: Sequence[str], top: int, samples: int, separator: str, file: str) -> int:
@@ -283,5 +304,5 @@ def _check_header(names: Sequence[str], file: str, line: int, has_units: bool) -
     channels = len(numbers) < len(names) and all(name.isdigit() and len(name) < 4 for name in numbers)
     if numbers and not has_units and not (channels and not _is_sample(names)):
         raise RecordError(
-            f"{file}, line {line} contains the number {numbers[0]} instead of a name: {_NO_HEADER}"
+            f"{file}, line {line} contains the number {numbers[0][:_SHOWN]} instead of a name: {_NO_HEADER}"
         )

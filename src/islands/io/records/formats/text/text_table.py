@@ -5,12 +5,16 @@ ways. `text_encoding`, `table_start` and `number_parsing` do that; a preview sta
 """
 
 import csv
+from array import array
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from io import StringIO
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.io.records.formats.text.number_format import find_number_format
@@ -24,6 +28,13 @@ from islands.io.records.formats.text.time_stamps import (
     parse_stamps,
 )
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.size_limits import (
+    MOST_CHARACTERS,
+    check_cell,
+    check_column_count,
+    check_line,
+    check_name,
+)
 from islands.io.records.table import Columns, RowRange, select
 
 #: Samples that decide whether a column contains time stamps.
@@ -62,6 +73,14 @@ class DelimitedText:
     options: ReadingOptions = DEFAULT_READING
     notes: tuple[str, ...] = ()
     others: str = ""
+    # Both are found once: a search per column would take the square of the time.
+    _places: Mapping[str, int] = field(init=False, repr=False)
+    _irregular: NDArray[np.int64] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        widths = np.fromiter(map(len, self.cells), np.int64, len(self.cells))
+        object.__setattr__(self, "_places", {name: place for place, name in enumerate(self.names)})
+        object.__setattr__(self, "_irregular", np.flatnonzero(widths != len(self.names)))
 
     def stated(self, structure: str) -> Mapping[str, float]:  # noqa: ARG002
         """Return an empty mapping: a text table cannot state a sampling time."""
@@ -70,9 +89,9 @@ class DelimitedText:
     def read(self, names: Sequence[str], rows: slice | None) -> Columns:
         """Convert the named columns over the selected rows; see `islands.io.records.table.Table`."""
         chosen = select(rows, len(self.cells), self.rows.file)
+        self._check_widths(chosen)
         kept = slice(chosen.start, chosen.stop)
         cells, where = self.cells[kept], RowRange(self.rows.file, self.rows.counted, self.rows.numbers[kept])
-        self._check_widths(cells, where)
         texts = self._select_columns([name for name in names if name not in self.clocks], cells)
         numbers = parse_numbers(texts, where, self.options.decimal_mark, self.separator)
         for name in names:
@@ -107,16 +126,15 @@ class DelimitedText:
         ]
 
     def _select_columns(self, names: Sequence[str], cells: Sequence[list[str]]) -> dict[str, list[str]]:
-        places = {name: place for place, name in enumerate(self.names)}
-        return {name: list(map(itemgetter(places[name]), cells)) for name in names}
+        return {name: list(map(itemgetter(self._places[name]), cells)) for name in names}
 
-    def _check_widths(self, cells: Sequence[list[str]], rows: RowRange) -> None:
-        width = len(self.names)
-        if set(map(len, cells)) <= {width}:
+    def _check_widths(self, chosen: range) -> None:
+        place = int(np.searchsorted(self._irregular, chosen.start))
+        if place == len(self._irregular) or (sample := int(self._irregular[place])) >= chosen.stop:
             return
-        sample = next(index for index, row in enumerate(cells) if len(row) != width)
-        found = len(cells[sample])
-        if not any(cells[sample]):
+        width, rows = len(self.names), self.rows
+        found = len(self.cells[sample])
+        if not any(self.cells[sample]):
             raise RecordError(
                 f"{rows.file}, {rows.row(sample)} is blank: delete it, or cut the file there if it holds "
                 "several recordings and pass them as segments (islands.join)"
@@ -140,7 +158,8 @@ def read_delimited(path: Path, options: ReadingOptions = DEFAULT_READING) -> Del
     Raises
     ------
     RecordError
-        The file is not text, is empty, has no header, has no samples, or a quote in it is never closed.
+        The file is not text, is empty, has no header, has no samples, exceeds a limit of
+        `islands.io.records.size_limits`, or a quote in it is never closed.
     """
     text, encoding = decode(path.read_bytes(), path.name)
     # Universal newlines; str.splitlines would also split at characters that editors do not count as line
@@ -165,30 +184,69 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
     Raises
     ------
     RecordError
-        There is no table, or a quote is never closed.
+        There is no table, a line, a name or a cell is too long, or a quote is never closed.
     """
+    for number, line in enumerate(lines, 1):
+        check_line(len(line), f"{file}, {counted} {number}")
     if not any(line.strip() for line in lines):
         raise RecordError(f"{file} is empty: a record has a header with names and one line per sample")
     start = find_table(lines, file, options)
-    below = (collapse_blanks(line, start.separator) for line in lines[start.first :])
-    reader = csv.reader(below, delimiter=start.separator, strict=True)
-    try:
-        rows = [(start.first + reader.line_num, cells) for cells in reader]
-    except csv.Error as error:
-        raise RecordError(
-            f"{file}, {counted} {start.first + reader.line_num}: {error}; is a quote never closed?"
-        ) from error
-    while rows and not any(cell.strip() for cell in rows[-1][1]):
-        rows.pop()
+    check_column_count(start.names, file)
+    for name in start.names:
+        check_name(name, f"{file}, {counted} {start.first if start.header is None else start.header + 1}")
+    numbers, rows = _read_rows(lines, start, file, counted)
     if not rows:
         header = "no" if start.header is None else f"a header in {counted} {start.header + 1} but no"
         raise RecordError(f"{file} has {header} samples{' below it' if start.header is not None else ''}")
-    where = RowRange(file, counted, [number for number, _ in rows])
-    names, cells = _trim(start.names, [cells for _, cells in rows])
+    where = RowRange(file, counted, numbers)
+    names, cells = _trim(start.names, rows)
     clocks = _find_clocks(names, cells)
     return DelimitedText(
         names, start.separator, cells, where, clocks, options, _list_notes(file, start, counted)
     )
+
+
+def _read_rows(
+    lines: Sequence[str], start: TableStart, file: str, counted: str
+) -> tuple["array[int]", list[list[str]]]:
+    """Return the line numbers and the cells of all samples, without blank lines at the end."""
+    below = (collapse_blanks(lines[at], start.separator) for at in range(start.first, len(lines)))
+    reader = csv.reader(below, delimiter=start.separator, strict=True)
+    numbers = array("q")
+    rows: list[list[str]] = []
+    blank: list[str] = []  # one for all: a file may consist of blank lines
+    ended = start.first
+    try:
+        for cells in reader:
+            ended = start.first + reader.line_num
+            numbers.append(ended)
+            rows.append(cells or blank)
+            longest = max(map(len, cells), default=0)
+            if longest > MOST_CHARACTERS:
+                place = _find_longest(cells)
+                check_cell(longest, f"{file}, {counted} {ended}, column {_name(start, place)}")
+    except csv.Error as error:
+        at = start.first + reader.line_num
+        if "field limit" in str(error):
+            # In a row of several lines, the cell is the last one of the first line.
+            parts = lines[ended].split(start.separator)
+            place = _find_longest(parts) if at == ended + 1 else len(parts) - 1
+            length = len(parts[place]) + sum(map(len, lines[ended + 1 : at]))
+            check_cell(length, f"{file}, {counted} {ended + 1}, column {_name(start, place)}")
+        raise RecordError(f"{file}, {counted} {at}: {error}; is a quote never closed?") from error
+    while rows and not any(cell.strip() for cell in rows[-1]):
+        rows.pop()
+        numbers.pop()
+    return numbers, rows
+
+
+def _find_longest(cells: Sequence[str]) -> int:
+    return max(range(len(cells)), key=lambda place: len(cells[place]))
+
+
+def _name(start: TableStart, place: int) -> str:
+    """Return the name of a column, or its number from 1 if it has none."""
+    return start.names[place] if place < len(start.names) else str(place + 1)
 
 
 def _trim(names: tuple[str, ...], cells: list[list[str]]) -> tuple[tuple[str, ...], list[list[str]]]:

@@ -1,5 +1,7 @@
 """Text tables without a valid record are refused with a message that says what to do."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -103,3 +105,36 @@ def test_a_channel_is_found_without_the_unit_of_the_row_of_units(tmp_path):
     path.write_text("\n".join(["x-axis,1,2", "second,Volt,Volt", *lines()[1:]]))
     record = read_record(path, ["1"], "2")
     assert (record.dt, record.input_names, record.output_unit) == (pytest.approx(0.01), ("1 [V]",), "V")
+
+
+@pytest.mark.parametrize(
+    "cell", ["1" * 32_768, "x" * 200_000, '"' + "1,\n" * 20_000 + '"', '"' + "a\n" * 90_000]
+)
+def test_a_long_cell_is_refused_with_its_line_and_column(tmp_path, cell):
+    message = refusal(tmp_path, changed(40, 1, cell))
+    assert re.match(
+        r"bad\.csv, line \d+, column u_V: the cell has \d+ characters, and at most 32767", message
+    )
+    assert "shorten it or leave the column out" in message
+
+
+def test_a_cell_at_the_limit_is_read(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("\n".join(changed(40, 1, "1." + "0" * 32_765)))
+    assert read_record(path, ["u_V"], "y_um").u[38, 0] == 1.0
+
+
+def test_a_long_name_is_refused(tmp_path):
+    message = refusal(tmp_path, [f"t_s,u_V,y_um,{'n' * 1001}", *(f"{row},1" for row in lines()[1:])])
+    assert message.startswith("bad.csv, line 1: the column nnnn")
+    assert "has a name of 1001 characters, and at most 1000 are read: give it a shorter one" in message
+
+
+def test_a_long_line_is_refused(tmp_path):
+    message = refusal(tmp_path, [*lines(), "1," * 500_001])
+    assert "bad.csv, line 62 has 1000003 characters, and at most 1000000 are read" in message
+
+
+def test_too_many_columns_are_refused(tmp_path):
+    rows = [",".join(f"c{number}" for number in range(10_001)), *[",".join(["1"] * 10_001)] * 3]
+    assert "bad.csv has more than 10000 columns" in refusal(tmp_path, rows, ["c1"], "c2")

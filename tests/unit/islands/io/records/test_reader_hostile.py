@@ -1,0 +1,55 @@
+"""Costly text files are read or refused in a time that grows in proportion to their size."""
+
+import pytest
+
+from islands.errors import RecordError
+from islands.facade.inspect_record import inspect_file
+from islands.io.records.preview import preview
+from support.hostile_tables import FAMILIES, reading_seconds
+
+#: Largest growth of the time when the size is doubled twice.
+LARGEST_RATIO = 2.2**2
+
+#: Families whose files exceed a limit; reading the file ends at once.
+EXCESSIVE = (
+    "digits in a cell",
+    "blanks in a cell",
+    "quotes",
+    "only quotes",
+    "quotes and separators",
+    "only separators",
+    "mixed separators",
+    "one line of numbers",
+    "one line of letters",
+    "one line of digits",
+    "one name",
+    "names of times",
+    "names above short lines",
+    "a quote in the header that is never closed",
+)
+
+
+def inspect(path):
+    """Read a file as a service does that receives it."""
+    return inspect_file(path, preview(path))
+
+
+@pytest.mark.parametrize("family", EXCESSIVE)
+def test_a_file_that_exceeds_a_limit_is_refused_with_its_place(tmp_path, family):
+    path = tmp_path / "r.csv"
+    path.write_text(FAMILIES[family](240_000))
+    with pytest.raises(RecordError, match=r"^r\.csv(, line \d+| has more than 10000 columns)") as caught:
+        inspect(path)
+    assert len(str(caught.value)) < 500
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_time_grows_in_proportion_to_the_size(tmp_path, family):
+    path = tmp_path / "r.csv"
+    times = []
+    for size in (250_000, 1_000_000):
+        path.write_bytes(FAMILIES[family](size).encode())
+        times.append(reading_seconds(inspect, path, 2))
+    # Below 50 ms the time is that of the start of the table and of the message.
+    assert times[1] < 0.05 or times[1] <= LARGEST_RATIO * times[0], times
