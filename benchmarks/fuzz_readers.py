@@ -1,10 +1,12 @@
 """Fuzzing of all readers of uploads: a mutated file is read, or refused with an error for its owner.
 
     python benchmarks/fuzz_readers.py [--seconds 60] [--cases N] [--seed 0] [--suffix .csv ...]
+    python benchmarks/fuzz_readers.py --families 1000000
 
 Each format runs in child processes with limited memory, so that a crash of a library ends only its case. The
 cases of a seed are always the same; a defect is printed with the numbers that repeat it. The exit status is 1
-if there is a defect.
+if there is a defect. With ``--families``, costly text files of a size and of twice the size are read instead;
+a time that grows faster than the size is a defect.
 """
 
 import argparse
@@ -18,13 +20,18 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+from islands.io.records import preview
 from islands_api.web.uploads.uploaded_file import SUFFIXES
 from support.fuzzing import SLOW, Defect, corpus
+from support.hostile_tables import FAMILIES, reading_seconds
 
 ROOT = Path(__file__).parents[1]
 
 #: Cases of one child process.
 BATCH = 500
+
+#: Largest growth of the time of a file of twice the size.
+LARGEST_RATIO = 2.2
 
 #: Folder of the mutated files; one in memory if there is one.
 FOLDER = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
@@ -66,13 +73,32 @@ def run_batch(suffix: str, seed: int, first: int, cases: int) -> tuple[int, list
     return ended, defects
 
 
+def measure_families(size: int) -> int:
+    """Print the CPU time of each family at a size and at twice the size; return the number of defects."""
+    defects = 0
+    with tempfile.TemporaryDirectory(dir=FOLDER) as folder:
+        path = Path(folder) / "r.csv"
+        for name, write in FAMILIES.items():
+            times = []
+            for length in (size, 2 * size):
+                path.write_bytes(write(length).encode())
+                times.append(reading_seconds(preview, path, 2))
+            grows = times[1] > max(0.05, LARGEST_RATIO * times[0])
+            defects += grows
+            print(f"{name:44} {times[0]:8.3f} s {times[1]:8.3f} s{'  DEFECT' if grows else ''}", flush=True)
+    return defects
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0, help="of all formats together")
     parser.add_argument("--cases", type=int, help="of each format, in place of --seconds")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--suffix", nargs="*", default=[each for each in SUFFIXES if corpus(each)])
+    parser.add_argument("--families", type=int, metavar="BYTES", help="time of costly files of this size")
     options = parser.parse_args()
+    if options.families:
+        return 1 if measure_families(options.families) else 0
     count, defects = dict.fromkeys(options.suffix, 0), []
     for suffix in options.suffix:
         until = time.monotonic() + options.seconds / len(options.suffix)
