@@ -26,7 +26,7 @@ def diagnose(name: str) -> Diagnosis:
 
 def causes(found: Diagnosis) -> tuple[Finding, ...]:
     """Return the named effects except for the noise."""
-    return tuple(each for each in found.effects if each.explained_fraction is not None)
+    return found.causes
 
 
 def names(found: Diagnosis) -> list[str]:

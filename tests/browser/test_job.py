@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.job import JobOutcome, JobState
+from islands_service.domain.job import JobOutcome, JobState, ProgressReport
 from support.played import advance, squared_error, stored
 from support.processes import eventually
 from support.screen import Screen
@@ -108,6 +108,32 @@ def test_a_running_job_is_cancelling_until_its_coordinator_stops(
         store.leases.finish(lease, JobOutcome(JobState.CANCELLED))
     expect(page.locator(".title .state")).to_have_text("cancelled")
     expect(page.locator(".status .progress-text")).to_have_text("10 / 500")
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("state", [JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED])
+def test_an_ended_job_shows_no_note_and_no_phase_of_its_attempts(
+    quiet: Callable[..., Screen], desk: Service, expect: Any, state: JobState
+) -> None:
+    reason, note = "the disk was full", "waiting for capacity"
+    job = desk.submit(500, name="piezo")
+    screen = quiet(desk.url)
+    page = screen.go(f"#/jobs/{job}")
+    body = page.locator("body")
+    with stored(desk) as store:
+        store.leases.postpone(taken(store, job), reason, 0.0)
+        expect(body).to_contain_text(reason)
+        lease = taken(store, job)
+        store.leases.report(lease, ProgressReport({"phase": "waiting", "note": note}))
+        expect(body).to_contain_text(note)
+        store.leases.finish(lease, JobOutcome(state, problem=PROBLEM if state == JobState.FAILED else None))
+    expect(page.locator(".title .state")).to_have_text(state)
+    for text in (reason, note):
+        expect(body).not_to_contain_text(text)
+    screen.go("#/")
+    expect(body).to_contain_text("piezo")
+    for text in (reason, note):
+        expect(body).not_to_contain_text(text)
 
 
 @pytest.mark.nightly

@@ -36,7 +36,7 @@ _CAPTIONS = {
 }
 
 
-#: Sentence for a record in which only sampling and noise effects were found.
+#: Sentence for "nothing" if properties of the noise were found.
 _NOISE = "No significant discrepancy: the simulation is correct within the noise, whose kind was identified."
 
 
@@ -76,8 +76,7 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
 
 
 def _verdict(found: Diagnosis) -> str:
-    has_noise = found.verdict == Verdict.NOTHING and bool(found.effects)
-    return _NOISE if has_noise else _VERDICTS[found.verdict]
+    return _NOISE if found.verdict == Verdict.NOTHING and found.noise else _VERDICTS[found.verdict]
 
 
 def _floor(found: Diagnosis) -> str:

@@ -89,6 +89,16 @@ class Diagnosis:
     shape: EffectShape | None = None
 
     @property
+    def causes(self) -> tuple[Finding, ...]:
+        """The named causes, the most important first."""
+        return tuple(each for each in self.effects if each.explained_fraction is not None)
+
+    @property
+    def noise(self) -> tuple[Finding, ...]:
+        """The properties of the noise. They are no discrepancy: alone they leave the verdict "nothing"."""
+        return tuple(each for each in self.effects if each.explained_fraction is None)
+
+    @property
     def held_out_part(self) -> str:
         """Name of the hold-out part in a sentence."""
         if not self.record.held_out:

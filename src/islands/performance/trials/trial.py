@@ -152,18 +152,14 @@ def run_trial(trial: Trial) -> TrialOutcome:
     simulated = CASES[trial.core]
     faulty, simulator = _draw_record(trial, simulated)
     found = diagnose(faulty.record, simulator, simulated.tolerance, trial.seed)
-    causes = [
-        each
-        for each in found.effects
-        if each.explained_fraction is not None and each.name != model_form.CORE_SHAPE
-    ]
+    causes = [each for each in found.causes if each.name != model_form.CORE_SHAPE]
     use_oracle = trial.oracle and trial.effects
     return TrialOutcome(
         trial,
         faulty.misfit,
         str(found.verdict),
         tuple(finding.name for finding in causes),
-        tuple(finding.name for finding in found.effects if finding.explained_fraction is None),
+        tuple(finding.name for finding in found.noise),
         tuple(finding.equivalents for finding in causes),
         tuple(each.name for each in found.candidates if each.name != model_form.CORE_SHAPE)[:3],
         causes[0].confidence if causes else 0.0,

@@ -108,7 +108,7 @@ def test_recorded_output_can_be_diagnosed(record: Dataset) -> None:
         record, y=simulated + 0.5 * record.time / record.time[-1] + 0.01 * np.sin(37.0 * record.time**2)
     )
     found = diagnose(drifted, RecordedOutput("theirs", simulated))
-    assert [each.name for each in found.effects if each.explained_fraction is not None] == ["linear-drift"]
+    assert [each.name for each in found.causes] == ["linear-drift"]
     assert found.effects[0].parameters["c"].value == pytest.approx(0.5, rel=0.05)
 
 

@@ -39,7 +39,7 @@ def run(record: Dataset) -> Diagnosis:
 
 
 def name_causes(found: Diagnosis) -> list[str]:
-    return [each.name for each in found.effects if each.explained_fraction is not None]
+    return [each.name for each in found.causes]
 
 
 @pytest.mark.ci

@@ -62,6 +62,18 @@ def test_report_says_which_effects_are_not_claimed_as_causes(diagnosis: Diagnosi
 
 
 @pytest.mark.ci
+def test_noise_alone_is_no_discrepancy_and_no_cause(diagnosis: Diagnosis) -> None:
+    (cause,) = diagnosis.causes
+    noise = replace(cause, name="coloured-noise", explained_fraction=None)
+    both = replace(diagnosis, effects=(cause, noise))
+    assert (both.causes, both.noise) == ((cause,), (noise,))
+    alone = replace(diagnosis, verdict=Verdict.NOTHING, effects=(noise,))
+    assert summarise(alone).startswith("No significant discrepancy: ")
+    assert "whose kind was identified" in summarise(alone)
+    assert "whose kind was identified" not in summarise(replace(alone, effects=()))
+
+
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("value", "written"),
     [

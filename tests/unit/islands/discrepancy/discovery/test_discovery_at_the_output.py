@@ -68,7 +68,7 @@ def test_missing_term_of_a_recorded_output_is_found(law: str) -> None:
     assert found.discovery is not None
     assert law in found.discovery.equations
     assert "y_sim is the simulated output" in found.discovery.equations
-    assert [each.name for each in found.effects if each.explained_fraction is not None] == ["missing-term"]
+    assert [each.name for each in found.causes] == ["missing-term"]
     assert found.gain is not None
     assert found.gain.after.rmse == pytest.approx(0.1, rel=0.1)
 

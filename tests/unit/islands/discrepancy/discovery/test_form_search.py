@@ -88,7 +88,7 @@ def lag_unevenly(signal: np.ndarray, falling: float, rising: float) -> np.ndarra
 
 def assert_uneven_lag(found: islands.Diagnosis, name: str, falling: float, rising: float) -> None:
     assert str(found.verdict) == "family"
-    (form,) = [each for each in found.effects if each.explained_fraction is not None]
+    (form,) = found.causes
     assert (form.name, form.family) == (name, "timing")
     values = [form.parameters[f"{side} slowly"].value for side in ("falling", "rising")]
     assert values == [pytest.approx(falling, rel=0.1), pytest.approx(rising, rel=0.1)]
