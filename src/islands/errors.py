@@ -1,9 +1,13 @@
 """Base classes of all deliberate errors. A message says what is wrong, where, and what to do."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 from typing import TypeVar
 
 T = TypeVar("T")
+
+#: Number of characters of an unknown name that are compared: a request may contain a name of a megabyte.
+_MAX_COMPARED = 200
 
 
 class IslandsError(Exception):
@@ -22,6 +26,19 @@ class SettingsError(IslandsError):
     """A setting is unknown, out of range, or contradicts another setting."""
 
 
+def suggest(name: str, known: Iterable[str]) -> str:
+    """Return the end of a message about an unknown name: which known names are similar.
+
+    Returns
+    -------
+    str
+        ``. Did you mean 'narx'?`` with up to three names, the most similar first; empty if none is similar.
+    """
+    names = {each.lower(): each for each in known}
+    close = get_close_matches(str(name)[:_MAX_COMPARED].lower(), names)
+    return f". Did you mean {', '.join(repr(names[each]) for each in close)}?" if close else ""
+
+
 def lookup(table: Mapping[str, T], name: str, kind: str) -> T:
     """Return an entry of a table by name.
 
@@ -33,10 +50,10 @@ def lookup(table: Mapping[str, T], name: str, kind: str) -> T:
     Raises
     ------
     SettingsError
-        The name is unknown. The message lists the names of the table.
+        The name is unknown. The message lists the names of the table, and suggests similar ones.
     """
     if name not in table:
-        raise SettingsError(f"unknown {kind} {name!r}: take one of {', '.join(table)}")
+        raise SettingsError(f"unknown {kind} {name!r}: take one of {', '.join(table)}{suggest(name, table)}")
     return table[name]
 
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.data.dataset import Dataset
 from islands.distribution import describe_missing_extra
-from islands.errors import IslandsError, SettingsError
+from islands.errors import IslandsError, SettingsError, suggest
 from islands.facade.fit import fit
 from islands.facade.identify import identify
 from islands.model.candidate_library import get_library
@@ -134,7 +134,9 @@ class IslandsRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2, estimator=self
         )
         if self.start not in STARTS:
-            raise ValueError(f"start is one of {', '.join(STARTS)}, got {self.start!r}")
+            raise ValueError(
+                f"start is one of {', '.join(STARTS)}, got {self.start!r}{suggest(self.start, STARTS)}"
+            )
         names = tuple(getattr(self, "feature_names_in_", [f"x{place + 1}" for place in range(u.shape[1])]))
         try:
             record = Dataset(u, output, self.dt, names, _name_output(names))

@@ -283,12 +283,16 @@ def test_upload_with_an_output_only_is_checked(service):
 
 #: Invalid jobs: changed fields, type of the problem, and parts of its message.
 INVALID_JOBS = {
-    "unknown preset": ({"preset": "magic"}, "invalid-settings", ("magic", "hysteresis", "narx")),
+    "unknown preset": (
+        {"preset": "narxx"},
+        "invalid-settings",
+        ("narxx", "hysteresis", "Did you mean 'narx'?"),
+    ),
     "no islands": ({"settings": {"islands": 0}}, "invalid-settings", ("islands is at least 1, got 0",)),
     "unknown primitive": (
         {"settings": {"primitives": ["mul", "sinh"]}},
         "invalid-settings",
-        ("primitive", "sinh", "mul"),
+        ("primitive", "sinh", "mul", "Did you mean 'sin'"),
     ),
     "generations": (
         {"settings": {"generations": 1e12}},
@@ -305,14 +309,23 @@ INVALID_JOBS = {
     "no column": (
         {"output": "y_m"},
         "invalid-record",
-        ("record.csv has no column y_m; it has t_s, u_V, y_um", "Did you mean y_um?"),
+        ("record.csv has no column y_m; it has t_s, u_V, y_um", "Did you mean 'y_um'?"),
     ),
     "unknown setting": (
         {"settings": {"islnds": 2}},
         "invalid-request",
-        ("/settings/islnds", "not permitted"),
+        ("/settings/islnds", "not permitted", "Did you mean 'islands'?"),
     ),
-    "unknown field": ({"presset": "narx"}, "invalid-request", ("/presset", "not permitted")),
+    "unknown field": (
+        {"presset": "narx"},
+        "invalid-request",
+        ("/presset", "not permitted", "Did you mean 'preset'?"),
+    ),
+    "unknown topology": (
+        {"settings": {"topology": "tours"}},
+        "invalid-settings",
+        ("Did you mean 'torus'?",),
+    ),
 }
 
 

@@ -21,7 +21,8 @@ def percentages(scores: dict[str, Any]) -> dict[str, float]:
 
 
 def test_invalid_trials_are_rejected() -> None:
-    assert "cannot inject gravity" in fail("trials", "--effects", "gravity")
+    assert "unknown effect 'delya'" in (message := fail("trials", "--effects", "delya"))
+    assert "Did you mean 'delay'" in message
     assert "unknown noise 'purple'" in fail("trials", "--noise", "purple")
     assert "unknown core 'gravity'" in fail("trials", "--core", "gravity")
     assert "2 effects at once" in fail("trials", "--effects", "offset", "--pairs", 1)

@@ -130,7 +130,7 @@ REFUSED = {
         "/input: a simulation is driven by one input: give the others as channels",
     ),
     "unknown input": ({"input": "u"}, "invalid-record", "record.csv has no column u; it has t_s, u_V, y_um"),
-    "unknown output": ({"output": "y_m"}, "invalid-record", "Did you mean y_um?"),
+    "unknown output": ({"output": "y_m"}, "invalid-record", "Did you mean 'y_um'?"),
     "unknown channel": ({"channels": ["T_K"]}, "invalid-record", "has no column T_K"),
     "channel is input": ({"channels": ["u_V"]}, "invalid-record", "channel u_V is the input itself"),
     "channel is early input": ({"channels": ["u_V+1"]}, "invalid-record", "u_V is given as an input twice"),
@@ -150,6 +150,16 @@ REFUSED = {
         {"simulation": {"kind": "python", "file": "model.py", "function": "run"}},
         "invalid-request",
         "/simulation: Input tag 'python'",
+    ),
+    "mistyped kind": (
+        {"simulation": {"kind": "second-oder"}},
+        "invalid-request",
+        "Did you mean 'second-order'?",
+    ),
+    "mistyped parameter": (
+        {"simulation": {"kind": "linear", "order": 1, "dealy": 2}},
+        "invalid-request",
+        "/simulation/linear/dealy: Extra inputs are not permitted. Did you mean 'delay'?",
     ),
     "no simulation": ({"simulation": None}, "invalid-request", "/simulation: "),
     "no number": (
@@ -186,7 +196,11 @@ REFUSED = {
         "and 50000 is the most",
     ),
     "rows": ({"rows": "5"}, "invalid-request", "/rows: cannot read the rows"),
-    "unknown field": ({"inputs": ["u_V"]}, "invalid-request", "/inputs: Extra inputs are not permitted"),
+    "unknown field": (
+        {"inputs": ["u_V"]},
+        "invalid-request",
+        "Extra inputs are not permitted. Did you mean 'input'",
+    ),
 }
 
 

@@ -301,7 +301,7 @@ ODD_FILES = (
         "unknown column",
         "r.csv",
         text(table()),
-        ("r.csv has no column u_v", "Did you mean u_V?"),
+        ("r.csv has no column u_v", "Did you mean 'u_V'?"),
         columns=("u_v", "y_um"),
     ),
 )

@@ -82,7 +82,7 @@ def is_generated(page: str) -> bool:
 def commands(page: Path) -> Iterator[str]:
     """Yield the commands of a page that begin with ``islands`` or ``make``: in blocks and in inline code.
 
-    In inline code ``islands`` may be left out before a command with an option, such as ``fit --library auto``.
+    In inline code ``islands`` may be left out before a command with an option: ``fit --library auto``.
     """
     shell = [code for language, code in blocks(page) if language in ("", "sh", "bash", "console")]
     inline = re.findall(r"`([^`\n]+)`", prose(page))

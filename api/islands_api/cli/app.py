@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Mapping
-from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
@@ -13,7 +12,7 @@ from rich.markup import escape
 from typer.core import TyperCommand, TyperGroup
 
 from islands.distribution import describe_missing_extra, read_version
-from islands.errors import IslandsError, SettingsError
+from islands.errors import IslandsError, SettingsError, suggest
 from islands_api.cli.console import errors, exit_with_closed_output
 from islands_api.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
 from islands_api.cli.stop_requests import exit_code, raise_on_signals
@@ -94,8 +93,8 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command of the arguments; for an unknown name, an error suggests similar ones."""
-        if args[0] not in COMMANDS and (close := get_close_matches(args[0], COMMANDS)):
-            ctx.fail(f"No such command {args[0]!r}. Did you mean {', '.join(map(repr, close))}?")
+        if args[0] not in COMMANDS and (similar := suggest(args[0], COMMANDS)):
+            ctx.fail(f"No such command {args[0]!r}{similar}")
         return super().resolve_command(ctx, args)
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002

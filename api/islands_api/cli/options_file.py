@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from islands.errors import SettingsError
+from islands.errors import SettingsError, suggest
 
 #: File that is read from the current folder if it exists.
 DEFAULT_FILE = Path("islands.toml")
@@ -59,6 +59,7 @@ def match_options(command: Any, table: Any, path: Path, title: str) -> dict[str,
     if unknown := [name for name in table if name not in known]:
         raise SettingsError(
             f"{path}, [{title}]: there is no option {unknown[0]!r}; it has {', '.join(sorted(known))}"
+            f"{suggest(unknown[0], known)}"
         )
     if commands is not None:
         return {

@@ -4,15 +4,18 @@ from collections.abc import Mapping, Sequence
 from errno import EDQUOT, ENOSPC
 from http import HTTPStatus
 from math import ceil
+from typing import Any
 
 import structlog
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
+from pydantic_core import ErrorDetails
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.routing import Match
 
 from islands.errors import IslandsError
+from islands.io.document_problems import explain_problem
 from islands_api.oidc.bearer_token import TokenRefusedError
 from islands_api.web.problems import (
     MEDIA_TYPE,
@@ -109,8 +112,10 @@ def _public_detail(error: Exception) -> str:
 async def _handle_invalid_request(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     invalid = error.errors()
+    body = getattr(request.scope.get("route"), "body_field", None)
+    form = None if body is None else body.field_info.annotation
     errors = [
-        {"pointer": _format_pointer(entry["loc"]), "detail": _format_message(entry["msg"])}
+        {"pointer": _format_pointer(entry["loc"]), "detail": _format_message(entry, form)}
         for entry in invalid[:_MAX_ERRORS]
     ]
     detail = "; ".join(f"{entry['pointer']}: {entry['detail']}" for entry in errors)
@@ -119,11 +124,12 @@ async def _handle_invalid_request(request: Request, error: Exception) -> JSONRes
     return problem_response(request, lookup_problem(error), detail, errors)
 
 
-def _format_message(message: str) -> str:
+def _format_message(problem: ErrorDetails, form: Any) -> str:
     # The framework's message for a form part without a file name.
-    if "Expected UploadFile" in message:
+    if "Expected UploadFile" in problem["msg"]:
         return "not a file: send a file with a file name"
-    return message.removeprefix("Value error, ")
+    kind, *place = problem["loc"]
+    return explain_problem({**problem, "loc": tuple(place)} if kind == "body" else problem, form)
 
 
 def _format_pointer(location: Sequence[int | str]) -> str:

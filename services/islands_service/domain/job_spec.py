@@ -20,6 +20,7 @@ from pydantic import (
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings, get_text_type
+from islands.io.document_problems import find_problem
 from islands.io.simulator_spec.specification import ColumnSpec, SimulationSpec, innermost
 
 S = TypeVar("S", bound=BaseModel)
@@ -226,8 +227,7 @@ def parse_document(form: type[S], document: Mapping[str, Any]) -> S:
     try:
         return form.model_validate(document)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"]))
+        problem = ": ".join(find_problem(error, form))
         raise SettingsError(
-            f"this version of islands cannot read the job ({where}: {first['msg']}): submit it again"
+            f"this version of islands cannot read the job ({problem}): submit it again"
         ) from error

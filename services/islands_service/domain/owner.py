@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from islands.errors import SettingsError
+from islands.errors import SettingsError, suggest
 from islands_service.settings import ServiceSettings
 
 #: Weight of an owner for which none was set.
@@ -124,6 +124,8 @@ def check_owner_changes(changes: Mapping[str, Any]) -> None:
                     f"weight is an integer from {WEIGHTS.start} to {WEIGHTS.stop - 1}, got {value}"
                 )
         elif name not in QUOTA_NAMES:
-            raise SettingsError(f"{name} is no quota: take one of {', '.join(QUOTA_NAMES)}")
+            raise SettingsError(
+                f"{name} is no quota: take one of {', '.join(QUOTA_NAMES)}{suggest(name, QUOTA_NAMES)}"
+            )
         elif value is not None and not 0 <= value <= MAX_QUOTA:
             raise SettingsError(f"{name} is an integer of at least 0, got {value}")

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from islands.errors import RecordError, SettingsError
+from islands.errors import RecordError, SettingsError, suggest
 from islands_service.intake.confined_process import (
     ENVIRONMENT,
     check_status,
@@ -214,7 +214,9 @@ def _check_usable(problems: Mapping[str, str], request: InspectionRequest) -> No
     for name in (*request.inputs, *([] if request.output is None else [request.output])):
         source = find_column(name, problems)
         if source not in problems:
-            raise RecordError(f"the record has no column {name}; it has {', '.join(problems)}")
+            raise RecordError(
+                f"the record has no column {name}; it has {', '.join(problems)}{suggest(name, problems)}"
+            )
         if problems[source]:
             raise RecordError(problems[source])
 

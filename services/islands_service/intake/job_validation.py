@@ -9,7 +9,7 @@ from math import prod
 from typing import Any
 
 from islands.data.compatibility import check_dt
-from islands.errors import RecordError, SettingsError
+from islands.errors import RecordError, SettingsError, suggest
 from islands.io.models import model_from_json
 from islands.io.records.column_names import find_column
 from islands.io.records.row_range import overlap, parse_rows
@@ -170,7 +170,9 @@ def _check_parameters(core: PhysicalSpec, tolerance: Mapping[str, float]) -> Non
     known = SIMULATORS[core.kind].parameters
     for name in (*core.parameters, *tolerance):
         if name not in known and not name.startswith("initial "):
-            raise SettingsError(f"{core.kind} has no parameter {name!r}: it has {', '.join(known)}")
+            raise SettingsError(
+                f"{core.kind} has no parameter {name!r}: it has {', '.join(known)}{suggest(name, known)}"
+            )
 
 
 def _written_out_length(term: Any) -> int:

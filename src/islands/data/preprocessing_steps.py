@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from typing import Any
 
-from islands.errors import SettingsError
+from islands.errors import SettingsError, suggest
 
 #: Values of ``detrend``.
 DETREND = ("none", "constant", "linear")
@@ -43,7 +43,9 @@ class PreprocessingSteps:
         if self.decimate < 1:
             raise SettingsError(f"decimate is a number of samples from 1 on, got {self.decimate}")
         if self.detrend not in DETREND:
-            raise SettingsError(f"detrend is {' or '.join(DETREND)}, got {self.detrend!r}")
+            raise SettingsError(
+                f"detrend is {' or '.join(DETREND)}, got {self.detrend!r}{suggest(self.detrend, DETREND)}"
+            )
 
     @property
     def is_none(self) -> bool:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 
 from islands.distribution import describe_missing_extra
-from islands.errors import SettingsError
+from islands.errors import SettingsError, lookup
 from islands.evolution.engine import Engine, SerialEngine
 from islands.evolution.progress import ProgressCallback, ignore_progress
 
@@ -75,8 +75,7 @@ def open_engine(
         yield SerialEngine()
         return
     installed = {each.name: each for each in entry_points(group=GROUP)}
-    if name not in installed:
-        raise SettingsError(f"unknown engine {name!r}: take one of {', '.join(['serial', *installed])}")
+    lookup({"serial": None, **installed}, name, "engine")
     with ExitStack() as stack:
         try:
             engine = stack.enter_context(installed[name].load()(address, progress, cpus))

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
+from islands.io.document_problems import find_problem
 from islands.io.result_models import read_preprocessing
 from islands.model.equations import equation, latex_equation
 from islands.model.expression import Primitive
@@ -79,7 +80,7 @@ def model_json(model: Model) -> str:
     try:
         document = ModelDocument.model_validate(fields)
     except ValidationError as error:
-        raise ModelError(f"the model cannot be written: {_first_problem(error)}") from error
+        raise ModelError(f"the model cannot be written: {_explain(error)}") from error
     # Models of measured signals have the files of earlier versions.
     left_out = {"preprocessing"} if model.preprocessing is None else None
     return document.model_dump_json(by_alias=True, indent=2, exclude=left_out) + "\n"
@@ -145,7 +146,7 @@ def model_from_json(
     try:
         document = ModelDocument.model_validate_json(text)
     except ValidationError as error:
-        raise ModelError(f"{name} is not a model file of schema {SCHEMA}: {_first_problem(error)}") from error
+        raise ModelError(f"{name} is not a model file of schema {SCHEMA}: {_explain(error)}") from error
     terms: dict[Regressor, tuple[float | None, float | None]] = {}
     for position, term in enumerate(document.terms):
         where = f"{name}: terms.{position}"
@@ -171,11 +172,9 @@ def model_from_json(
         raise ModelError(f"{name}: inputs: {error}") from error
 
 
-def _first_problem(error: ValidationError) -> str:
-    """Return the first invalid field and its validation message."""
-    problem = error.errors(include_url=False)[0]
-    where = ".".join(str(part) for part in problem["loc"]) or "the file"
-    return f"{where}: {problem['msg']}"
+def _explain(error: ValidationError) -> str:
+    where, message = find_problem(error, ModelDocument)
+    return f"{where or 'the file'}: {message}"
 
 
 def _parse_regressor(text: str, primitives: Mapping[str, Primitive], where: str) -> tuple[float, Regressor]:

@@ -8,7 +8,7 @@ import re
 import sys
 from collections.abc import Mapping, Sequence
 
-from islands.errors import ModelError
+from islands.errors import ModelError, suggest
 from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, Shift
 from islands.model.primitives import ADD, MUL, PRIMITIVES
 from islands.model.rendering import LARGEST_POWER
@@ -113,7 +113,7 @@ def _read_call(name: str, arguments: Sequence[ast.expr], primitives: Mapping[str
     if name not in primitives:
         raise ModelError(
             f"unknown function {name!r}: take one of {', '.join(primitives)}, or pass your own primitive in "
-            f"primitives=islands.PRIMITIVES | {{{name!r}: ...}}"
+            f"primitives=islands.PRIMITIVES | {{{name!r}: ...}}{suggest(name, primitives)}"
         )
     primitive = primitives[name]
     variadic = primitive in (ADD, MUL) and len(arguments) > 1

@@ -22,7 +22,7 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.errors import RecordError, SettingsError
+from islands.errors import RecordError, lookup
 
 #: Length of a training or validation record in samples.
 SAMPLES = 500
@@ -131,11 +131,10 @@ def soft_input(seed: int, scaling: str = "rescaled", samples: int = SAMPLES) -> 
     SettingsError
         The scaling is unknown.
     """
-    if scaling not in SCALINGS:
-        raise SettingsError(f"no scaling {scaling!r}: take one of {', '.join(SCALINGS)}")
+    scale = lookup(SCALINGS, scaling, "scaling")
     noise = np.sqrt(SOFT_VARIANCE) * _draw(seed, _SOFT_INPUT, samples)
     filtered: Signal = scipy.signal.lfilter([1.0], np.poly(POLES), noise)
-    return SCALINGS[scaling](filtered)
+    return scale(filtered)
 
 
 def white_input(seed: int, samples: int = SAMPLES) -> Signal:

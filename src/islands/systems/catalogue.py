@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.errors import SettingsError
+from islands.errors import SettingsError, lookup
 from islands.systems import appendix, bouc_wen, signals
 from islands.systems.bouc_wen import AUTHORS_SEED, DT
 
@@ -118,15 +118,9 @@ def make_record(name: str, variant: str, part: str, seed: int = 0) -> Dataset:
     SettingsError
         A name is unknown (the message lists the known names), or the seed is negative.
     """
-    _check_name("system", name, tuple(SYSTEMS))
-    system = SYSTEMS[name]
-    _check_name(f"variant of {name}", variant, system.variants)
-    _check_name(f"part of {name}", part, system.parts)
+    system = lookup(SYSTEMS, name, "system")
+    lookup(dict.fromkeys(system.variants), variant, f"variant of {name}")
+    lookup(dict.fromkeys(system.parts), part, f"part of {name}")
     if seed < 0:
         raise SettingsError(f"a seed must not be negative, got {seed}")
     return system.make(variant, part, seed)
-
-
-def _check_name(kind: str, name: str, known: tuple[str, ...]) -> None:
-    if name not in known:
-        raise SettingsError(f"no {kind} is called {name!r}: there is {', '.join(known)}")

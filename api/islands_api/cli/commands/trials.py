@@ -159,11 +159,8 @@ def _report_case(core: str, simulated: SimulatedCase, outcomes: Sequence[TrialOu
 def _select_effects(effects: list[str] | None, simulated: SimulatedCase) -> list[str]:
     if not effects or effects == ["all"]:
         return list(simulated.nameable)
-    unknown = set(effects) - set(simulated.system.known)
-    if unknown:
-        raise SettingsError(
-            f"cannot inject {', '.join(sorted(unknown))}: choose from {', '.join(simulated.system.known)}"
-        )
+    for name in effects:
+        lookup(dict.fromkeys(simulated.system.known), name, "effect")
     return effects
 
 

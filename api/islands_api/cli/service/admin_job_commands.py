@@ -6,7 +6,7 @@ import typer
 from rich.table import Column, Table
 from rich.text import Text
 
-from islands.errors import SettingsError
+from islands.errors import lookup
 from islands_api.cli.console import output
 from islands_api.cli.service.store_options import COMMAND_LINE, Database, DataDir, open_store
 from islands_service.domain.job import JobState
@@ -23,9 +23,7 @@ def list_jobs(
     database: Database = None,
 ) -> None:
     """List the jobs of all owners, newest first."""
-    if state is not None and state not in list(JobState):
-        raise SettingsError(f"--state {state} is no state of a job: take one of {', '.join(JobState)}")
-    wanted = None if state is None else JobState(state)
+    wanted = None if state is None else lookup({str(each): each for each in JobState}, state, "state")
     with open_store(data_dir, database) as store:
         found = store.jobs.page(owner, wanted, None, limit).jobs
     table = Table(

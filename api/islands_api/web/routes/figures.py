@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import structlog
 from fastapi import APIRouter, Path, Response
 
-from islands.errors import IslandsError
+from islands.errors import IslandsError, suggest
 from islands_api.schemas import Names
 from islands_api.web.auth import Principal, Reader
 from islands_api.web.dependencies import AppState, AppStateDep
@@ -183,7 +183,9 @@ async def _list_model_figures(state: AppState, job: str) -> tuple[str, ...]:
 
 def _check_figure(figure: str, figures: tuple[str, ...]) -> None:
     if figure not in figures:
-        raise ResourceNotFoundError(f"there is no figure {figure!r}: use one of {', '.join(figures)}")
+        raise ResourceNotFoundError(
+            f"there is no figure {figure!r}: use one of {', '.join(figures)}{suggest(figure, figures)}"
+        )
 
 
 async def _figure_response(

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
+from islands.errors import suggest
 from islands_api.schemas import Health
 from islands_api.web.auth import Operator
 from islands_api.web.dependencies import AppState, AppStateDep
@@ -69,4 +70,5 @@ async def problem(
     for entry in PROBLEMS.values():
         if entry.type == kind:
             return {"type": f"/problems/{kind}", "status": int(entry.status), "title": entry.title}
-    raise ResourceNotFoundError(f"there is no problem type {kind!r}")
+    known = [entry.type for entry in PROBLEMS.values()]
+    raise ResourceNotFoundError(f"there is no problem type {kind!r}{suggest(kind, known)}")

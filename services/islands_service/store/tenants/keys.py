@@ -9,7 +9,7 @@ from typing import Any
 
 from sqlalchemy import Column, Connection, Row, func, insert, or_, select, update
 
-from islands.errors import IslandsError, SettingsError
+from islands.errors import IslandsError, SettingsError, suggest
 from islands_service.domain.job import Requester
 from islands_service.store.audit import Action, record_change
 from islands_service.store.backends import dialect
@@ -94,10 +94,11 @@ class Keys:
         SettingsError
             A scope is unknown, no scope is given, or the name or the owner is too long.
         """
-        if not scopes or not scopes <= set(SCOPES):
+        unknown = sorted(scopes - set(SCOPES))
+        if unknown or not scopes:
             raise SettingsError(
-                f"unknown scopes {', '.join(sorted(scopes - set(SCOPES))) or '(none)'}: take some of "
-                f"{', '.join(SCOPES)}"
+                f"unknown scopes {', '.join(unknown) or '(none)'}: take some of {', '.join(SCOPES)}"
+                f"{suggest(unknown[0], SCOPES) if unknown else ''}"
             )
         _check_length("name", name, keys.c.name)
         _check_length("owner", owner or "", keys.c.owner)

@@ -10,7 +10,7 @@ from uuid import uuid4
 
 from sqlalchemy import Connection, Row, delete, func, insert, select
 
-from islands.errors import SettingsError
+from islands.errors import SettingsError, suggest
 from islands_service.domain.job import QuotaError, Requester
 from islands_service.domain.webhook import EVENT_NAMES, Delivery, Webhook, WebhookNotFoundError
 from islands_service.store.audit import Action, record_change
@@ -61,10 +61,11 @@ class Webhooks:
         QuotaError
             The owner has ``most`` webhooks.
         """
-        if not events or not set(events) <= set(EVENT_NAMES):
+        unknown = [name for name in events if name not in EVENT_NAMES]
+        if unknown or not events:
             raise SettingsError(
-                f"unknown events {', '.join(map(str, events)) or '(none)'}: take some of "
-                f"{', '.join(EVENT_NAMES)}"
+                f"unknown events {', '.join(map(str, unknown)) or '(none)'}: take some of "
+                f"{', '.join(EVENT_NAMES)}{suggest(unknown[0], EVENT_NAMES) if unknown else ''}"
             )
         secret = SECRET_PREFIX + base64.b64encode(secrets.token_bytes(_SECRET_BYTES)).decode()
 

@@ -14,7 +14,7 @@ from islands.discrepancy.interfaces.effect import Effect, SimulationContext, Sit
 from islands.discrepancy.interfaces.segments import fill_gaps, is_resting, split_at_gaps
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.errors import RecordError, SettingsError
+from islands.errors import RecordError, SettingsError, suggest
 
 #: Fraction of the record, at its end, that is reserved for hold-out validation.
 HOLDOUT_FRACTION = 0.25
@@ -107,6 +107,7 @@ def validate_prior(tolerance: Mapping[str, float], simulator: Simulator) -> Mapp
         if name not in nominal:
             raise SettingsError(
                 f"{simulator.name} has no parameter {name!r}: it has {', '.join(nominal) or 'none'}"
+                f"{suggest(name, nominal)}"
             )
         if not 0.0 < value < 1.0:
             raise SettingsError(

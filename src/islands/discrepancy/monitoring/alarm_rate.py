@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from islands.errors import SettingsError
+from islands.errors import SettingsError, suggest
 
 #: Default rate.
 DEFAULT_RATE = "1 per month"
@@ -42,6 +42,7 @@ def parse_alarm_rate(text: str, interval: float) -> float:
         raise SettingsError(
             f"{text!r} is no rate of false alarms: write NUMBER per UNIT, such as 1 per month or 1 per 720 "
             f"records; the units are {', '.join(known)}"
+            f"{suggest(match[3], known) if match else ''}"
         ) from None
     if not 0.0 < per_record < 1.0:
         raise SettingsError(

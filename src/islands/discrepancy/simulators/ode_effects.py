@@ -14,7 +14,7 @@ from islands.discrepancy.effects.baseline import input_offset
 from islands.discrepancy.effects.nonlinearity import outflow_law, state_clip
 from islands.discrepancy.effects.time_variation import GAIN_EFFECTS
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Signal, SimulationContext, Site
-from islands.errors import ModelError
+from islands.errors import ModelError, suggest
 from islands.systems.mechanics import WIDTH
 from islands.systems.ode.equation_parser import FORCE, parse_expression
 from islands.systems.ode.ode_expression import OdeExpression, Operation, Symbol, substitute
@@ -79,6 +79,7 @@ def find_effects(system: OdeSystem, sizes: Mapping[str, float]) -> tuple[frozens
             raise ModelError(
                 f"[effects] {each.name}: there is no such effect: take input-offset:NAME, outflow-law:NAME, "
                 f"{', '.join(sorted(_SUPPORTED))}, each with equation and term, or state-clip:STATE"
+                f"{suggest(cause, ('input-offset', 'outflow-law', 'state-clip', *_SUPPORTED))}"
             )
     return frozenset(supported), tuple(found)
 

@@ -12,7 +12,7 @@ from islands.discrepancy.interfaces.coordinates import input_coordinate
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import add_output_forces
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.errors import RecordError, SettingsError
+from islands.errors import RecordError, SettingsError, suggest
 
 #: Typical change of a parameter, relative to its value.
 _SCALE = 0.01
@@ -51,8 +51,11 @@ class PythonFunctionSimulator:
                 f"the arguments of {self.name} are unknown: wrap it in a Python function"
             ) from error
         defaults = {each.name: each.default for each in arguments[2:]}
-        if unknown := self.given.keys() - defaults.keys():
-            raise SettingsError(f"{self.name} has no parameter {', '.join(sorted(unknown))}")
+        if unknown := sorted(self.given.keys() - defaults.keys()):
+            raise SettingsError(
+                f"{self.name} has no parameter {', '.join(unknown)}: it has {', '.join(defaults) or 'none'}"
+                f"{suggest(unknown[0], defaults)}"
+            )
         for name, value in defaults.items():
             if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
                 raise SettingsError(

@@ -8,7 +8,7 @@ import numpy as np
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import Signal, SimulationContext
-from islands.errors import RecordError
+from islands.errors import RecordError, suggest
 from islands.systems.ode.sampled_signal import SampledSignal, interpolate_linearly
 
 
@@ -31,6 +31,7 @@ def find_channel(name: str, record: Dataset, reader: str) -> str:
         raise RecordError(
             f"{reader} the channel {name}, and the channels of the record are {others}: give its column as "
             f"a channel, and name it {name} there"
+            f"{suggest(name, record.input_names[1:])}"
         )
     return found[0]
 

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Mapping
 from math import isfinite
 
-from islands.errors import ModelError, SettingsError
+from islands.errors import ModelError, SettingsError, suggest
 from islands.estimation.constraints.constraint_parts import (
     FixedPoint,
     LinearEquality,
@@ -75,7 +75,7 @@ def _parse_statement(statement: str, names: Mapping[str, tuple[Part, ...]]) -> P
             return make(statement, match)
     raise SettingsError(
         f"unknown constraints {statement[:80]!r}: take one of {', '.join(names)}, or a statement such as "
-        + "; ".join(FORMS)
+        f"{'; '.join(FORMS)}{suggest(statement, names)}"
     )
 
 

@@ -9,7 +9,7 @@ from islands.data.averaging import AUTO, average_samples
 from islands.data.coupled_record import CoupledRecord, check_outputs, couple, split_coupled
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.errors import SettingsError
+from islands.errors import SettingsError, suggest
 from islands.estimation.coupled_refinement import refine_coupled
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.engine import Engine
@@ -207,7 +207,7 @@ def _check_constraints(constraints: str | None, options: dict[str, Any]) -> None
     if constraints is not None and constraints not in CONSTRAINTS:
         raise SettingsError(
             f"the constraints {constraints!r} are for one output: with several, each equation numbers its "
-            f"inputs differently; take {', '.join(CONSTRAINTS)}"
+            f"inputs differently; take {', '.join(CONSTRAINTS)}{suggest(constraints, CONSTRAINTS)}"
         )
     if options.setdefault("feedthrough", "no") != "no":
         raise SettingsError(

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.data.dataset import Dataset, join
 from islands.data.signal_map import match_rate
-from islands.errors import RecordError, SettingsError, lookup
+from islands.errors import RecordError, SettingsError, lookup, suggest
 from islands.io.data_frames import as_record, column_names, states_time
 from islands.io.records.column_names import find_column
 from islands.model.model import Model
@@ -104,6 +104,7 @@ def record_of_model(
         raise RecordError(
             f"the record has no column {output}; it has {', '.join(known)}. A simulation starts from the "
             "first values of the output: add its column, in which the other values may be missing"
+            f"{suggest(output, known)}"
         )
     if dt is None and model.dt is not None and not states_time(data, (*inputs, output or "")):
         dt = model.dt / model.average

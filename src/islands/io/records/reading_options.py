@@ -6,7 +6,7 @@ from math import isfinite
 from typing import Any
 from zoneinfo import ZoneInfo
 
-from islands.errors import SettingsError
+from islands.errors import SettingsError, suggest
 
 #: Characters of the decimal marks by the values of ``decimal``.
 DECIMAL_MARKS = {"point": ".", "comma": ","}
@@ -117,7 +117,7 @@ class ReadingOptions:
 
 def _check_choice(option: str, value: str | None, choices: Sequence[str] | Mapping[str, str]) -> None:
     if value is not None and value not in choices:
-        raise SettingsError(f"--{option} is {' or '.join(choices)}, got {value!r}")
+        raise SettingsError(f"--{option} is {' or '.join(choices)}, got {value!r}{suggest(value, choices)}")
 
 
 def _check_timezone(name: str | None) -> None:

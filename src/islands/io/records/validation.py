@@ -2,12 +2,11 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError
+from islands.errors import RecordError, suggest
 from islands.io.records.table import Columns
 
 #: Smallest number of samples. With 30 samples the 95 % band of a residual correlation, 1.96 / sqrt(30), is
@@ -62,8 +61,8 @@ def check_choice(
     for name in (*chosen, *([] if time is None else [time])):
         if name not in names:
             raise RecordError(
-                f"{file} has no column {name}; it has "
-                f"{_list_names(names)}{_suggest(name, names)}{'; ' if others else ''}{others}"
+                f"{file} has no column {name}; it has {_list_names(names)}{'; ' if others else ''}{others}"
+                f"{suggest(name, names)}"
             )
 
 
@@ -188,12 +187,6 @@ def check_varies(columns: Columns, name: str) -> None:
             f"{rows.file}: column {name} is constant, {values[0]:.6g} from {rows.row(0)} to {rows.row(-1)}: "
             "choose a column, or rows, that vary"
         )
-
-
-def _suggest(name: str, names: Sequence[str]) -> str:
-    spelled = {known.lower(): known for known in names}
-    close = get_close_matches(name.lower(), spelled, n=1)
-    return f". Did you mean {spelled[close[0]]}?" if close else ""
 
 
 def _list_names(names: Sequence[str]) -> str:

@@ -28,7 +28,7 @@ from islands.discrepancy.simulators.output_equation import OutputEquation
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
-from islands.errors import ModelError, RecordError, SettingsError, lookup
+from islands.errors import ModelError, RecordError, SettingsError, lookup, suggest
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.document import read_scales
@@ -202,11 +202,16 @@ def make_recorded_output(spec: ColumnSpec, record: Dataset, columns: Mapping[str
 def make_python_function(spec: ProgramSpec, _record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
     """Run a Python file and make a simulator of one of its functions."""
     try:
-        function = runpy.run_path(spec.path).get(spec.function)
+        names = runpy.run_path(spec.path)
     except (Exception, SystemExit) as error:
         raise SettingsError(f"{spec.path} cannot be run: {type(error).__name__}: {error}") from error
+    function = names.get(spec.function)
     if not callable(function):
-        raise SettingsError(f"{spec.path} has no function {spec.function!r}: write python:FILE.py:FUNCTION")
+        defined = [name for name, value in names.items() if callable(value)]
+        raise SettingsError(
+            f"{spec.path} has no function {spec.function!r}: write python:FILE.py:FUNCTION"
+            f"{suggest(spec.function, defined)}"
+        )
     return PythonFunctionSimulator(function, f"{spec.path}:{spec.function}", spec.parameters)
 
 
@@ -253,9 +258,12 @@ def make_model_simulator(model: Model, name: str, record: Dataset) -> Simulator:
 
 
 def _check_parameters(entry: SimulatorEntry, given: Mapping[str, float]) -> None:
-    if unknown := given.keys() - entry.parameters.keys():
+    if unknown := sorted(given.keys() - entry.parameters.keys()):
         known = ", ".join(entry.parameters)
-        raise SettingsError(f"there is no parameter {', '.join(sorted(unknown))}: the parameters are {known}")
+        raise SettingsError(
+            f"there is no parameter {', '.join(unknown)}: the parameters are {known}"
+            f"{suggest(unknown[0], entry.parameters)}"
+        )
     for name, value in given.items():
         allowed = entry.parameters[name]
         if allowed == ParameterRange.REAL or value > 0.0:

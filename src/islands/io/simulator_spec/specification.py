@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from pydantic import ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from islands.errors import ModelError, SettingsError, lookup
+from islands.io.document_problems import find_problem
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.ode_spec import OdeSpec, OutputEquationSpec
 from islands.io.simulator_spec.spec_base import (
@@ -272,9 +273,7 @@ def parse_spec(text: str) -> LocalSpec:
     try:
         spec: LocalSpec = entry.spec.from_text(kind, arguments)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = "".join(f"{part}." for part in first["loc"])[:-1]
-        raise SettingsError(": ".join(filter(None, (text, where, first["msg"])))) from error
+        raise SettingsError(": ".join(filter(None, (text, *find_problem(error, entry.spec))))) from error
     return spec
 
 

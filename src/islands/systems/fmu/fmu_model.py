@@ -1,13 +1,12 @@
 """Simulation by an FMU: the variables that are its input, output, channels, parameters and initial values."""
 
-import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import TypeVar
 
-from islands.errors import SettingsError
+from islands.errors import SettingsError, suggest
 from islands.systems.fmu.fmi_description import FmiDescription, FmiInterface, FmiVariable
 from islands.systems.ode.equation_parser import is_free_name
 from islands.systems.ode.ode_system import OUTPUT
@@ -200,10 +199,11 @@ def _choose_one(file: str, kind: str, known: Mapping[str, FmiVariable], chosen: 
 
 
 def _find(file: str, kind: str, known: Mapping[str, T], name: str) -> T:
-    """Return the entry of a name, or raise an error that lists the nearest names."""
+    """Return the entry of a name, or raise an error that suggests similar names."""
     if name not in known:
-        near = difflib.get_close_matches(name, known, _NAMED, 0.5) or list(known)
-        raise SettingsError(f"{file} has no {kind} {name!r}: take one of {_list(near)}")
+        raise SettingsError(
+            f"{file} has no {kind} {name!r}: take one of {_list(known)}{suggest(name, known)}"
+        )
     return known[name]
 
 

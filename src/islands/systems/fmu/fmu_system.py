@@ -7,7 +7,7 @@ equations of an FMU that nothing extends are ``dx/dt = fmu(x)`` and ``output = f
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from islands.errors import ModelError
+from islands.errors import ModelError, suggest
 from islands.systems.fmu.fmu_model import FmuModel
 from islands.systems.ode.equation_parser import FORCE, Equation, parse_equations
 from islands.systems.ode.ode_expression import FMU, OdeExpression, Operation, Symbol, find_symbols, render
@@ -99,6 +99,7 @@ def _check_target(equation: Equation, system: OdeSystem) -> None:
         raise ModelError(
             f"{equation.place}: the FMU has no state {equation.target} whose initial value is estimated: "
             f"take one of {', '.join(states) or 'none, since it is a co-simulation or initial is empty'}"
+            f"{suggest(equation.target, states)}"
         )
     if equation.target == OUTPUT and not equation.is_derivative:
         return

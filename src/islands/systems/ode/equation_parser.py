@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from islands.errors import ModelError
+from islands.errors import ModelError, suggest
 from islands.systems.ode.ode_expression import (
     FMU,
     FUNCTIONS,
@@ -214,7 +214,10 @@ def _make_call(name: str, arguments: tuple[OdeExpression, ...], place: str) -> O
         case (called, (Symbol(),)) if called == FMU:
             return Operation(FMU, arguments)
     if name not in NAMED_FUNCTIONS:
-        raise ModelError(f"{place}: unknown function {name!r}: take one of {', '.join(NAMED_FUNCTIONS)}")
+        raise ModelError(
+            f"{place}: unknown function {name!r}: take one of {', '.join(NAMED_FUNCTIONS)}"
+            f"{suggest(name, NAMED_FUNCTIONS)}"
+        )
     if name in ("min", "max") and len(arguments) > 2:
         *first, last = arguments
         return Operation(name, (_make_call(name, tuple(first), place), last))

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 
-from islands.errors import ModelError
+from islands.errors import ModelError, suggest
 from islands.systems.ode.equation_parser import FORCE, TIME, check_name, parse_expression
 from islands.systems.ode.ode_expression import (
     FMU,
@@ -132,7 +131,7 @@ class OdeSystem:
         extended = replace(self, parameters=(*self.parameters, *parameters), is_built_in=False)
         check_symbols(added, extended, place)
         if target != OUTPUT and target not in {name for name, _ in (*self.derivatives, *self.variables)}:
-            raise ModelError(f"there is no equation of {target!r}: {_suggest(target, known)}")
+            raise ModelError(f"there is no equation of {target!r}: {_list_known(target, known)}")
         extended = extended._add(target, added)
         sort_variables(extended)
         return extended
@@ -238,7 +237,7 @@ def check_symbols(expression: OdeExpression, system: OdeSystem, place: str) -> N
         if name == FORCE and name not in known:
             raise ModelError(f"{place}: force needs a table [force] with a coordinate and its rate")
         if name not in known:
-            raise ModelError(f"{place}: unknown name {name!r}: {_suggest(name, known)}")
+            raise ModelError(f"{place}: unknown name {name!r}: {_list_known(name, known)}")
     _check_signals(expression, system, place)
 
 
@@ -262,10 +261,8 @@ def _check_signals(expression: OdeExpression, system: OdeSystem, place: str) -> 
                 _check_signals(argument, system, place)
 
 
-def _suggest(name: str, known: Mapping[str, str]) -> str:
-    close = get_close_matches(name, known, n=1, cutoff=0.5)
-    hint = f"did you mean {close[0]!r}? " if close else ""
+def _list_known(name: str, known: Mapping[str, str]) -> str:
     return (
-        f"{hint}Known are {', '.join(known)}; define others by an equation, in [parameters], or as the input "
-        "or a channel"
+        f"known are {', '.join(known)}; define others by an equation, in [parameters], or as the input or a "
+        f"channel{suggest(name, known)}"
     )

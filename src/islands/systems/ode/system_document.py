@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import inf, isfinite
 from typing import Any
 
-from islands.errors import ModelError
+from islands.errors import ModelError, suggest
 from islands.systems.ode.equation_parser import (
     Equation,
     check_name,
@@ -45,6 +45,7 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
         if name not in names:
             raise ModelError(
                 f"[states] {name}: there is no equation d{name}/dt = ...: add it, or remove the state"
+                f"{suggest(name, names)}"
             )
     parameters = tuple(make_parameter(name, entry) for name, entry in document.get("parameters", {}).items())
     system = OdeSystem(
@@ -182,11 +183,18 @@ def _check_used(system: OdeSystem) -> None:
 def _check_effects(system: OdeSystem) -> None:
     """Check effects, the parameter that is the gain, and the states that others spill into."""
     names = [each.name for each in system.states]
-    if system.gain and system.gain not in {each.name for each in system.parameters}:
-        raise ModelError(f"gain: there is no parameter {system.gain!r}: take one of [parameters]")
+    parameters = [each.name for each in system.parameters]
+    if system.gain and system.gain not in parameters:
+        raise ModelError(
+            f"gain: there is no parameter {system.gain!r}: take one of [parameters]"
+            f"{suggest(system.gain, parameters)}"
+        )
     for state in system.states:
         if state.spills_into and (state.spills_into not in names or state.spills_into == state.name):
-            raise ModelError(f"[states] {state.name}: spills_into has to be another state")
+            raise ModelError(
+                f"[states] {state.name}: spills_into has to be another state"
+                f"{suggest(state.spills_into, names)}"
+            )
     extended = replace(system, parameters=(*system.parameters, OdeParameter(EFFECT_VALUE, 0.0)))
     for effect in system.effects:
         place = f"[effects] {effect.name}"

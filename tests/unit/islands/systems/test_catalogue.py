@@ -70,9 +70,9 @@ def test_every_system_has_its_key_as_name_and_a_one_line_description():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("piezo", "authors", "estimation"), r"no system is called 'piezo': there is bouc-wen-piezo, s1, s2"),
-        (("s1", "raw", "estimation"), r"no variant of s1 is called 'raw': there is rescaled, unit-gain"),
-        (("s2", "rescaled", "test"), r"no part of s2 is called 'test': there is estimation, validation"),
+        (("piezo", "authors", "estimation"), r"unknown system 'piezo': take one of bouc-wen-piezo, s1, s2"),
+        (("s1", "raw", "estimation"), r"unknown variant of s1 'raw': take one of rescaled, unit-gain"),
+        (("s2", "rescaled", "test"), r"unknown part of s2 'test': take one of estimation, validation"),
         (("s1", "rescaled", "estimation", -1), r"a seed must not be negative, got -1"),
     ],
 )

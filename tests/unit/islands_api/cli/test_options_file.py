@@ -35,7 +35,11 @@ def test_the_table_of_a_group_has_tables_of_its_commands(group):
 @pytest.mark.parametrize(
     ("command", "table", "message"),
     [
-        ("fit", {"max_terms": 3}, r"\[fit\]: there is no option 'max_terms'; it has .*max-terms"),
+        (
+            "fit",
+            {"max_terms": 3},
+            r"\[fit\]: there is no option 'max_terms'; .* mean 'max-terms'",
+        ),
         ("jobs", {"send": {}}, r"\[jobs\]: there is no option 'send'; it has .*submit"),
         ("jobs", {"submit": 3}, r"write the options of a command as a table: \[jobs.submit\]"),
     ],

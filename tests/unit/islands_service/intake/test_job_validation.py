@@ -132,7 +132,7 @@ def test_validation_record_is_checked_like_the_estimation_record():
     ("changes", "words"),
     [
         ({"output": "y"}, "a.csv has no column y; it has t_s, u_V, y_um"),
-        ({"inputs": ["u_v"]}, "Did you mean u_V?"),
+        ({"inputs": ["u_v"]}, "Did you mean 'u_V'?"),
         ({"inputs": ["u_V", "u_V"]}, "given as an input twice"),
         ({"inputs": ["u_V", "u_V+1"]}, "given as an input twice"),
         ({"inputs": ["y_um"]}, "given as input and as output"),

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from islands.errors import SettingsError
+from islands.errors import SettingsError, suggest
 from islands.io.export.coupled.coupled_document import coupled_json
 from islands.io.export.coupled.coupled_equations import coupled_latex, coupled_mathml, coupled_text
 from islands.io.export.coupled.coupled_programs import coupled_c, coupled_matlab, coupled_python
@@ -41,5 +41,6 @@ def export_coupled(model: CoupledModel, kind: str) -> str:
         raise SettingsError(
             f"a model of several outputs has no format {kind!r}: take {', '.join(COUPLED_EXPORTS)}, or "
             "export the equation of one output, which has the other outputs as inputs"
+            f"{suggest(kind, COUPLED_EXPORTS)}"
         )
     return COUPLED_EXPORTS[kind](model)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from islands.distribution import describe_missing_extra
-from islands.errors import RecordError
+from islands.errors import RecordError, suggest
 from islands.io.records.formats.text.table_start import has_samples
 from islands.io.records.formats.text.text_table import DelimitedText, split_table
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
@@ -91,7 +91,9 @@ def _choose_sheets(names: Sequence[str], sheet: str | None, file: str) -> Sequen
     if sheet is None:
         return names
     if sheet not in names:
-        raise RecordError(f"{file} has no sheet {sheet}; its sheets are {', '.join(names)}")
+        raise RecordError(
+            f"{file} has no sheet {sheet}; its sheets are {', '.join(names)}{suggest(sheet, names)}"
+        )
     return [sheet]
 
 

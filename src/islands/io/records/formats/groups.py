@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from islands.errors import RecordError
+from islands.errors import RecordError, suggest
 
 #: Most groups that are listed in a message.
 _LISTED = 12
@@ -25,7 +25,9 @@ def choose_group(tables: Mapping[str, bool], group: str | None, file: str) -> tu
     """
     names = [name for name, is_table in tables.items() if is_table] or list(tables)
     if group is not None and group not in tables:
-        raise RecordError(f"{file} has no group {group}; its groups are {_list(names)}")
+        raise RecordError(
+            f"{file} has no group {group}; its groups are {_list(names)}{suggest(group, names)}"
+        )
     if not names:
         raise RecordError(f"{file} contains no channels: export the record again")
     chosen = names[0] if group is None else group

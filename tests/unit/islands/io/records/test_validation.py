@@ -274,7 +274,7 @@ def test_two_possible_time_columns_are_refused(tmp_path):
 
 def test_a_missing_column_is_refused_with_all_columns_and_the_closest(tmp_path):
     message = refusal(tmp_path, lines(), inputs=["U_v"])
-    assert message == "bad.csv has no column U_v; it has t_s, u_V, y_um. Did you mean u_V?"
+    assert message == "bad.csv has no column U_v; it has t_s, u_V, y_um. Did you mean 'u_V'?"
 
 
 def test_a_missing_output_column_is_refused(tmp_path):

@@ -67,7 +67,10 @@ def test_values_tolerances_and_bounds_can_be_given() -> None:
     [
         ({"input": "U"}, "axis.fmu has no input 'U': take one of u"),
         ({"output": "y"}, "axis.fmu has no output 'y': take one of x"),
-        ({"parameters": {"dampnig": FmuParameterChoice()}}, "no parameter 'dampnig': take one of damping$"),
+        (
+            {"parameters": {"dampnig": FmuParameterChoice()}},
+            "no parameter 'dampnig': take one of mass, damping. Did you mean 'damping'",
+        ),
         (
             {"parameters": {"damping": FmuParameterChoice(0.01)}},
             "damping = 0.01 is outside its bounds 0.1 to",

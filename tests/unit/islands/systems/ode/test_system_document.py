@@ -64,7 +64,7 @@ def test_a_term_is_added_to_one_equation() -> None:
 @pytest.mark.parametrize(
     ("target", "term", "parameters", "message"),
     [
-        ("v3", "1", [], "there is no equation of 'v3': did you mean 'v"),
+        ("v3", "1", [], "there is no equation of 'v3': known are "),
         ("v1", "q*x1", [], "unknown name 'q'"),
         ("v1", "F", [OdeParameter("k", 1.0)], "'k' has a meaning already"),
         ("coupling", "coupling", [], "depend on each other: coupling -> coupling"),
@@ -87,7 +87,7 @@ def test_other_values_keep_everything_else() -> None:
     ("fields", "message"),
     [
         ({"equations": "dx1/dt = v7"}, "line 1 of the equations, 'dx1/dt = v7': unknown name 'v7'"),
-        ({"equations": "dx1/dt = coupling2\ncoupling = x1"}, "did you mean 'coupling'"),
+        ({"equations": "dx1/dt = coupling2\ncoupling = x1"}, "Did you mean 'coupling'"),
         ({"equations": "dx1/dt = a1\na1 = a2\na2 = 2*a1"}, "depend on each other: a1 -> a2 -> a1"),
         ({"equations": "dx1/dt = x1\ndx1/dt = F"}, "'x1' is defined 2 times"),
         ({"equations": "dx1/dt = F\nm1 = x1"}, "line 2 .*'m1' is defined 2 times"),
@@ -105,7 +105,7 @@ def test_other_values_keep_everything_else() -> None:
         ({"effects": {"relaxation": {"equation": "x1", "term": "-x1"}}}, "the term has to contain value"),
         ({"effects": {"relaxation": {"equation": "x1", "term": "value*x9"}}}, "unknown name 'x9'"),
         ({"effects": {"relaxation": {"equation": "x9", "term": "value"}}}, "there is no equation of 'x9'"),
-        ({"output": "x9"}, "output, 'x9': unknown name 'x9': did you mean 'x2'"),
+        ({"output": "x9"}, "output, 'x9': unknown name 'x9': known are "),
         ({"states": {"x5": {}}}, r"there is no equation dx5/dt = \.\.\."),
         ({"states": {"x1": {"fixed": True}}}, "a fixed state needs a value"),
         ({"states": {"x1": {"initial": 2.0, "upper": 1.0}}}, "lower, initial and upper"),
@@ -114,6 +114,9 @@ def test_other_values_keep_everything_else() -> None:
         ({"parameters": {**DOCUMENT["parameters"], "a": {"value": 2.0, "upper": 1.0}}}, "not between"),
         ({"parameters": {**DOCUMENT["parameters"], "k": {"value": 2.0, "tolerance": 2.0}}}, "such as 0.02"),
         ({"input": "t"}, "'t' already has a meaning"),
+        ({"channels": ["rate"]}, "'rate' already has a meaning"),
+        ({"channels": ["output"]}, "'output' already has a meaning"),
+        ({"channels": ["room temperature"]}, "is not a name"),
         ({"channels": ["F", "T"]}, "'F' is defined 2 times"),
         ({"channels": ["T"], "input": "G"}, "unknown name 'F'"),
         ({"equations": "".join(f"dx{i}/dt = F\n" for i in range(41))}, "41 states, and 40 is the most"),
