@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from islands.data.dataset import Dataset
+from islands.data.magnitudes import check_magnitudes
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.effects.scale import wrong_parameter
@@ -142,8 +143,10 @@ def count_fitted_samples(record: Dataset) -> int:
     Raises
     ------
     RecordError
-        The record or one of its recordings is too short, or has too few outputs or a constant one.
+        The record or one of its recordings is too short, has too few outputs or a constant one, or has values
+        that are too large or too small.
     """
+    check_magnitudes(record)
     if record.samples < MIN_SAMPLES:
         raise RecordError(
             f"the record has {record.samples} samples, and a diagnosis needs at least {MIN_SAMPLES}: give a "

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset
+from islands.data.magnitudes import check_magnitudes
 from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.preparation import estimation_part, make_context, make_target
 from islands.discrepancy.effects import CATALOGUE
@@ -77,6 +78,7 @@ def make_simulator(
         The record is not suitable for the simulator.
     """
     spec = parse_spec(spec) if isinstance(spec, str) else spec
+    check_magnitudes(record)
     # Estimates and initial values need a complete output; the calibration leaves missing samples out.
     record = replace(record, y=fill_gaps(record.y))
     if isinstance(spec, ExtendedSpec):

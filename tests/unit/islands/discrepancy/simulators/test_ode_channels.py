@@ -1,5 +1,6 @@
 """Shipped equations in records with channels: each effect and each error of a channel gets a verdict."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,9 @@ from islands.discrepancy.calibration.preparation import make_context
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.errors import IslandsError
 from islands.io.simulator_spec.factory import make_simulator
 from support.simulated_records import EQUATIONS, wave
 
@@ -101,3 +104,50 @@ def test_effect_of_a_channel_is_named(name: str, effect: str) -> None:
     found = diagnose(record, make_simulator(f"ode:{EQUATIONS / name}.toml", record), catalogue=own)
     assert found.verdict in (Verdict.NAMED, Verdict.REMAINDER)
     assert found.effects[0].name == effect
+
+
+def change_column(record: Dataset, place: int, change: Callable[[Signal], Signal]) -> Dataset:
+    """Return the record with another signal in a column; the output is the last one."""
+    columns = np.column_stack([record.u, record.y])
+    columns[:, place] = change(columns[:, place])
+    return replace(record, u=columns[:, :-1], y=columns[:, -1])
+
+
+#: Errors of a column.
+ERRORS: dict[str, Callable[[Signal], Signal]] = {
+    "offset": lambda signal: signal + 3.0 * np.std(signal),
+    "gain": lambda signal: 1.5 * signal,
+    "unit": lambda signal: 1e3 * signal,
+    "sign": np.negative,
+    "delay": lambda signal: np.concatenate([np.full(40, signal[0]), signal[:-40]]),
+    "step": lambda signal: signal + np.where(np.arange(SAMPLES) < SAMPLES // 2, 0.0, 2.0 * np.std(signal)),
+    "stuck": lambda signal: np.where(np.arange(SAMPLES) < SAMPLES // 3, signal, signal[SAMPLES // 3]),
+    "constant": lambda signal: np.full(SAMPLES, signal[0]),
+    "overflow": lambda signal: 1e200 * signal,
+    "underflow": lambda signal: 1e-200 * signal,
+}
+
+#: Errors of the output, or of any column, that a sentence refuses.
+REFUSED_OUTPUT, REFUSED = {"constant"}, {"overflow", "underflow"}
+
+
+@pytest.mark.parametrize("place", [0, 1, 2, 3], ids=["drive", "room", "pressure", "output"])
+@pytest.mark.parametrize("error", ERRORS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(path.stem, marks=pytest.mark.ci if "thermal" in path.stem else pytest.mark.nightly)
+        for path in sorted(EQUATIONS.glob("*.toml"))
+    ],
+)
+def test_error_of_a_column_has_a_diagnosis_or_a_sentence(name: str, error: str, place: int) -> None:
+    record = change_column(simulate_record(name), place, ERRORS[error])
+    own = [each for each in EFFECTS if each.name in CHANNELS]
+    try:
+        simulator = make_simulator(f"ode:{EQUATIONS / name}.toml", record)
+        rmse, refusal = diagnose(record, simulator, catalogue=own).nominal_rmse, ""
+    except IslandsError as refused:
+        rmse, refusal = 0.0, str(refused)
+    assert np.isfinite(rmse)
+    assert bool(refusal) == (error in REFUSED or (place == 3 and error in REFUSED_OUTPUT)), refusal
+    assert not refusal or f"column {[*record.input_names, 'y'][place]} " in refusal
