@@ -2,16 +2,20 @@
 
 import importlib
 import io
+import re
 import subprocess
 import sys
 import sysconfig
+from concurrent.futures import ThreadPoolExecutor
 from importlib.util import find_spec
 from pathlib import Path
 
 import httpx
 import pytest
 
-from support.service import csv, run_identification, spec
+from support.processes import eventually
+from support.repository import DOCS
+from support.service import csv, execute_identification, identification
 
 pytestmark = [
     pytest.mark.ci,
@@ -20,8 +24,8 @@ pytestmark = [
     ),
 ]
 
-#: The generator knows no SVG unless its configuration names a media type that it knows.
-CONFIGURATION = "content_type_overrides: {image/svg+xml: text/plain}\npost_hooks: []\n"
+#: The configuration of the generator that the guide states.
+GUIDE = (DOCS / "how-to/use-the-rest-api.md").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +39,7 @@ def generated(running, tmp_path_factory):
     """Generate a client, and return a function that imports its modules."""
     folder = tmp_path_factory.mktemp("generated")
     (folder / "openapi.json").write_bytes(running.client.get("/openapi.json").content)
-    (folder / "configuration.yaml").write_text(CONFIGURATION)
+    (folder / "configuration.yaml").write_text(re.search(r"^```yaml\n(.*?)^```", GUIDE, re.M | re.S)[1])
     program = Path(sysconfig.get_path("scripts")) / "openapi-python-client"
     command = [program, "generate", "--path", "openapi.json", "--config", "configuration.yaml"]
     done = subprocess.run(
@@ -52,28 +56,47 @@ def generated(running, tmp_path_factory):
     sys.path.remove(str(folder))
 
 
-def test_a_generated_client_uploads_submits_and_reads_results(running, generated):
-    with generated("client").Client(base_url=running.url, timeout=httpx.Timeout(60.0)) as client:
-        models = generated("models")
-        file = generated("types").File(payload=io.BytesIO(csv(100)), file_name="record.csv")
+def test_a_generated_client_walks_from_the_upload_to_the_result(running, generated):
+    with (
+        generated("client").Client(base_url=running.url, timeout=httpx.Timeout(180.0)) as client,
+        ThreadPoolExecutor() as coordinator,
+    ):
+        models, jobs = generated("models"), "api.jobs"
+        file = generated("types").File(payload=io.BytesIO(csv(400)), file_name="record.csv")
         (body,) = (each for name, each in vars(models).items() if name.startswith("BodyUpload"))
         uploaded = generated("api.data_sets.upload_v1_datasets_post").sync(
             client=client, body=body(file=file)
         )
-        assert uploaded.preview.samples == 100
+        assert uploaded.preview.samples == 400
 
-        job = generated("api.jobs.submit_v1_jobs_post").sync(
-            client=client, body=models.JobRequest.from_dict(spec(uploaded.id))
+        order = models.JobRequest.from_dict(identification(uploaded.id, islands=2))
+        submitted = generated(f"{jobs}.submit_v1_jobs_post").sync(client=client, body=order)
+        assert submitted.state == "queued"
+        executed = coordinator.submit(execute_identification, running)
+        poll = generated(f"{jobs}.job_v1_jobs_job_get")
+        ended = eventually(
+            lambda: (job := poll.sync(submitted.id, client=client)).state not in ("queued", "running") and job
         )
-        cancelled = generated("api.jobs.cancel_v1_jobs_job_cancel_post").sync(job.id, client=client)
-        assert cancelled.state == "cancelled"
-        events = generated("api.jobs.events_v1_jobs_job_events_get").sync(job.id, client=client)
-        assert "event: cancelled" in events
+        assert (executed.result(), ended.state) == (submitted.id, "succeeded")
+        events = generated(f"{jobs}.events_v1_jobs_job_events_get").sync(submitted.id, client=client)
+        assert "event: succeeded" in events
 
-        finished = run_identification(running, islands=2)
-        polled = generated("api.jobs.job_v1_jobs_job_get").sync(finished, client=client)
-        assert polled.state == "succeeded"
-        page = generated("api.models.models_v1_jobs_job_models_get").sync(finished, client=client)
+        page = generated("api.models.models_v1_jobs_job_models_get").sync(submitted.id, client=client)
         assert page.items[0].rank == 1
+        result = generated("api.models.result_v1_jobs_job_result_get").sync(submitted.id, client=client)
+        assert isinstance(result, models.IdentificationResult)
+        assert result.models[0].equation == page.items[0].equation
+        run = generated("api.figures.simulation_v1_jobs_job_models_rank_simulation_get")
+        drawn = run.sync(submitted.id, 1, client=client)
+        assert len(drawn.free_run) == len(drawn.measured) == len(drawn.time_s)
         figure = generated("api.figures.search_figure_v1_jobs_job_figures_figure_svg_get")
-        assert "<svg" in figure.sync(finished, "front", client=client)
+        assert "<svg" in figure.sync(submitted.id, "front", client=client)
+
+
+def test_a_generated_client_cancels_a_job_and_reads_a_problem_type(running, generated):
+    with generated("client").Client(base_url=running.url, timeout=httpx.Timeout(180.0)) as client:
+        job = running.submit(**identification(running.upload(csv(100)).json()["id"])).json()["id"]
+        cancelled = generated("api.jobs.cancel_v1_jobs_job_cancel_post").sync(job, client=client)
+        assert cancelled.state == "cancelled"
+        kind = generated("api.service.problem_problems_kind_get").sync("no-such-job", client=client)
+        assert (kind.status, kind.title) == (404, "There is no such job")

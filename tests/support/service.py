@@ -258,20 +258,29 @@ QUICK = {
 
 def run_identification(service: Service, islands: int = 1) -> str:
     """Upload a record, submit an identification and execute it in this process; return the id of the job."""
+    dataset = service.upload(csv(400)).json()["id"]
+    job = service.submit(**identification(dataset, islands)).json()
+    assert execute_identification(service) == job["id"]
+    return str(job["id"])
+
+
+def identification(dataset: str, islands: int = 1) -> dict[str, Any]:
+    """Return the specification of an identification that takes a second."""
+    return spec(dataset, preset="narx", settings={**QUICK, "islands": islands}, seed=islands)
+
+
+def execute_identification(service: Service) -> str:
+    """Execute the identification that is next in the queue in this process; return the id of the job."""
     from islands.evolution.engine import SerialEngine
     from islands_service.coordinator.identification_job import run_identification_job
 
-    dataset = service.upload(csv(400)).json()["id"]
-    settings = {**QUICK, "islands": islands}
-    job = service.submit(**spec(dataset, preset="narx", settings=settings, seed=islands)).json()
     lease = service.store.leases.claim("test", 600.0)
     assert lease is not None
-    assert lease.job.id == job["id"]
     outcome = run_identification_job(
         lease, service.store, Blobs(service.settings.blobs), SerialEngine(), lambda: None, 600.0
     )
     service.store.leases.finish(lease, outcome)
-    return str(job["id"])
+    return lease.job.id
 
 
 def emptied(service: Service) -> Service:

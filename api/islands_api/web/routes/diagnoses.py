@@ -4,6 +4,7 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
+from islands_api.result_schemas import ExtendedSimulation
 from islands_api.schemas import DiscrepancyRequest, JobView
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppStateDep
@@ -35,7 +36,7 @@ async def submit(
     return await submit_job(state, caller, request, DISCREPANCY, idempotency_key)
 
 
-@router.get(JOBS_PATH + "/{job}/extended", response_model=dict[str, Any])
+@router.get(JOBS_PATH + "/{job}/extended", response_model=ExtendedSimulation)
 async def extended(job: Id, caller: Reader, state: AppStateDep) -> Response:
     """Return the simulation extended by the missing effects; 404 if the diagnosis named none."""
     found = await get_job_of_kind(state, caller, job, DISCREPANCY)

@@ -11,6 +11,7 @@ import structlog
 from fastapi import APIRouter, Path, Response
 
 from islands.errors import IslandsError, suggest
+from islands_api.result_schemas import FreeRun
 from islands_api.schemas import Names
 from islands_api.web.auth import Principal, Reader
 from islands_api.web.dependencies import AppState, AppStateDep
@@ -145,7 +146,7 @@ async def model_figure(
     return await _figure_response(state, caller, job, f"{rank}/{figure}.svg", rank)
 
 
-@router.get("/{job}/models/{rank}/simulation", response_model=dict[str, Any])
+@router.get("/{job}/models/{rank}/simulation", response_model=FreeRun)
 async def simulation(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Response:
     """Return the free run of a model over the validation data, and its 90 % band, as numbers for a screen."""
     await get_model(state, caller, job, rank)

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Path, Query, Response
 
 from islands.io.export import EXPORTS, export
 from islands.io.models import model_from_json
+from islands_api.result_schemas import DiscrepancyResult, IdentificationResult, MonitoredRecordResult
 from islands_api.schemas import ModelPage, ModelView
 from islands_api.web.auth import Principal, Reader
 from islands_api.web.dependencies import AppState, AppStateDep
@@ -90,7 +91,7 @@ async def exported(
     )
 
 
-@router.get("/{job}/result", response_model=dict[str, Any])
+@router.get("/{job}/result", response_model=IdentificationResult | DiscrepancyResult | MonitoredRecordResult)
 async def result(job: Id, caller: Reader, state: AppStateDep) -> Any:
     """Return the whole result, in the form of `result.json` or `discrepancy.json`."""
     found = await state.run_blocking(state.store.jobs.get, caller.owner, job)

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Path, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
 from islands.errors import suggest
+from islands_api.result_schemas import ProblemType
 from islands_api.schemas import Health
 from islands_api.web.auth import Operator
 from islands_api.web.dependencies import AppState, AppStateDep
@@ -60,7 +61,7 @@ async def metrics(_operator: Operator, state: AppStateDep) -> Response:
     return Response(await state.run_blocking(state.metrics.page), media_type=CONTENT_TYPE_LATEST)
 
 
-@router.get("/problems/{kind}", response_model=dict[str, Any])
+@router.get("/problems/{kind}", response_model=ProblemType)
 async def problem(
     kind: Annotated[
         str, Path(description="The last part of a problem's `type`.", examples=["invalid-record"])

@@ -1,0 +1,112 @@
+"""Schemas of results: identification, diagnosis, record of a monitor, extended simulation, free run.
+
+They state the fields of the OpenAPI document. `docs/reference/result-json.md` describes each of them.
+"""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from islands_api.schemas import ModelView, ResponseModel
+
+
+class IdentificationResult(ResponseModel):
+    """Result of an identification, as in ``result.json``."""
+
+    schema_version: Literal["islands.result/1"] = Field(alias="schema")
+    record: dict[str, Any] = Field(description="Hash, length, sampling time, names and units of the record.")
+    preprocessing: dict[str, Any] | None = Field(default=None, description="Averages, filters, trends.")
+    seed: int
+    settings: dict[str, Any] = Field(description="What determines the result besides the record.")
+    search: dict[str, Any] = Field(description="Statistics of the search.")
+    recommended: dict[str, Any] | None = Field(
+        default=None, description="Rank of the recommended model, and the reasons."
+    )
+    models: tuple[ModelView, ...] = Field(description="The models, least validation error first.")
+    ensemble: list[dict[str, Any]] | None = Field(
+        default=None, description="Structures with their weights and parameters."
+    )
+
+
+class FindingView(ResponseModel):
+    """Cause of a discrepancy, or property of the noise."""
+
+    name: str
+    family: str
+    confidence: float
+    equivalents: tuple[str, ...] = Field(description="Causes that the record cannot distinguish from it.")
+    parameters: dict[str, dict[str, Any]] = Field(description="Value, unit and 95 % interval by name.")
+    score: float
+    eta: float | None = Field(description="Fraction of the misfit; null for a property of the noise.")
+    claimed: bool = True
+
+
+class DiscrepancyResult(ResponseModel):
+    """Result of a diagnosis, as in ``discrepancy.json``."""
+
+    schema_version: Literal["islands.discrepancy/1"] = Field(alias="schema")
+    record: dict[str, Any] = Field(description="Hash, length, sampling time, names and units of the record.")
+    simulation: str
+    verdict: str
+    effects: tuple[FindingView, ...] = Field(description="The causes, then the properties of the noise.")
+    gain: dict[str, Any] | None = Field(description="Errors before and after on held-out data.")
+    candidates: tuple[dict[str, Any], ...] = Field(description="All screened effects, the best first.")
+    calibrated: dict[str, float] = Field(description="Values of the parameters of the simulation.")
+    record_findings: tuple[dict[str, Any], ...] = Field(default=(), description="Findings about the record.")
+
+
+class MonitoredRecordResult(ResponseModel):
+    """Result of a record of a monitor."""
+
+    schema_version: Literal["islands.monitor/1"] = Field(alias="schema")
+    monitor: str
+    status: str
+    record: dict[str, Any] = Field(description="States of the record.")
+    alarms: tuple[dict[str, Any], ...] = Field(description="Alarms that the record raised.")
+
+
+class MonitorState(ResponseModel):
+    """State of a monitor, as in ``state.json``. Its further fields are for `islands monitor` alone."""
+
+    schema_version: Literal["islands.monitor-state/1"] = Field(alias="schema")
+
+
+class ExtendedSimulation(ResponseModel):
+    """A simulation with the effects that it lacks, as in ``extended.json``."""
+
+    kind: Literal["extended"] = "extended"
+    schema_version: Literal["islands.extended/1"] = Field(alias="schema")
+    inputs: tuple[str, ...]
+    output: str
+    core: dict[str, Any] = Field(description="The simulation without effects.")
+    effects: tuple[dict[str, Any], ...] = Field(description="Name and parameters of each effect.")
+    start: dict[str, float] = Field(default_factory=dict, description="States at the first sample.")
+    scales: dict[str, Any] = Field(description="Sizes of the signals of the record.")
+
+
+class Band(ResponseModel):
+    """Prediction band of a free run; null where it diverged."""
+
+    level: float
+    lower: tuple[float | None, ...]
+    upper: tuple[float | None, ...]
+
+
+class FreeRun(ResponseModel):
+    """Free run of a model over the validation data."""
+
+    outcome: str
+    every: int = Field(description="The arrays have one of this number of samples.")
+    time_s: tuple[float, ...]
+    inputs: dict[str, tuple[float, ...]]
+    measured: tuple[float | None, ...]
+    free_run: tuple[float | None, ...] = Field(description="Null where the free run diverged.")
+    band: Band | None = None
+
+
+class ProblemType(ResponseModel):
+    """Description of a kind of problem."""
+
+    type: str
+    status: int
+    title: str
