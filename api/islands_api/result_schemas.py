@@ -65,7 +65,7 @@ class MonitoredRecordResult(ResponseModel):
     alarms: tuple[dict[str, Any], ...] = Field(description="Alarms that the record raised.")
 
 
-class MonitorState(ResponseModel):
+class SavedMonitorState(ResponseModel):
     """State of a monitor, as in ``state.json``. Its further fields are for `islands monitor` alone."""
 
     schema_version: Literal["islands.monitor-state/1"] = Field(alias="schema")

@@ -13,7 +13,7 @@ from islands_api.monitor_schemas import (
     MonitorRequest,
     MonitorView,
 )
-from islands_api.result_schemas import MonitorState
+from islands_api.result_schemas import SavedMonitorState
 from islands_api.schemas import JobView
 from islands_api.web.auth import Principal, Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
@@ -117,7 +117,7 @@ async def monitor(monitor: Id, caller: Reader, state: AppStateDep, if_none_match
     return Response(_render(found, document), headers=headers, media_type="application/json")
 
 
-@router.get("/{monitor}/state", response_model=MonitorState)
+@router.get("/{monitor}/state", response_model=SavedMonitorState)
 async def saved(monitor: Id, caller: Reader, state: AppStateDep) -> Response:
     """Return `state.json` of a monitor, from which `islands monitor` continues with the same bits."""
     text = await state.run_blocking(state.store.monitors.saved, caller.owner, monitor)

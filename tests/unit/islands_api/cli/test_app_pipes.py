@@ -18,9 +18,7 @@ from support.command_line import ISLANDS, islands
         *((each, True) for each in ("--help", "systems list", "fitt", "show no-result")),
     ],
 )
-def test_command_with_a_closed_output_ends_quietly_with_the_code_of_a_closed_pipe(
-    arguments: str, is_joined: bool
-) -> None:
+def test_command_with_a_closed_output_exits_quietly(arguments: str, is_joined: bool) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as closed:

@@ -1,4 +1,4 @@
-"""Readiness: a brief check takes no time on a large file, and a complete one finds what it leaves out."""
+"""Readiness: a brief check takes no time on a large file, and a complete one finds all damage."""
 
 import threading
 from collections.abc import Iterator
@@ -64,7 +64,7 @@ def test_a_check_of_a_large_database_is_brief(large: tuple[Store, Path]) -> None
 
 
 @pytest.mark.ci
-def test_damage_that_a_brief_check_cannot_reach_is_remembered_from_the_complete_one(
+def test_damage_found_by_a_complete_check_is_remembered(
     large: tuple[Store, Path],
 ) -> None:
     store, path = large
