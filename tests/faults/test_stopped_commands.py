@@ -106,7 +106,7 @@ def read_cpu(pid: int) -> float:
 
 
 def stop(process: subprocess.Popen[str], number: signal.Signals) -> tuple[float, str, str]:
-    """Send a signal as a terminal or a process manager does; return the CPU time until the end, and output."""
+    """Send a signal as a terminal or a process manager does; return the CPU time after it, and the output."""
     before = used = read_cpu(process.pid)
     if number == signal.SIGINT:
         os.killpg(process.pid, number)

@@ -39,6 +39,10 @@ errors = Console(stderr=True, highlight=False, soft_wrap=True)
 MIN_FRACTION = 0.05
 
 
+#: Seconds between two checks whether another thread has ended.
+_JOIN_SECONDS = 0.1
+
+
 class Display(Protocol):
     """Progress callback that can show lines below its bar."""
 
@@ -119,6 +123,7 @@ def _call_in_thread(function: Callable[[], object]) -> None:
 
     thread = Thread(target=call, daemon=True)
     thread.start()
-    thread.join()
+    while thread.is_alive():
+        thread.join(_JOIN_SECONDS)  # a signal that another thread receives does not end a longer wait
     if raised:
         raise raised[0]
