@@ -1,4 +1,4 @@
-"""Every long command, stopped by a signal after a part of its work: it ends soon and keeps what it found."""
+"""Every long command, stopped by a signal after a part of its work: it ends soon and keeps its result so far."""
 
 import json
 import os
@@ -79,7 +79,7 @@ def write_two_outputs(path: Path) -> None:
     u = np.repeat(rng.normal(size=150), 10)
     x, y = np.zeros(1500), np.zeros(1500)
     for k in range(1, 1500):
-        x[k] = 0.8 * x[k - 1] + 0.2 * u[k - 1] - 0.1 * y[k - 1] * x[k - 1]
+        x[k] = 0.8 * x[k - 1] + 0.2 * u[k - 1] - 0.1 * y[k - 1]
         y[k] = 0.7 * y[k - 1] + 0.3 * x[k - 1]
     noisy = [each + 0.01 * rng.normal(size=1500) for each in (x, y)]
     rows = np.column_stack([0.1 * np.arange(1500), u, *noisy])
@@ -182,7 +182,7 @@ def check_kept(folder: Path, err: str) -> None:
         ),
     ],
 )
-def test_stopped_command_ends_soon_and_keeps_what_it_found(
+def test_stopped_command_ends_soon_and_keeps_its_result(
     folder: Path, durations: Callable[[str], float], name: str, percent: int, number: signal.Signals
 ) -> None:
     duration = durations(name)

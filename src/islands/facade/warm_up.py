@@ -1,12 +1,12 @@
 """Compilation of all kernels before the first use."""
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing import cpu_count
+from signal import SIGKILL, raise_signal
 from threading import Thread
 
 from islands.data.coupled_record import CoupledRecord
@@ -78,7 +78,7 @@ def end_with_parent() -> None:
 
     def wait() -> None:
         sys.stdin.read()
-        os._exit(1)
+        raise_signal(SIGKILL)  # the compiler of another thread cannot be interrupted
 
     Thread(target=wait, daemon=True).start()
 
