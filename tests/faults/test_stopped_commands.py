@@ -1,4 +1,4 @@
-"""Every long command, stopped by a signal after a part of its work: it ends soon and keeps its result so far."""
+"""Every long command, stopped by a signal after a part of its work: it ends soon with its result so far."""
 
 import json
 import os
