@@ -65,9 +65,10 @@ soak: .venv/ready-test
 	$(BIN)/python benchmarks/service_soak.py --kills 500 --seed $(DAY)
 	$(BIN)/python benchmarks/service_soak.py --kills 500 --seed $(DAY) --database postgresql
 
-# Five minutes of mutated files for all readers of uploads.
+# Five minutes of mutated files for all readers of uploads, and five of short and extreme records for the searches.
 fuzz: .venv/ready-test
 	$(BIN)/python benchmarks/fuzz_readers.py --seconds 300 --seed $(DAY)
+	$(BIN)/python benchmarks/fuzz_searches.py --seconds 300 --seed $(DAY)
 
 # Figures of a service under load, on a machine that should be otherwise idle.
 load: .venv/ready-test

@@ -8,6 +8,7 @@ import numpy as np
 from islands.data.averaging import average_samples
 from islands.data.compatibility import Reference, match_record
 from islands.data.dataset import Dataset, join
+from islands.data.magnitudes import check_magnitudes
 from islands.data.missing_outputs import skip_missing_outputs
 from islands.errors import SettingsError
 
@@ -72,14 +73,18 @@ def split_data(record: Dataset, validation: Dataset | float) -> Split:
     Raises
     ------
     RecordError
-        The validation data has other columns, units or another sampling time, or every output is missing.
+        The validation data has other columns, units or another sampling time, every output is missing, or a
+        magnitude is too large or too small to calculate with.
     SettingsError
         The fraction leaves a part empty, or the validation data has samples of the record.
     """
     if not isinstance(validation, Dataset):
         parts = split(record, validation)
-        return Split(*map(skip_missing_outputs, (parts.estimation, parts.validation)))
+        parts = Split(*map(skip_missing_outputs, (parts.estimation, parts.validation)))
+        check_magnitudes(parts.estimation, parts.validation)
+        return parts
     parts = Split(skip_missing_outputs(record), skip_missing_outputs(validation))
+    check_magnitudes(parts.estimation, parts.validation)
     if share_samples(parts.estimation, parts.validation):
         raise SettingsError(
             "the validation data has samples that are used for estimation: give another recording, other "

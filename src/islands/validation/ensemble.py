@@ -225,7 +225,9 @@ def _weigh(
         return []
     best = free_run(candidates[0].model, validation, warm_up).y
     count = effective_samples((validation.y - best)[~np.isnan(best)])
-    errors = np.array([candidate.error for candidate in candidates]) + floor + np.finfo(float).tiny
+    errors = np.array([candidate.error for candidate in candidates]) + floor
+    # The floor is 0 if the output is constant, and the ratio of two errors remains finite.
+    errors += np.finfo(float).tiny * max(1.0, errors.max())
     sizes = np.array([candidate.model.size for candidate in candidates])
     scores = -0.5 * (count * np.log(errors / errors.min()) + np.log(count) * sizes)
     weights = np.exp(scores - scores.max())

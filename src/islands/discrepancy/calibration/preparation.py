@@ -143,10 +143,9 @@ def count_fitted_samples(record: Dataset) -> int:
     Raises
     ------
     RecordError
-        The record or one of its recordings is too short, has too few outputs or a constant one, or has values
-        that are too large or too small.
+        The record or one of its recordings is too short, or has too few outputs or a constant one, or a
+        magnitude is too large or too small to calculate with.
     """
-    check_magnitudes(record)
     if record.samples < MIN_SAMPLES:
         raise RecordError(
             f"the record has {record.samples} samples, and a diagnosis needs at least {MIN_SAMPLES}: give a "
@@ -162,7 +161,9 @@ def count_fitted_samples(record: Dataset) -> int:
             f"recording {1 + record.segments.index(shortest)} has {shortest} samples, and a diagnosis of "
             f"several recordings needs at least {MIN_RECORDING_SAMPLES} of each: leave it out"
         )
-    fitted = estimation_part(record).samples
+    estimation = estimation_part(record)
+    check_magnitudes(estimation, record)
+    fitted = estimation.samples
     is_known = ~np.isnan(record.y)
     if (known := int(is_known.sum())) < MIN_SAMPLES:
         raise RecordError(

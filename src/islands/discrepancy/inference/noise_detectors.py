@@ -161,9 +161,10 @@ def _detect_outliers(y: Signal, residual: Signal, context: SimulationContext) ->
         return None
     is_outlier = np.abs(standardised) > _OUTLIER_DISTANCE * robust
     count = int(np.count_nonzero(is_outlier))
-    if count < _MIN_OUTLIERS:
-        return None
     n = whitened.size
+    # If most residuals are far from 0, the simulation is biased, and they are no single samples.
+    if not _MIN_OUTLIERS <= count < n / 2:
+        return None
     decrease = n * float(np.log(np.mean(standardised**2) / np.mean(standardised[~is_outlier] ** 2)))
     score_gain = decrease - 2 * count * float(np.log(n))
     size = float(np.median(np.abs(whitened[is_outlier])))

@@ -105,5 +105,8 @@ def measure_error(model: CoupledModel, validation: CoupledRecord, warm_up: int) 
     if not simulated.outcome:
         return inf
     ranges = [each.output_range or 1.0 for each in validation.records]
-    relative = [error / scale**2 for error, scale in zip(simulated.mean_squared_errors, ranges, strict=True)]
+    # The square of a very small range would be 0.
+    relative = [
+        error / scale / scale for error, scale in zip(simulated.mean_squared_errors, ranges, strict=True)
+    ]
     return sqrt(sum(relative) / len(relative))

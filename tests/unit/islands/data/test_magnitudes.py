@@ -1,4 +1,4 @@
-"""Magnitudes of signals that cannot be analysed are refused with the name of the column."""
+"""Magnitudes that overflow or underflow are refused before a search, with a sentence that says what to do."""
 
 from dataclasses import replace
 
@@ -6,29 +6,39 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.data.magnitudes import check_magnitudes
+from islands.data.magnitudes import LARGEST, SMALLEST, check_magnitudes
 from islands.errors import RecordError
 
-WAVE = np.sin(np.arange(50.0))
-RECORD = Dataset(np.column_stack([WAVE, WAVE]), WAVE, 0.1, ("u_V", "room_degC"), "y_um")
+SINE = np.sin(0.3 * np.arange(100))
+RECORD = Dataset(np.column_stack([SINE, SINE**2]), np.cos(SINE), 0.01, ("u_V", "v_V"), "y_um")
 
 
-@pytest.mark.parametrize(
-    ("factor", "message"),
-    [
-        (1e101, r"column room_degC reaches 1e\+101, and 1e\+100 is the most: correct it, or"),
-        (
-            1e-101,
-            r"column room_degC varies by 2e-101, and 1e-100 is the least: give it in a smaller unit",
-        ),
-    ],
-)
-def test_signal_beyond_the_range_is_refused_by_its_name(factor: float, message: str) -> None:
-    with pytest.raises(RecordError, match=message):
-        check_magnitudes(replace(RECORD, u=RECORD.u * np.array([1.0, factor])))
+@pytest.mark.parametrize("name", ["u_V", "v_V", "y_um"])
+@pytest.mark.parametrize("factor", [1e300, 1e40, 1e-40, 1e-310])
+def test_a_signal_out_of_range_is_named(name: str, factor: float) -> None:
+    u = RECORD.u * np.where(np.array(RECORD.input_names) == name, factor, 1.0)
+    scaled = replace(RECORD, u=u, y=RECORD.y * (factor if name == "y_um" else 1.0))
+    with pytest.raises(RecordError, match=rf"^{name} has .* use another unit"):
+        check_magnitudes(scaled, RECORD)
 
 
-@pytest.mark.parametrize("factor", [1e99, 1e-99, 0.0])
-def test_large_small_and_constant_signals_are_accepted(factor: float) -> None:
-    output = np.where(np.arange(50) < 10, np.nan, factor * WAVE)
-    check_magnitudes(replace(RECORD, u=factor * RECORD.u, y=output))
+def test_one_large_value_is_refused_in_the_validation_data_too() -> None:
+    y = np.where(np.arange(100) == 7, 9.91e37, RECORD.y)  # the invalid value of many instruments
+    for data in ((replace(RECORD, y=y), RECORD), (RECORD, replace(RECORD, y=y))):
+        with pytest.raises(
+            RecordError, match=r"y_um has a value of magnitude 9\.91e\+37.*leave out the samples"
+        ):
+            check_magnitudes(*data)
+
+
+@pytest.mark.parametrize("dt", [1e-40, 1e40])
+def test_a_sampling_time_out_of_range_is_refused(dt: float) -> None:
+    with pytest.raises(RecordError, match="correct the time"):
+        check_magnitudes(replace(RECORD, dt=dt), replace(RECORD, dt=dt))
+
+
+def test_the_limits_zeros_missing_outputs_and_the_end_of_a_decay_are_accepted() -> None:
+    for scale in (0.0, LARGEST, SMALLEST):
+        check_magnitudes(replace(RECORD, u=np.full((100, 2), scale)), RECORD)
+    check_magnitudes(replace(RECORD, y=np.full(100, np.nan)), RECORD)
+    check_magnitudes(RECORD, replace(RECORD, u=1e-300 * RECORD.u, y=1e-300 * RECORD.y))

@@ -150,4 +150,4 @@ def test_error_of_a_column_has_a_diagnosis_or_a_sentence(name: str, error: str, 
         rmse, refusal = 0.0, str(refused)
     assert np.isfinite(rmse)
     assert bool(refusal) == (error in REFUSED or (place == 3 and error in REFUSED_OUTPUT)), refusal
-    assert not refusal or f"column {[*record.input_names, 'y'][place]} " in refusal
+    assert not refusal or [*record.input_names, record.output_name][place] in refusal
