@@ -3,11 +3,11 @@
 import warnings
 from functools import partial
 
+import fuzz_searches
 import numpy as np
 import pytest
-
-import fuzz_searches
 from fuzz_searches import Case, draw_case, main, run_case
+
 from islands.errors import RecordError
 
 #: The cases are the same at every run; `make fuzz` takes others every day.

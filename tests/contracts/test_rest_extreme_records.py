@@ -43,8 +43,12 @@ def _run(service: Service, path: str, content: bytes, name: str, **asked: Any) -
     assert uploaded.status_code == 201, uploaded.text
     answer = service.client.post(path, json={**asked, "dataset": uploaded.json()["id"]})
     assert answer.status_code == 202, answer.text
-    location = f"{path}/{answer.json()['id']}"
-    eventually(lambda: service.client.get(location).json()["finished"] is not None, seconds=_PATIENCE)
+    location = f"/v1/jobs/{answer.json()['id']}"
+    eventually(lambda: _read(service, location)["state"] not in ("queued", "running"), seconds=_PATIENCE)
+    return _read(service, location)
+
+
+def _read(service: Service, location: str) -> dict[str, Any]:
     job: dict[str, Any] = service.client.get(location).json()
     return job
 

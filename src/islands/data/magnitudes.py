@@ -33,8 +33,8 @@ def check_magnitudes(estimation: Dataset, validation: Dataset) -> None:
     """
     if not SMALLEST <= estimation.dt <= LARGEST:
         raise RecordError(
-            f"the sampling time is {estimation.dt:.3g} s, and it must lie between {SMALLEST:g} and {LARGEST:g} "
-            "s: correct the time of the record"
+            f"the sampling time is {estimation.dt:.3g} s, and it must lie between {SMALLEST:g} s and "
+            f"{LARGEST:g} s: correct the time of the record"
         )
     for record in (estimation, validation):
         names = (*record.input_names, record.output_name)
