@@ -136,3 +136,14 @@ def test_effective_samples_of_an_autoregression():
     assert effective_samples(white) == pytest.approx(20_000, rel=0.1)
     assert effective_samples(coloured) == pytest.approx(20_000 / 9.0, rel=0.2)
     assert effective_samples(np.zeros(7)) == 7.0
+
+
+def test_errors_on_a_constant_output_of_zero_are_weighed() -> None:
+    """The ratio of the errors overflowed, since rounding errors of a range of 0 are 0."""
+    data = parts()
+    resting = replace(data, validation=replace(data.validation, y=np.zeros(data.validation.samples)))
+    exact, other = (candidate(texts, data).model for texts in STRUCTURES[:2])
+    made = make_ensemble(
+        [ValidatedModel(exact, 1, 0.0), ValidatedModel(other, 1, 5.0)], resting, "none", 2, seed=0
+    )
+    assert [structure.weight for structure in made.structures] == [1.0]

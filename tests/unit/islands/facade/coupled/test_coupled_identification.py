@@ -11,6 +11,7 @@ from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import join
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.facade.coupled.coupled_identification import fit_coupled, identify_coupled
+from islands.facade.coupled.coupled_selection import measure_error
 from islands.facade.results.saved_result import read_result
 from islands.io.export.coupled.coupled_document import read_coupled_model
 from islands.io.result_models import find_model_file
@@ -150,3 +151,9 @@ def test_missing_outputs_are_skipped_for_all() -> None:
     found = fit_coupled(CoupledRecord((replace(record.records[0], y=holed), record.records[1])), **FAST)
     assert found.estimation.samples + found.validation.samples == record.samples - 2
     assert found.metrics["y2"]["validation"]["free_run"].mape < 1e-6
+
+
+def test_the_error_relative_to_a_tiny_range_of_the_output_is_finite() -> None:
+    record = make_coupled_record(TWO_MASSES, samples=50)
+    tiny = CoupledRecord(tuple(replace(each, u=0.0 * each.u, y=1e-200 * each.y) for each in record.records))
+    assert 0.0 <= measure_error(TWO_MASSES, tiny, 2) < np.inf
