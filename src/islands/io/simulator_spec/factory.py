@@ -78,8 +78,8 @@ def make_simulator(
         The record is not suitable for the simulator.
     """
     spec = parse_spec(spec) if isinstance(spec, str) else spec
-    # Estimates and initial values need a complete output; the calibration leaves missing samples out.
     check_magnitudes(estimation_part(record), record)
+    # Estimates and initial values need a complete output; the calibration leaves missing samples out.
     record = replace(record, y=fill_gaps(record.y))
     if isinstance(spec, ExtendedSpec):
         return _make_saved_extension(spec, record, columns or {})
