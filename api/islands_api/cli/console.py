@@ -103,12 +103,12 @@ def compile_kernels() -> None:
             errors.print(line, markup=False)
             stack.enter_context(progress("kernels"))("", 0.0)
 
+        freeze_garbage_collector()  # before the compilation, which makes many objects
         try:
             _call_in_thread(partial(warm_up, announce))
         except KeyboardInterrupt as interrupt:
             stack.close()
             end_at_once(interrupt)
-    freeze_garbage_collector()
 
 
 def _call_in_thread(function: Callable[[], object]) -> None:

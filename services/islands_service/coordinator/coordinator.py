@@ -293,8 +293,8 @@ class Coordinator:
         stop_on_signals(self._stopping)
         self._connected = True
         log.info("connected to Ray", address=self._find_address())
+        freeze_garbage_collector()  # before the compilation, which makes many objects
         warm_up(lambda line: log.info("kernels", note=line))
-        freeze_garbage_collector()
 
     def _make_engine(self, lease: Lease, notes: JobNotes, heartbeat: Heartbeat) -> "Engine":
         from islands_service.coordinator.job_engine import make_job_engine  # noqa: PLC0415

@@ -8,13 +8,18 @@ from dataclasses import replace
 from multiprocessing import cpu_count
 from signal import SIGKILL, raise_signal
 from threading import Thread
+from typing import Final
 
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
 from islands.estimation.structure_selection.certificate import certify
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.island import first_generation
+from islands.evolution.presets import resolve_settings
 from islands.facade.fit import fit
 from islands.facade.identify import identify
+from islands.facade.setting_changes import SettingChanges
 from islands.kernels.jit_cache import cache_folder, ready
 from islands.model.expression import Lagged
 from islands.model.model import make_model
@@ -23,6 +28,15 @@ from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED
+
+#: Changed settings of a search that calls every kernel and takes no time.
+SMALL: Final[SettingChanges] = {
+    "population": 10,
+    "max_terms": 3,
+    "initial_terms": (1, 3),
+    "library_degree": 1,
+    "shooting": 100,
+}
 
 
 def warm_up(report: Callable[[str], None] = print) -> bool:
@@ -43,34 +57,33 @@ def warm_up(report: Callable[[str], None] = print) -> bool:
 
 def _use_all_kernels() -> None:
     """Call every kernel once with each of its argument types."""
+    record = _make_record()
     with _second_process():
-        record = _make_record()
+        # Half of the time, and all that this process compiles if the other one compiles the rest meanwhile.
+        first_generation(0, 0, Evaluator(record, resolve_settings("hysteresis", SMALL)))
         for constraints in ("none", "hysteresis"):
             identify(
                 record,
                 preset="hysteresis",
-                population=10,
                 generations=1,
-                max_terms=3,
-                initial_terms=(1, 3),
-                library_degree=1,
-                shooting=100,
                 constraints=constraints,
+                **SMALL,
             )
     fit(record, library="phi-polynomial", max_terms=3)
     _simulate_two_outputs(record)
 
 
 def use_kernels_of_one_model() -> None:
-    """Call the kernels that the evaluation of populations calls last, or not at all."""
+    """Call the kernels of fits and simulations, which are all besides the evaluation of populations."""
     record = _make_record()
     model = PUBLISHED["13"].model
-    free_run(model, record)
-    _simulate_two_outputs(record)
     problem = make_selection_problem(model.regressors, record, "none")
     if isinstance(problem, SelectionProblem):
         select_forward(problem, 3)
         certify(problem, 3, 100)
+    free_run(model, record)
+    fit(record, library="phi-polynomial", max_terms=3)
+    _simulate_two_outputs(record)
 
 
 def end_with_parent() -> None:
@@ -87,14 +100,16 @@ def end_with_parent() -> None:
 def _second_process() -> Iterator[None]:
     """Compile the kernels of one model in another process during the context, if there is a core for it.
 
-    The evaluation of populations is compiled in this process: pruning, estimation, and simulation last. By
-    then the other process has stored the simulation, which is loaded. What the other process does not
-    store, since it fails or is late, is compiled by this one.
+    What it does not store, since it fails or is late, is compiled by this process.
     """
     if cpu_count() == 1 or cache_folder() is None:
         yield
         return
-    code = f"import {__name__} as work; work.end_with_parent(); work.{use_kernels_of_one_model.__name__}()"
+    # Garbage collection visits the objects of the compiler again and again; the process ends soon.
+    code = (
+        f"import gc; gc.disable(); import {__name__} as work; work.end_with_parent(); "
+        f"work.{use_kernels_of_one_model.__name__}()"
+    )
     nowhere = subprocess.DEVNULL
     command = [sys.executable, "-c", code]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=nowhere, stderr=nowhere) as process:

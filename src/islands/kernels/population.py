@@ -153,7 +153,6 @@ def evaluate(
     matrix = np.empty((most + 1, most + 1))
     lanes = layout.start.size
     squared, diverged, predicted = np.empty(lanes), np.empty(lanes, np.int64), np.empty(0)
-    patient = np.bool_(False)  # a constant would make the compiler specialise the simulation once more
     for index in range(sizes.size):
         terms, positions = structures[index], results.kept[index]
         results.error[index] = np.inf
@@ -165,7 +164,7 @@ def evaluate(
             if status == OK:
                 program = generate_program(nodes, chosen, operand_index)
                 limit = allowed[size]
-                status = simulate(program, theta, layout, bound, limit, patient, squared, diverged, predicted)
+                status = simulate(program, theta, layout, bound, limit, False, squared, diverged, predicted)
                 if status == OK:
                     results.error[index] = total(squared)
         results.status[index] = status
@@ -254,7 +253,7 @@ def _estimate(chosen, context, matrix, operand_index, theta):
 @kernel
 def _has_zero_column(matrix, size):
     """Return whether the squared norm of one of the columns, on the diagonal of the matrix, is zero."""
+    found = False
     for position in range(size):
-        if matrix[position, position] == 0.0:
-            return True
-    return False
+        found |= matrix[position, position] == 0.0
+    return found
