@@ -32,6 +32,7 @@ from islands.systems.published_models import PUBLISHED
 #: Changed settings of a search that calls every kernel and takes no time.
 SMALL: Final[SettingChanges] = {
     "population": 10,
+    "generations": 1,
     "max_terms": 3,
     "initial_terms": (1, 3),
     "library_degree": 1,
@@ -62,13 +63,8 @@ def _use_all_kernels() -> None:
         # Half of the time, and all that this process compiles if the other one compiles the rest meanwhile.
         first_generation(0, 0, Evaluator(record, resolve_settings("hysteresis", SMALL)))
         for constraints in ("none", "hysteresis"):
-            identify(
-                record,
-                preset="hysteresis",
-                generations=1,
-                constraints=constraints,
-                **SMALL,
-            )
+            changes: SettingChanges = {**SMALL, "constraints": constraints}
+            identify(record, preset="hysteresis", **changes)
     fit(record, library="phi-polynomial", max_terms=3)
     _simulate_two_outputs(record)
 
