@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset, join
+from islands.data.input_lead import advance_inputs
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError
@@ -16,6 +18,18 @@ from islands.io.records.row_range import overlap, parse_rows
 FRACTION = 0.25
 
 
+def measured_names(inputs: Sequence[str], steps: PreprocessingSteps) -> Sequence[str]:
+    """Return the columns to read before some steps: a filter and a decimation need inputs as measured."""
+    return [parse_channel_name(name).base for name in inputs] if steps.has_rate_steps else inputs
+
+
+def advance_as_named(record: Dataset, inputs: Sequence[str]) -> Dataset:
+    """Return a record with those inputs advanced whose given names say so (``u_V+1``)."""
+    pairs = zip(inputs, record.input_names, strict=False)
+    early = [(parse_channel_name(name).at_once, parse_channel_name(own).at_once) for name, own in pairs]
+    return advance_inputs(record, [place for place, (given, own) in enumerate(early) if given and not own])
+
+
 @dataclass(frozen=True, slots=True)
 class Recordings:
     """Files with recordings of one system, their columns, and how they are read.
@@ -25,7 +39,7 @@ class Recordings:
     paths : sequence of Path
         Files, one for each recording.
     inputs : sequence of str
-        Input columns.
+        Input columns. Those that are read one sample early (``u_V+1``) are advanced after the steps.
     output : str
         Output column.
     dt : float, optional
@@ -47,7 +61,7 @@ class Recordings:
 
     def read(self, rows: str | None = None) -> Dataset:
         """Read ``START:STOP`` of every recording, or all of it, join the recordings and preprocess them."""
-        return preprocess(self._read_measured(rows), **asdict(self.steps))
+        return advance_as_named(preprocess(self._read_measured(rows), **asdict(self.steps)), self.inputs)
 
     def _read_measured(self, rows: str | None) -> Dataset:
         return join(tuple(self._read_file(path, rows) for path in self.paths))
@@ -88,12 +102,14 @@ class Recordings:
 
     def _preprocess_held_out(self, record: Dataset, used: str | None) -> Dataset:
         """Do the steps with the offsets of the estimation data."""
-        return record if self.steps.is_none else preprocess(record, like=self.read(used))
+        if self.steps.is_none:
+            return record
+        return advance_as_named(preprocess(record, like=self.read(used)), self.inputs)
 
     def _read_file(self, path: Path, rows: str | None = None) -> Dataset:
         return read_dataset(
             path,
-            self.inputs,
+            measured_names(self.inputs, self.steps),
             self.output,
             self.dt,
             parse_rows(rows),

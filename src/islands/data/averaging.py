@@ -46,7 +46,7 @@ def average_samples(record: Dataset, count: int) -> Dataset:
     if early := [name for name in record.input_names if parse_channel_name(name).at_once]:
         raise RecordError(
             f"{early[0]} is read one sample early, so it has no means: read the input without "
-            "+1, or set average to 1"
+            "+1 and take feedthrough yes, or set average to 1"
         )
     if max(record.segments) < count:
         raise RecordError(

@@ -137,6 +137,13 @@ def _subtract(record: Dataset, found: Preprocessing) -> Dataset:
 
 def _reduce(record: Dataset, steps: PreprocessingSteps) -> Dataset:
     """Return the filtered and decimated record."""
+    early = [name for name in record.input_names if parse_channel_name(name).at_once]
+    if early and steps.has_rate_steps:
+        # A model of such an input filters a measured record and advances it afterwards, see `match_rate`.
+        raise RecordError(
+            f"{early[0]} is read one sample early, so it cannot be filtered or decimated: read "
+            f"{parse_channel_name(early[0]).base}, and fit the record with feedthrough yes"
+        )
     if steps.lowpass is not None:
         if steps.lowpass >= 0.5 / record.dt:
             raise SettingsError(
@@ -145,10 +152,6 @@ def _reduce(record: Dataset, steps: PreprocessingSteps) -> Dataset:
         record = _filter(record, steps.lowpass, _LOWPASS_ORDER)
     if steps.decimate == 1:
         return record
-    if early := [name for name in record.input_names if parse_channel_name(name).at_once]:
-        raise RecordError(
-            f"{early[0]} is read one sample early, so it cannot be decimated: read the input without +1"
-        )
     record = _filter(record, find_decimation_cutoff(record.dt, steps.decimate), _DECIMATION_ORDER)
     kept = np.concatenate([np.arange(begin, end, steps.decimate) for begin, end in record.bounds])
     return replace(

@@ -52,6 +52,11 @@ class PreprocessingSteps:
         """Whether there is no step."""
         return self == NO_STEPS
 
+    @property
+    def has_rate_steps(self) -> bool:
+        """Whether the record is filtered or decimated."""
+        return self.lowpass is not None or self.decimate > 1
+
 
 #: No preprocessing.
 NO_STEPS = PreprocessingSteps()
@@ -87,7 +92,7 @@ class Preprocessing:
     @property
     def has_rate_steps(self) -> bool:
         """Whether the record was filtered or decimated."""
-        return self.steps.lowpass is not None or self.steps.decimate > 1
+        return self.steps.has_rate_steps
 
     @property
     def decimation_cutoff(self) -> float | None:

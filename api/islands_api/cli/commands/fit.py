@@ -22,7 +22,7 @@ from islands_api.cli.console import compile_kernels, progress
 from islands_api.cli.output_folder import check_folder, show_result
 from islands_api.cli.preprocessing_options import with_preprocessing_options
 from islands_api.cli.record_options import with_reading_options
-from islands_api.cli.recordings import Recordings
+from islands_api.cli.recordings import Recordings, measured_names
 from islands_api.cli.runs.coupled_run import couple_data, coupled_options, join_columns, keep_coupled
 from islands_api.cli.stop_requests import REPEAT, stop_requests
 
@@ -96,10 +96,10 @@ def fit(
     check_folder(out, force)
     outputs = options.columns(output_columns)
     names, output_column = join_columns(options.columns(inputs), outputs)
-    # The outputs of one system have one filter and offsets each, see `couple_data`.
-    recordings = Recordings(
-        records, names, output_column, dt, reading, steps if len(outputs) == 1 else NO_STEPS
-    )
+    if len(outputs) == 1:
+        recordings = Recordings(records, names, output_column, dt, reading, steps)
+    else:
+        recordings = Recordings(records, measured_names(names, steps), output_column, dt, reading)
     compile_kernels()
     with progress("fit") as show:
         show("reading", 0.0)
@@ -127,7 +127,7 @@ def fit(
             if dead_time:
                 raise SettingsError("--dead-time is for one output: leave it out")
             given["library"] = SEVERAL_OUTPUTS if library == AUTO else library
-            pair = couple_data(data, held_out, len(outputs), steps)
+            pair = couple_data(data, held_out, len(outputs), steps, names)
             fit_all = partial(islands.fit_coupled, pair[0], validation=pair[1], **coupled_options(given))
             keep_coupled(fit_all, out, show, stop)
             return

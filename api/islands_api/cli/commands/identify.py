@@ -15,7 +15,7 @@ from islands_api.cli import options
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.preprocessing_options import with_preprocessing_options
 from islands_api.cli.record_options import with_reading_options
-from islands_api.cli.recordings import Recordings
+from islands_api.cli.recordings import Recordings, measured_names
 from islands_api.cli.runs.coupled_run import couple_data, identify_several, join_columns
 from islands_api.cli.runs.identify_run import RunOptions, load_run, run
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, with_search_options
@@ -96,9 +96,9 @@ def identify(
         if len(outputs) > 1:
             if test is not None or wall_time is not None:
                 raise SettingsError("--test and --wall-time are for one output: leave them out")
-            recordings = Recordings(records, names, output_column, dt, reading)
+            recordings = Recordings(records, measured_names(names, steps), output_column, dt, reading)
             data = couple_data(
-                recordings.read(rows), recordings.read_held_out(validation, rows), len(outputs), steps
+                recordings.read(rows), recordings.read_held_out(validation, rows), len(outputs), steps, names
             )
             preset = COUPLED_PRESET if search.preset == AUTO else search.preset
             identify_several(run_options, out, data, preset, search.seed, search.changes)

@@ -28,6 +28,7 @@ from islands.simulation.coupled_free_run import coupled_free_run, match_coupled
 from islands.validation.metrics import metrics
 from islands_api.cli import options
 from islands_api.cli.console import Display, compile_kernels, output, print_message, progress
+from islands_api.cli.recordings import advance_as_named
 from islands_api.cli.runs.identify_run import RunOptions
 from islands_api.cli.search_progress import search_progress
 from islands_api.cli.stop_requests import REPEAT, StopRequests, stop_requests
@@ -48,14 +49,22 @@ def join_columns(inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[st
 
 
 def couple_data(
-    data: Dataset, held_out: Dataset | float, outputs: int, steps: PreprocessingSteps
+    data: Dataset, held_out: Dataset | float, outputs: int, steps: PreprocessingSteps, names: Sequence[str]
 ) -> tuple[CoupledRecord, CoupledRecord | float]:
-    """Return the coupled records of measured data that were read with `join_columns`, preprocessed."""
+    """Return the coupled records of data that were read with `join_columns` and `measured_names`.
+
+    They are preprocessed, and then the inputs are advanced whose names say so.
+    """
+
+    def advance(record: Dataset) -> Dataset:
+        return advance_as_named(record, names[: record.inputs])
+
     prepared = couple(data, outputs).map(lambda each: preprocess(each, **asdict(steps)))
     if isinstance(held_out, float):
-        return prepared, held_out
+        return prepared.map(advance), held_out
     pairs = zip(couple(held_out, outputs).records, prepared.records, strict=True)
-    return prepared, CoupledRecord(tuple(preprocess(each, like=like) for each, like in pairs))
+    held = CoupledRecord(tuple(preprocess(each, like=like) for each, like in pairs))
+    return prepared.map(advance), held.map(advance)
 
 
 def coupled_options(given: dict[str, Any]) -> dict[str, Any]:

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.data.input_lead import advance_inputs
+from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.errors import RecordError, SettingsError
 from islands.io.records import write_record
 from islands_api.cli.recordings import Recordings
@@ -45,6 +47,23 @@ def test_validation_is_a_file_a_fraction_or_rows(files):
     )
     with pytest.raises(RecordError, match="is a folder: give the path of the file in it"):
         one.read_held_out(str(files), "0:80")
+
+
+@pytest.mark.parametrize("steps", [{"decimate": 3}, {"lowpass": 20.0, "detrend": "constant"}], ids=str)
+def test_an_input_is_read_early_behind_the_filter(files, steps):
+    """A model of ``u_V+1`` filters a measured record and advances the input after it."""
+    paths, given = [files / "r.csv"], PreprocessingSteps(**steps)
+    found = Recordings(paths, ["u_V+1"], "y_um", steps=given)
+    expected = Recordings(paths, ["u_V"], "y_um", steps=given)
+    for own, other in (
+        (found.read(), expected.read()),
+        (found.read_held_out("80:", "0:80"), expected.read_held_out("80:", "0:80")),
+    ):
+        assert own.input_names == ("u_V+1",)
+        advanced = advance_inputs(other, (0,))
+        assert np.array_equal(own.u, advanced.u)
+        assert np.array_equal(own.y, advanced.y)
+        assert own.preprocessing == other.preprocessing
 
 
 @pytest.mark.parametrize(
