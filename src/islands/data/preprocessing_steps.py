@@ -100,10 +100,23 @@ class Preprocessing:
         return None if self.steps.decimate == 1 else find_decimation_cutoff(self.dt, self.steps.decimate)
 
     @property
+    def rate_steps(self) -> PreprocessingSteps:
+        """The filter and the decimation."""
+        return replace(self.steps, detrend="none")
+
+    @property
     def without_offsets(self) -> "Preprocessing":
         """The filter and the decimation alone: signals as measured, at the rate of the model."""
-        steps = replace(self.steps, detrend="none")
-        return Preprocessing(steps, self.dt, (0.0,) * len(self.input_offsets), 0.0, 0.0)
+        return Preprocessing(self.rate_steps, self.dt, (0.0,) * len(self.input_offsets), 0.0, 0.0)
+
+    def relative_to(self, done: "Preprocessing") -> "Preprocessing":
+        """Return the preprocessing with the offsets that remain after another one, of at least its inputs."""
+        pairs = zip(self.input_offsets, done.input_offsets, strict=False)
+        return replace(
+            self,
+            input_offsets=tuple(own - other for own, other in pairs),
+            output_offset=self.output_offset - done.output_offset,
+        )
 
     def select_inputs(self, places: Iterable[int]) -> "Preprocessing":
         """Return the preprocessing of some inputs, in another order."""

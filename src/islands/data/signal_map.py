@@ -79,8 +79,8 @@ def map_signals(model: SignalReference, record: Dataset) -> tuple[Dataset, float
     expected, done = model.preprocessing, record.preprocessing
     if expected is None:
         return record, 0.0
-    offset = expected.output_offset - (done.output_offset if done else 0.0)
-    shift = np.array(expected.input_offsets) - np.array(done.input_offsets if done else 0.0)
+    left = expected.relative_to(done) if done else expected
+    offset, shift = left.output_offset, np.array(left.input_offsets)
     if offset == 0.0 and not shift.any():
         return record, 0.0
     return replace(record, u=record.u - shift, y=record.y - offset, preprocessing=expected), offset

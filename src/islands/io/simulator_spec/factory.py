@@ -3,7 +3,7 @@
 import json
 import runpy
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pkgutil import resolve_name
 from typing import Any
 
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.compatibility import ColumnReference, match_record
-from islands.data.dataset import Dataset
+from islands.data.dataset import Dataset, same_dt
 from islands.data.magnitudes import check_magnitudes
+from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.preparation import estimation_part, make_context, make_target
 from islands.discrepancy.effects import CATALOGUE
@@ -48,6 +49,7 @@ from islands.io.simulator_spec.specification import (
     parse_spec,
 )
 from islands.model.model import Model, measured_model
+from islands.model.signal_statement import describe_values
 from islands.systems.ode.output_system import SIMULATED
 
 #: Smallest number of samples from which parameters and the initial state are estimated.
@@ -241,22 +243,47 @@ def make_model_simulator(model: Model, name: str, record: Dataset) -> Simulator:
     ModelError
         The model has no parameters, or several inputs.
     RecordError
-        The first input of the record is not that of the model, or the sampling times differ.
+        The first input of the record is not that of the model, the sampling times differ, or the model
+        describes filtered samples or means that the record does not have.
     """
     if model.theta is None:
         raise ModelError(f"{name} has no parameters: estimate them first")
-    done = model.preprocessing
-    if done is not None and record.preprocessing is None:
-        if done.has_rate_steps:
-            raise RecordError(
-                f"{name} describes a filtered or decimated record, and a diagnosis reads the record as it "
-                "is: identify the model without --lowpass and --decimate"
-            )
-        model = measured_model(model)
+    model = _read_as_recorded(model, name, record)
     simulator = NarxSimulator(model, name, fill_gaps(record.y))
     # Further columns of the record are channels, which the model does not read.
     match_record(model, record.first_inputs(1), name, advance=False)
     return simulator
+
+
+def _read_as_recorded(model: Model, name: str, record: Dataset) -> Model:
+    """Return a model that reads the signals of a record, with the offsets by which they differ.
+
+    A diagnosis fits effects of the measured input between its samples, so it does not filter, decimate or
+    average a record for its simulation.
+    """
+    expected, done = model.preprocessing, record.preprocessing
+    if model.average > 1 and model.dt is not None and same_dt(model.dt, record.dt * model.average):
+        raise RecordError(
+            f"of {name}, {describe_values(model)}, and a diagnosis reads every sample: identify the model "
+            "with --average 1"
+        )
+    if expected is None:
+        return model
+    if expected.rate_steps != (NO_STEPS if done is None else done.rate_steps):
+        values = describe_values(replace(model, average=1)) or "each value is a sample as measured"
+        raise RecordError(
+            f"of {name}, {values}, and a diagnosis reads the record as it is: identify the model without "
+            "--lowpass and --decimate, or give islands.diagnose the record of islands.preprocess(record"
+            f"{_list_steps(expected.rate_steps)})"
+        )
+    left = expected if done is None else expected.relative_to(done)
+    return measured_model(replace(model, preprocessing=left))
+
+
+def _list_steps(steps: PreprocessingSteps) -> str:
+    """Return steps as arguments of `islands.data.preprocessing.preprocess`."""
+    given = {name: value for name, value in asdict(steps).items() if value != getattr(NO_STEPS, name)}
+    return "".join(f", {name}={value!r}" for name, value in given.items())
 
 
 def _check_parameters(entry: SimulatorEntry, given: Mapping[str, float]) -> None:

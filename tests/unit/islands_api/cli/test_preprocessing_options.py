@@ -3,7 +3,13 @@ import json
 import numpy as np
 import pytest
 
+import islands
+from islands.data.signal_map import match_rate
+from islands.discrepancy.calibration.preparation import make_context
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.io.simulator_spec.factory import make_simulator
 from support.command_line import fail, stored, succeed
+from support.exported_programs import run_c
 from support.undrawn import undrawn_figures
 
 
@@ -64,6 +70,42 @@ def test_simulation_repeats_the_steps_and_restores_the_offset(folder):
     expected = measured["y_um"][::4]
     assert len(values) == len(expected)
     assert np.nanmax(np.abs(values - expected)[20:-20]) < 0.05
+
+
+def run_python(best, data):
+    program = {}
+    exec(best.export("python"), program)
+    return np.array(program["simulate"](data.u[:, 0], data.y))
+
+
+def simulate_for_diagnosis(best, data, folder):
+    """Return the simulation of a diagnosis and of a monitor, of a record at the rate of the model."""
+    simulator = make_simulator(f"model:{folder / 'out' / 'models'}/{best.rank:02d}.json", data)
+    alone = ExtendedSimulator(simulator, (), make_context(data, simulator, data.samples))
+    return alone.simulate(alone.nominal)
+
+
+@pytest.mark.parametrize("path", ["read_result", "written again", "python", "c", "diagnosis"])
+def test_every_path_from_a_folder_gives_the_output_of_the_command(folder, tmp_path, path):
+    record = write(folder / "third.csv", 2, offset=0.3)
+    succeed("simulate", folder / "out", record, "--out", tmp_path / "sim.csv")
+    expected = np.genfromtxt(tmp_path / "sim.csv", delimiter=",", skip_header=1)[:, 1]
+    best, whole = islands.read_result(folder / "out").best, islands.read_record(record, "u_V", "y_um")
+    data = match_rate(best.model, whole)
+    islands.write_model(best.model, tmp_path / "model.json")
+    found = {
+        "read_result": lambda: best.simulate(whole).y,
+        "written again": lambda: (
+            islands.simulate(islands.read_model(tmp_path / "model.json"), whole, warm_up=best.warm_up).y
+        ),
+        "python": lambda: run_python(best, data),
+        "c": lambda: run_c(best.model, data, tmp_path),
+        "diagnosis": lambda: simulate_for_diagnosis(best, data, folder),
+    }[path]()
+    first = len(found) - np.isfinite(expected).sum()
+    # Programs start from the largest lag; the file leaves out the samples before the first prediction.
+    assert best.warm_up == best.model.maximum_lag
+    np.testing.assert_allclose(found[first:], expected[np.isfinite(expected)], rtol=1e-9)
 
 
 def test_a_result_without_steps_has_none(tmp_path):
