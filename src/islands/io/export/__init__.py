@@ -37,7 +37,7 @@ EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(
     }
 )
 
-#: Formats that state the offsets of a model beside its equation. Programs have them in the equation.
+#: Formats that write the equation of a model in deviations. Programs have the offsets in the equation.
 _OF_DEVIATIONS = ("plain", "latex", "mathml", "json")
 
 #: Formats that are not text.
