@@ -40,11 +40,11 @@ COMMANDS: dict[str, tuple[str, ...]] = {
         *("--simulation", "column:theirs_um", "--self-test", *OUT),
     ),
     "plan": (
-        *("diagnose", "--plan", "--input", "u_V", "--excitation", "multisine:0.1:2", "--amplitude", "5"),
-        *("--duration", "20", "--dt", "0.02", "--noise-std", "0.1", "--simulation", "second-order", *OUT),
+        *("diagnose", "--plan", "motor.csv", "--input", "drive_V", "--output", "speed_rad_s"),
+        *("--simulation", "linear:1", *OUT),
     ),
     "trials": (
-        *("trials", "--count", "1", "--clean", "4", "--open-set", "0", "--effects", "static-nonlinearity"),
+        *("trials", "--count", "1", "--clean", "4", "--open-set", "0", "--effects", "sensor-gain"),
         *("--workers", "1", "--json", "out.json"),
     ),
     "bench": ("bench", "--quick", *OUT),

@@ -250,8 +250,11 @@ def _search_swaps(
         depth=_SCREENED,
         steps=steps,
     )
-    return [
-        each.regressors
-        for individuals in by_size
-        for each in screen(individuals, split.validation, settings.maximum_lag, most_valid=1)
-    ]
+    found: list[Structure] = []
+    for individuals in by_size:
+        if steps.skip("choice of the structures on the validation data"):
+            found.append(individuals[0].regressors)
+            continue
+        kept = screen(individuals, split.validation, settings.maximum_lag, most_valid=1)
+        found += [each.regressors for each in kept]
+    return found
