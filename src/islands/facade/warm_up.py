@@ -96,7 +96,7 @@ def end_with_parent() -> None:
 def _second_process() -> Iterator[None]:
     """Compile the kernels of one model in another process during the context, if there is a core for it.
 
-    What it does not store, since it fails or is late, is compiled by this process.
+    This process compiles the kernels that the other one has not stored, since it fails or is late.
     """
     if cpu_count() == 1 or cache_folder() is None:
         yield
