@@ -12,6 +12,7 @@ from typing import Final
 
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
+from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
 from islands.estimation.structure_selection.certificate import certify
 from islands.evolution.generation.evaluation import Evaluator
@@ -70,7 +71,7 @@ def _use_all_kernels() -> None:
 
 
 def use_kernels_of_one_model() -> None:
-    """Call the kernels of fits and simulations, which are all besides the evaluation of populations."""
+    """Call all kernels but the evaluation of populations, which fits and searches call."""
     record = _make_record()
     model = PUBLISHED["13"].model
     problem = make_selection_problem(model.regressors, record, "none")
@@ -78,7 +79,7 @@ def use_kernels_of_one_model() -> None:
         select_forward(problem, 3)
         certify(problem, 3, 100)
     free_run(model, record)
-    fit(record, library="phi-polynomial", max_terms=3)
+    estimate(model.regressors, record)
     _simulate_two_outputs(record)
 
 
