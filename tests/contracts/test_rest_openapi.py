@@ -128,7 +128,6 @@ def test_every_example_of_the_openapi_document_is_valid(document):
         "/v1/jobs/{job}/result",
         "/v1/jobs/{job}/figures",
         "/v1/jobs/{job}/models/1/figures",
-        "/v1/jobs/{job}/models/1/simulation",
         "/v1/datasets",
         "/v1/datasets/{dataset}",
         "/v1/monitors",
