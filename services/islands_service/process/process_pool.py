@@ -110,15 +110,17 @@ def _map_on(
             check()
             while not wait([result], _CHECK_SECONDS).done:
                 check()
-            yield result.result()
+            yield cloudpickle.loads(result.result())
     except BrokenProcessPool as error:
         raise ProcessPoolError(
             "a process has ended, perhaps because memory was full: repeat the command with fewer --workers"
         ) from error
 
 
-def _call(function: bytes, argument: bytes) -> Any:
-    return _load(function)(cloudpickle.loads(argument))
+def _call(function: bytes, argument: bytes) -> bytes:
+    # Results may have effects, which contain functions without a name.
+    result: bytes = cloudpickle.dumps(_load(function)(cloudpickle.loads(argument)))
+    return result
 
 
 @lru_cache(maxsize=1)

@@ -2,10 +2,12 @@
 
 import os
 import signal
+import time
 from multiprocessing import active_children
 
 import pytest
 
+from islands.evolution.progress import StoppedError
 from islands_service.process.process_pool import ProcessPoolError, process_pool
 
 pytestmark = pytest.mark.ci
@@ -59,3 +61,24 @@ def test_killed_process_is_an_error_that_says_what_to_do() -> None:
         process_pool(2, start_after=0.0) as parallel_map,
     ):
         list(parallel_map(end, range(2)))
+
+
+def test_results_may_contain_functions_without_a_name() -> None:
+    with process_pool(2, start_after=0.0) as parallel:
+        doubled = list(parallel(lambda factor: lambda value: factor * value, [1, 2, 3]))
+    assert [function(2) for function in doubled] == [2, 4, 6]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_check_ends_a_map_while_its_functions_compute(workers: int) -> None:
+    checks: list[float] = []
+
+    def check() -> None:
+        checks.append(time.monotonic())
+        if len(checks) > 2:
+            raise StoppedError("the map")
+
+    began = time.monotonic()
+    with pytest.raises(StoppedError), process_pool(workers, start_after=0.0, check=check) as parallel:
+        list(parallel(time.sleep, [0.05, 0.05, 60.0]))
+    assert time.monotonic() - began < 30.0
