@@ -40,5 +40,5 @@ def test_search_and_fit_compile_nothing_after_the_warm_up(tmp_path):
         )
         compiled, before, after = json.loads(done.stdout)
         assert compiled is first
-        assert len(before) > 50
+        assert len(before) > 10
         assert after == before
