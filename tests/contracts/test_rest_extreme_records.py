@@ -15,7 +15,7 @@ from support.processes import eventually
 from support.service import QUICK, Service, columns, emptied, held, npz, spec
 
 #: Seconds that a job may take.
-_PATIENCE = 60.0
+_PATIENCE = 240.0
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +25,7 @@ def coordinated(serve: Any) -> Iterator[Service]:
         stopping = StopRequest()
         coordinator = Thread(target=SerialCoordinator(service.settings, "coordinator", stopping).run)
         coordinator.start()
+        service.client.timeout = _PATIENCE  # compilation in the thread of the coordinator blocks the service
         try:
             yield service
         finally:
@@ -75,18 +76,14 @@ def test_a_job_on_extreme_magnitudes_fails_with_a_sentence_that_says_what_to_do(
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize(
-    ("rows", "preset"), [("0:30", "auto"), ("0:36", "auto"), ("0:44", "narx"), ("0:44", "hysteresis")]
-)
-def test_a_job_on_a_few_samples_of_the_example_succeeds_or_says_that_they_are_too_few(
-    service: Service, tmp_path: Path, rows: str, preset: str
-) -> None:
+@pytest.mark.parametrize("rows", ["0:30", "0:36", "0:44"])
+def test_a_job_on_few_samples_succeeds_or_asks_for_more(service: Service, tmp_path: Path, rows: str) -> None:
     """Models of different lags had predictions of different lengths, which the recommendation compared."""
     write_record(make_piezo(), tmp_path / "piezo.csv")
     content = (tmp_path / "piezo.csv").read_bytes()
-    settings = {"population": 20, "generations": 2}
+    settings = {**QUICK, "max_height": 1}
     job = _run(
-        service, "/v1/jobs", content, "piezo.csv", **spec("", preset=preset, settings=settings, rows=rows)
+        service, "/v1/jobs", content, "piezo.csv", **spec("", preset="narx", settings=settings, rows=rows)
     )
     if job["state"] == "failed":
         assert job["problem"]["type"] == "invalid-record", job["problem"]
