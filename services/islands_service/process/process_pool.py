@@ -7,7 +7,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import lru_cache, partial
 from multiprocessing import active_children, forkserver, get_context
-from signal import SIG_IGN, SIGINT, signal
+from signal import SIG_BLOCK, SIG_IGN, SIG_SETMASK, SIGINT, pthread_sigmask, signal
 from time import monotonic
 from typing import Any, TypeVar
 
@@ -70,7 +70,13 @@ def process_pool(
     began, others = monotonic(), set(active_children())
     context = get_context("forkserver")
     context.set_forkserver_preload(_PRELOADED)
-    forkserver.ensure_running()  # it imports while this process computes
+    # It imports while this process computes. Ctrl-C in a terminal would end these imports with a traceback, so
+    # that it starts with the signal blocked.
+    unblocked = pthread_sigmask(SIG_BLOCK, {SIGINT})
+    try:
+        forkserver.ensure_running()
+    finally:
+        pthread_sigmask(SIG_SETMASK, unblocked)
     pool = ProcessPoolExecutor(workers, context, initializer=signal, initargs=(SIGINT, SIG_IGN))
 
     def parallel_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
