@@ -70,8 +70,8 @@ def process_pool(
     began, others = monotonic(), set(active_children())
     context = get_context("forkserver")
     context.set_forkserver_preload(_PRELOADED)
-    # It imports while this process computes. Ctrl-C in a terminal would end these imports with a traceback, so
-    # that it starts with the signal blocked.
+    # It imports while this process computes. Ctrl-C in a terminal would end these imports with a traceback:
+    # it starts with the signal blocked.
     unblocked = pthread_sigmask(SIG_BLOCK, {SIGINT})
     try:
         forkserver.ensure_running()
