@@ -216,7 +216,7 @@ def test_job_leased_under_the_same_name_is_taken_over_at_once(store):
 def test_renewal_keeps_a_job(store):
     submitted(store)
     lease = claimed(store, EXPIRED, "first")
-    assert store.leases.renew(lease, LONG) is False
+    assert not store.leases.renew(lease, LONG).cancel_requested
     assert store.leases.claim("second", LONG) is None
 
 
@@ -237,10 +237,10 @@ def test_renewal_is_not_an_event(store):
 def test_renewal_returns_a_cancel_request(store):
     job = submitted(store)
     lease = claimed(store)
-    assert store.leases.renew(lease, LONG) is False
+    assert not store.leases.renew(lease, LONG).cancel_requested
     store.jobs.cancel(ALICE, job.id)
-    assert store.leases.renew(lease, LONG) is True
-    assert store.leases.renew(lease, LONG) is True
+    assert store.leases.renew(lease, LONG).cancel_requested
+    assert store.leases.renew(lease, LONG).cancel_requested
 
 
 def test_claim_after_a_takeover_contains_the_cancel_request(store):

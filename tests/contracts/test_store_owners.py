@@ -108,7 +108,7 @@ def test_resumed_job_continues_from_its_checkpoint(store):
     assert resumed.progress == {"generation": 6}
     again = claimed(store)
     assert (again.job.id, again.job.cancel_requested, again.job.attempt) == (job.id, False, 2)
-    assert store.leases.renew(again, 1.0) is False
+    assert not store.leases.renew(again, 1.0).cancel_requested
     assert kinds(store, job.id) == ["queued", "running", "progress", "failed", "queued", "running"]
 
 
@@ -122,7 +122,7 @@ def test_resume_clears_the_cancel_request(store, running):
     assert store.jobs.resume(ALICE, job.id).cancel_requested is False
     again = claimed(store)
     assert again.job.cancel_requested is False
-    assert store.leases.renew(again, 1.0) is False
+    assert not store.leases.renew(again, 1.0).cancel_requested
     store.leases.release(again)
     assert store.jobs.get(ALICE, job.id).state == QUEUED
 

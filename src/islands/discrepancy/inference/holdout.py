@@ -187,7 +187,9 @@ def cross_validate_gain(
         decrease, is_judged = squares[0] - squares[1], is_left_out & target.estimation_part
         gains += [float(np.sum(decrease[(block == number) & is_judged])) for number in left_out]
     weight = after.noise.effective_samples / np.count_nonzero(target.estimation_part)
-    return _bound_gain(weight * np.array(gains) / after.noise.variance, rng)
+    # Of exact data a fit leaves rounding errors, or nothing: the quotient would overflow.
+    rounding = np.finfo(float).eps * float(np.max(np.abs(target.y[target.estimation_part])))
+    return _bound_gain(weight * np.array(gains) / max(after.noise.variance, rounding**2), rng)
 
 
 def _bound_gain(gains: Signal, rng: np.random.Generator) -> float:

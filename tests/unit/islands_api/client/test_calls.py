@@ -335,7 +335,7 @@ def test_result_that_is_not_an_object_raises_an_error(connect: Any, scripted: An
 
 
 def test_fields_of_a_newer_service_are_kept(connect: Any, scripted: Any, service: Service, me: Any) -> None:
-    document = {**job_document(queued(service.store, me.owner)), "mood": "good"}
+    document = {**job_document(queued(service.store, me.owner), 3600), "mood": "good"}
     job = connect(scripted((200, {}, json.dumps(document).encode())).url).job("0")
     assert job.mood == "good"
     assert set(JobView.model_fields) == set(document) - {"mood"}

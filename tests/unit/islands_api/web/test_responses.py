@@ -48,7 +48,7 @@ def test_numbers_that_json_lacks_are_null(number):
 
 
 def test_a_job_document_has_the_fields_of_its_schema(service):
-    document = job_document(queued(service.store))
+    document = job_document(queued(service.store), 3600)
     assert list(document) == list(JobView.model_fields)
     view = JobView.model_validate(document)
     assert view.created.timestamp() == pytest.approx(time.time(), abs=60)
@@ -71,13 +71,15 @@ def test_a_job_document_with_all_values_round_trips_through_its_schema():
         checkpoint="c",
         summary={"equation": "y(k) = 0"},
         problem={"title": "failed"},
+        run_seconds=2.5,
+        max_run_seconds=7200,
         created=1.5,
         updated=4.125,
         started=2.25,
         finished=4.0,
         versions={"job": "1.2", "checkpoint": None, "result": "1.3"},
     )
-    view = JobView.model_validate_json(json_text(job_document(job)))
+    view = JobView.model_validate_json(json_text(job_document(job, 3600)))
     assert view.model_extra == {}
     for field in JobView.model_fields:
         value = getattr(view, field)
@@ -122,17 +124,17 @@ WAITING = {
 def test_the_progress_of_a_job_that_does_not_run_has_only_reached_values(service, state):
     job = replace(queued(service.store), state=state, progress=WAITING)
     reached = WAITING if state == JobState.RUNNING else {"phase": state, "generation": 4}
-    assert job_document(job)["progress"] == reached
+    assert job_document(job, 3600)["progress"] == reached
 
 
 def test_a_queued_job_has_the_reason_of_its_wait_until_it_ends(service):
     lease = claimed_job(service)
     service.store.leases.postpone(lease, "the disk is full", 60.0)
     job = service.store.jobs.get("local", lease.job.id)
-    assert job_document(job)["progress"] == {"phase": "queued", "note": "the disk is full"}
+    assert job_document(job, 3600)["progress"] == {"phase": "queued", "note": "the disk is full"}
     ended = service.store.jobs.cancel("local", job.id)
-    assert job_document(ended)["progress"] == {"phase": "cancelled"}
-    assert job_document(service.store.jobs.resume("local", job.id))["progress"] == {"phase": "queued"}
+    assert job_document(ended, 3600)["progress"] == {"phase": "cancelled"}
+    assert job_document(service.store.jobs.resume("local", job.id), 3600)["progress"] == {"phase": "queued"}
 
 
 def test_a_released_job_has_no_note_of_its_attempt(service):
@@ -140,7 +142,7 @@ def test_a_released_job_has_no_note_of_its_attempt(service):
     service.store.leases.report(lease, ProgressReport(WAITING))
     service.store.leases.release(lease)
     job = service.store.jobs.get("local", lease.job.id)
-    assert job_document(job)["progress"] == {"phase": "queued", "generation": 4}
+    assert job_document(job, 3600)["progress"] == {"phase": "queued", "generation": 4}
 
 
 def claimed_job(service):
