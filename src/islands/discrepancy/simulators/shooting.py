@@ -268,7 +268,9 @@ def make_shots(system: OdeSystem, record: Dataset) -> Shots:
             guesses[name] = record.y
             if isinstance(right, Symbol):
                 guesses[right.name] = smooth(record.y, record, 1)
-    return Shots(max(MIN_SAMPLES, round(system.shooting / record.dt)), record.y, guesses)
+    # Signals are padded to whole intervals: of samples of a nanosecond an interval would not fit into memory.
+    interval = min(round(system.shooting / record.dt), max(record.segments))
+    return Shots(max(MIN_SAMPLES, interval), record.y, guesses)
 
 
 def smooth(signal: Signal, record: Dataset, order: int = 0, window: int = SMOOTHING_WINDOW) -> Signal:
