@@ -1,6 +1,7 @@
 """Multiple shooting: fitted states, and derivatives of outputs with fitted states."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -126,3 +127,12 @@ def test_recordings_begin_with_a_shooting_interval() -> None:
     part = make_simulator(spec, both).for_samples(330, 600)  # type: ignore[attr-defined]
     alone = ExtendedSimulator(part, (), make_context(record[330:], part, 270))
     assert np.array_equal(output[330:], alone.simulate(alone.nominal))
+
+
+def test_interval_is_no_longer_than_the_record() -> None:
+    """With samples of a nanosecond half a second has more of them than fit into memory."""
+    record = replace(made()["rigid-axis"].record, dt=1e-9)
+    simulator = make_simulator(made()["rigid-axis"].spec, record)
+    assert isinstance(simulator, OdeSimulator)
+    assert simulator.shots is not None
+    assert simulator.shots.interval == record.samples
