@@ -14,7 +14,7 @@ TOLERANCE = 1.5
 #: Seconds that the loops of ``.ci/run`` took on the machine where the stated times were measured.
 SECONDS_OF_LOOPS = 1.5
 
-#: Row of the table, and the steps of ``.ci/run`` that it comprises. The download of packages depends on the network.
+#: Row of the table, and its steps in ``.ci/run``. The download of packages depends on the network.
 STEPS = {
     "`make demo` after the set-up": ("demo",),
     "`make test`": ("packages and bytecode of the tests", "make test"),

@@ -52,7 +52,10 @@ _EXPORT_RESPONSES: dict[int | str, dict[str, Any]] = {
 
 @router.get("/{job}/models", response_model=ModelPage)
 async def models(job: Id, caller: Reader, state: AppStateDep) -> Any:
-    """Return the models of a job in the order of their ranks; none until the job has succeeded."""
+    """Return the models of a job in the order of their ranks.
+
+    A job has models when it has succeeded, or was cancelled after its first models.
+    """
     await get_job_of_kind(state, caller, job, IDENTIFICATION)
     return await state.run_blocking(
         lambda: JSONItems([model.document for model in state.store.results.models(job)])
