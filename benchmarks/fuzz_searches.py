@@ -43,8 +43,8 @@ from islands.model.candidate_library import LIBRARIES
 Generator = np.random.Generator
 Signal = NDArray[np.float64]
 
-#: Largest number of seconds of CPU of one case; the first cases also compile kernels.
-SLOW = 30.0
+#: Largest number of seconds of CPU of one case: a diagnosis of an axis takes up to 75.
+SLOW = 120.0
 
 #: Most samples of a record, and most of one that is diagnosed.
 MOST_SAMPLES, MOST_DIAGNOSED = 200, 320
@@ -373,9 +373,9 @@ def _stop_slow_case(_signal: int, _frame: FrameType | None) -> None:
 def run_case(case: Case) -> Ending:
     """Carry out a case and check its result."""
     signal.signal(signal.SIGPROF, _stop_slow_case)
-    signal.setitimer(signal.ITIMER_PROF, SLOW)
     # The signal waits for the end of a compiled loop. If one never ends, the process ends with its traceback.
-    faulthandler.dump_traceback_later(STUCK, exit=True)
+    faulthandler.dump_traceback_later(STUCK, exit=True, file=sys.__stderr__)
+    signal.setitimer(signal.ITIMER_PROF, SLOW)
     began = time.process_time()
     outcome, reason = "result", ""
     try:

@@ -195,4 +195,6 @@ def test_errors_say_what_to_do_and_keep_existing_results(folder: Path) -> None:
     assert "unknown published model" in fail("show", "published:15")
     assert "cannot read the model file" in fail("show", folder / "nothing.json")
     assert "is not a model file" in fail("show", folder / "fit/result.json")
-    assert "there is bouc-wen-piezo" in fail("systems", "make", "pendulum", "--out", folder / "p.csv")
+    assert "unknown system 'pendulum': take one of bouc-wen-piezo" in fail(
+        "systems", "make", "pendulum", "--out", folder / "p.csv"
+    )

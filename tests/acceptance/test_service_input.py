@@ -117,7 +117,7 @@ UNUSABLE = {
     "long name": (
         csv().replace(b"y_um", b"y" * 100_000),
         "a.csv",
-        (f"a.csv has a column {'y' * 40}... whose name has 100000 characters", "200 is the most", "shorter"),
+        (f"line 1: the column {'y' * 40}... has a name of 100000 characters", "at most 1000", "shorter"),
     ),
     "no gzip": (
         csv(),

@@ -32,7 +32,7 @@ def test_invalid_trials_are_rejected() -> None:
 def test_trials_are_counted_by_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The trials run in this process, one after the other."""
     pool = "islands_service.runtime.parallel_map.ray_pool"
-    monkeypatch.setattr(pool, lambda _workers, _address: nullcontext(map))
+    monkeypatch.setattr(pool, lambda _workers, _address, _check: nullcontext(map))
     command = ("trials", "--core", "column", "--effects", "offset", "--count", 1, "--clean", 1)
     limits = ("--open-set", 0, "--mixed", 1, "--seconds", 10, "--seed", 8)
     more = (*limits, "--json", tmp_path / "trials.json")

@@ -5,11 +5,12 @@ same filter: for a linear system, the filtered output is the response to the fil
 filter also reads samples that follow, over about one period of its cutoff.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset, same_dt
@@ -165,17 +166,23 @@ def _reduce(record: Dataset, steps: PreprocessingSteps) -> Dataset:
 
 def _filter(record: Dataset, cutoff: float, order: int) -> Dataset:
     """Apply a zero-phase low-pass filter to every signal of every segment."""
+    # The import takes half a second, and every model file names its preprocessing.
+    from scipy.signal import butter, sosfiltfilt  # noqa: PLC0415
+
     if min(record.segments) <= _SAMPLES_PER_ORDER * order:
         raise RecordError(
             f"a segment of {min(record.segments)} samples is too short for a filter: give longer recordings"
         )
     sections = butter(order, cutoff, fs=1.0 / record.dt, output="sos")
-    columns = [_filter_signal(signal, record, sections) for signal in (*record.u.T, record.y)]
+    filter_part = partial(sosfiltfilt, sections)
+    columns = [_filter_signal(signal, record, filter_part) for signal in (*record.u.T, record.y)]
     return replace(record, u=np.column_stack(columns[:-1]), y=columns[-1])
 
 
 def _filter_signal(
-    signal: NDArray[np.float64], record: Dataset, sections: NDArray[np.float64]
+    signal: NDArray[np.float64],
+    record: Dataset,
+    filter_part: Callable[[NDArray[np.float64]], NDArray[np.float64]],
 ) -> NDArray[np.float64]:
     known = np.isfinite(signal)
     if not known.any():
@@ -183,7 +190,7 @@ def _filter_signal(
     places = np.arange(signal.size)
     # Missing outputs are interpolated for the filter and missing again behind it.
     filled = signal if known.all() else np.interp(places, places[known], signal[known])
-    parts = [sosfiltfilt(sections, filled[begin:end]) for begin, end in record.bounds]
+    parts = [filter_part(filled[begin:end]) for begin, end in record.bounds]
     return np.where(known, np.concatenate(parts), np.nan)
 
 

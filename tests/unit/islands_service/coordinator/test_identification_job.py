@@ -175,7 +175,7 @@ def test_search_at_its_limit_of_run_time_ends_with_its_models(
     def check() -> None:
         try:
             interruption()
-        except JobCancelled:
+        except CoordinatorStopping:
             raise RunTimeLimitError(10) from None
 
     outcome = run_job(claim(store), store, blobs, check)
