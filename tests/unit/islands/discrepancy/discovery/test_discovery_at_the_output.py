@@ -61,7 +61,9 @@ def find(law: str) -> tuple[Dataset, Diagnosis]:
     return record, diagnose(record, make_column(record))
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    "law", [pytest.param(law, marks=() if law == "u**5" else pytest.mark.ci) for law in LAWS]
+)
 def test_missing_term_of_a_recorded_output_is_found(law: str) -> None:
     _, found = find(law)
     assert found.verdict == "discovered"

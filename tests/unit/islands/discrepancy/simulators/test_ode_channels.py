@@ -135,10 +135,7 @@ REFUSED_OUTPUT, REFUSED = {"constant"}, {"overflow", "underflow"}
 @pytest.mark.parametrize("error", ERRORS)
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(path.stem, marks=pytest.mark.ci if "thermal" in path.stem else pytest.mark.nightly)
-        for path in sorted(EQUATIONS.glob("*.toml"))
-    ],
+    [pytest.param(path.stem, marks=pytest.mark.nightly) for path in sorted(EQUATIONS.glob("*.toml"))],
 )
 def test_error_of_a_column_has_a_diagnosis_or_a_sentence(name: str, error: str, place: int) -> None:
     record = change_column(simulate_record(name), place, ERRORS[error])
