@@ -49,7 +49,7 @@ def test_readme_and_help_state_the_times_of_the_installation_page() -> None:
 @pytest.mark.skipif("ISLANDS_CI_STEPS" not in os.environ, reason=".ci/run measures the times")
 @pytest.mark.parametrize("row", STEPS)
 def test_stated_time_is_measured_by_ci(row: str) -> None:
-    """The speed of machines differs, so the measured time is also compared relative to loops in the same run."""
+    """The speed of machines differs, so the measured time is also compared by that of loops."""
     measured = read_measured(Path(os.environ["ISLANDS_CI_STEPS"]))
     seconds = sum(measured[step] for step in STEPS[row])
     scaled = seconds * SECONDS_OF_LOOPS / float(os.environ["ISLANDS_CI_LOOPS"])
