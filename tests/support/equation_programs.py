@@ -35,7 +35,8 @@ OCTAVE = shutil.which("octave-cli")
 #: Largest difference of a program from the simulation, relative to the range of the output.
 TOLERANCE = 1e-9
 
-_SCRIPT = """
+#: Functions of Octave that exchange numbers through binary files, which keep every bit.
+OCTAVE_FILES = """
 function r = read_numbers(name)
   file = fopen(name); r = fread(file, Inf, 'double'); fclose(file);
 end
@@ -127,7 +128,7 @@ def run_matlab(
             f"cd('{own}'); clear extended_simulation; write_numbers('y', extended_simulation({arguments}));"
         )
     done = subprocess.run(
-        [str(OCTAVE), "--quiet", "--no-init-file", "--no-history", "--eval", _SCRIPT + "\n".join(runs)],
+        [str(OCTAVE), "--quiet", "--no-init-file", "--no-history", "--eval", OCTAVE_FILES + "\n".join(runs)],
         capture_output=True,
         text=True,
         check=False,

@@ -12,6 +12,7 @@ from fmpy.validation import validate_fmu
 from islands.io.export import export, write_export
 from islands.io.export.fmu.compiler import find_compiler
 from islands.performance.benchmark.compiled_c import compile_model
+from support.equation_programs import OCTAVE_FILES
 
 OCTAVE = shutil.which("octave-cli")
 
@@ -51,18 +52,6 @@ def octave(script, folder):
     return done.stdout
 
 
-#: Exchanges numbers through binary files, which keep every bit.
-_SCRIPT = """
-function r = read_numbers(name)
-  file = fopen(name); r = fread(file, Inf, 'double'); fclose(file);
-end
-function write_numbers(name, values)
-  file = fopen(name, 'w'); fwrite(file, values, 'double'); fclose(file);
-end
-{runs}
-"""
-
-
 def run_matlab(programs, folder):
     """Run several exported models on one record each, in one process with a folder for each."""
     runs = []
@@ -76,7 +65,7 @@ def run_matlab(programs, folder):
         data.y[: exported.maximum_lag].tofile(own / "y0")
         arguments = ", ".join(f"read_numbers('{name}')" for name in [*inputs, "y0"])
         runs.append(f"cd('{own}'); clear narx_model; write_numbers('y', narx_model({arguments}));")
-    octave(_SCRIPT.format(runs="\n".join(runs)), folder)
+    octave(OCTAVE_FILES + "\n".join(runs), folder)
     return [np.fromfile(folder / str(index) / "y") for index in range(len(programs))]
 
 

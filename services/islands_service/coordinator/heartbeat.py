@@ -36,8 +36,7 @@ CANCEL_POLL = 0.2
 #: Seconds that a job has to end by itself. Then the heartbeat stores the cancellation and abandons the job.
 CANCEL_GRACE = 1.5
 
-#: Seconds that a job has to end by itself at its limit of run time, with the models that it has found. Its
-#: owner gets no models afterwards.
+#: The same at the limit of run time: the models that the search has found are wanted.
 RUN_LIMIT_GRACE = 60.0
 
 #: Seconds without a call of `Heartbeat.check` after which a search counts as hanging. A search checks many
