@@ -27,6 +27,7 @@ from islands_service.intake.confined_process import (
 if TYPE_CHECKING:
     from islands.io.records import Preview
     from islands.io.records.reading_options import ReadingOptions
+    from islands.io.records.table import Table
 
 #: Largest number of columns of a record: their descriptions are stored, and shown in every list.
 _MAX_COLUMNS = 1000
@@ -124,48 +125,59 @@ async def _read_output(process: asyncio.subprocess.Process, stream: asyncio.Stre
 def main() -> None:
     """Inspect the file named on standard input, and write the result to standard output."""
     path, asked, answer = enter()
+    try:
+        document = describe_file(Path(path), InspectionRequest(**asked))
+    except (RecordError, SettingsError) as error:
+        refuse(error, answer)
+    send_document(document, answer)
+
+
+def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
+    """Describe a file, and read the requested columns, in this process; see `inspect_file`.
+
+    Raises
+    ------
+    RecordError, SettingsError
+        The file, the requested columns or the options of reading cannot be used.
+    """
     # Import after the limits are set, so that the imported code is subject to them.
-    from islands.io.records import read_dataset  # noqa: PLC0415
     from islands.io.records.preview import preview_table  # noqa: PLC0415
     from islands.io.records.reader import open_record  # noqa: PLC0415
     from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
     from islands.io.records.row_range import parse_rows  # noqa: PLC0415
+    from islands.io.records.table_reading import read_table  # noqa: PLC0415
 
-    request = InspectionRequest(**asked)
-    try:
-        options = ReadingOptions(**request.reading)
-        table, name = open_record(path, options), Path(path).name
-        _check_columns([column for column in table.names if column], name)
-        found = preview_table(table, name, options)
-        # Check this first: a message about missing columns lists the existing ones.
-        _check_readable(found, name)
-        if request.inputs and request.output is not None:
-            rows = parse_rows(request.rows)
-            read_dataset(
-                path,
-                request.inputs,
-                request.output,
-                request.dt,
-                rows,
-                options=options,
-                resting_inputs=request.resting_inputs,
-            )
-        elif options.gaps is None:
-            _check_usable({column.name: column.problem for column in found.columns}, request)
-    except (RecordError, SettingsError) as error:
-        refuse(error, answer)
-    measured = _measure(found, path, request, options)
+    options = ReadingOptions(**request.reading)
+    # The file is parsed once, because parsing takes most of the time: all that follows reads this table.
+    table, name = open_record(path, options), path.name
+    _check_columns([column for column in table.names if column], name)
+    found = preview_table(table, name, options)
+    # Check this first: a message about missing columns lists the existing ones.
+    _check_readable(found, name)
+    if request.inputs and request.output is not None:
+        read_table(
+            table,
+            name,
+            request.inputs,
+            request.output,
+            request.dt,
+            parse_rows(request.rows),
+            options=options,
+            resting_inputs=request.resting_inputs,
+        )
+    elif options.gaps is None:
+        _check_usable({column.name: column.problem for column in found.columns}, request)
+    measured = _measure(table, found, path, request, options)
     if options.resample is not None:
         found = replace(found, dt=options.resample)
-    document = {**asdict(found), "inspection": measured, "reading": options.changes()}
-    send_document(document, answer)
+    return {**asdict(found), "inspection": measured, "reading": options.changes()}
 
 
 def _measure(
-    found: "Preview", path: str, request: InspectionRequest, options: "ReadingOptions"
+    table: "Table", found: "Preview", path: Path, request: InspectionRequest, options: "ReadingOptions"
 ) -> dict[str, Any] | None:
     """Return the choice of columns and the facts about the record; None if there is no record."""
-    from islands.facade.inspect_record import inspect_file  # noqa: PLC0415
+    from islands.facade.inspect_record import inspect_table  # noqa: PLC0415
     from islands.inspection.record_facts import MOST_SAMPLES  # noqa: PLC0415
     from islands.io.records.row_range import parse_rows  # noqa: PLC0415
 
@@ -174,8 +186,8 @@ def _measure(
         first = (found.samples - MOST_SAMPLES) // 2
         rows = f"{first}:{first + MOST_SAMPLES}"
     try:
-        inspected = inspect_file(
-            path, found, request.inputs, request.output, request.dt, parse_rows(rows), options
+        inspected = inspect_table(
+            table, path, found, request.inputs, request.output, request.dt, parse_rows(rows), options
         )
     except RecordError:
         # The preview states the problems of the file.

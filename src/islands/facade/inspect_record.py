@@ -22,7 +22,7 @@ from islands.inspection.columns.record_inspection import (
 from islands.inspection.columns.stamp_regularity import NO_BREAKS, TimeStamps, describe_stamps
 from islands.inspection.record_facts import RecordFacts, measure_facts
 from islands.io.records.column_names import find_column, split_structures
-from islands.io.records.preview import ColumnPreview, Preview, preview
+from islands.io.records.preview import ColumnPreview, Preview, preview_table
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.sampling.sampling_time import time_scale
@@ -78,11 +78,15 @@ def inspect_record(
     """
     if isinstance(record, Dataset):
         return _inspect_dataset(record if rows is None else record[rows])
-    return inspect_file(record, preview(record, reading), inputs, output, dt, rows, reading)
+    # The file is parsed once: parsing takes most of the time.
+    table = open_record(record, reading)
+    found = preview_table(table, Path(record).name, reading)
+    return inspect_table(table, record, found, inputs, output, dt, rows, reading)
 
 
-def inspect_file(
-    record: str | Path,
+def inspect_table(
+    table: Table,
+    path: str | Path,
     found: Preview,
     inputs: Sequence[str] = (),
     output: str | None = None,
@@ -90,7 +94,18 @@ def inspect_file(
     rows: slice | None = None,
     reading: ReadingOptions = DEFAULT_READING,
 ) -> RecordInspection:
-    """Describe a file as `inspect_record` does, with its preview.
+    """Describe an open file as `inspect_record` does.
+
+    Parameters
+    ----------
+    table : Table
+        The columns of the file.
+    path : str or Path
+        The file.
+    found : Preview
+        Its preview.
+    inputs, output, dt, rows, reading
+        As in `inspect_record`.
 
     Raises
     ------
@@ -98,11 +113,12 @@ def inspect_file(
         As in `inspect_record`.
     """
     inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
-    table, file = open_record(record, reading), Path(record).name
+    path = Path(path)
     if inputs and output is not None:
         sources = [find_column(name, table.names) for name in inputs]
-        check_choice(table.names, sources, find_column(output, table.names), file, reading.time, table.others)
-    return _FileInspection(Path(record), table, found, dt, rows, reading).inspect(inputs, output)
+        target = find_column(output, table.names)
+        check_choice(table.names, sources, target, path.name, reading.time, table.others)
+    return _FileInspection(path, table, found, dt, rows, reading).inspect(inputs, output)
 
 
 def _inspect_dataset(record: Dataset) -> RecordInspection:

@@ -21,8 +21,9 @@ from islands.facade.coupled.coupled_identification import StoppedCouplingError
 from islands.facade.coupled.coupled_result import list_folders
 from islands.io.export.coupled.coupled_document import is_coupled
 from islands.io.export.coupled.coupled_equations import coupled_signals
-from islands.io.records import read_dataset
+from islands.io.records.reader import open_record
 from islands.io.records.reading_options import ReadingOptions
+from islands.io.records.table_reading import read_table
 from islands.io.records.writer import write_coupled_simulation
 from islands.simulation.coupled_free_run import coupled_free_run, match_coupled
 from islands.validation.metrics import metrics
@@ -161,9 +162,12 @@ def simulate_coupled(
             f"the model has the outputs {', '.join(model.output_names)}: give as many --output, or none"
         )
     names = model.models[0].column_names[: len(model.input_names)]
+    table = open_record(record, reading)
     recorded = CoupledRecord(
         tuple(
-            read_dataset(record, inputs or names, name, dt, rows, missing_output=True, options=reading)
+            read_table(
+                *(table, record.name, inputs or names, name, dt, rows), missing_output=True, options=reading
+            )
             for name in outputs or model.output_names
         )
     )

@@ -9,6 +9,7 @@ from islands.inspection.columns.record_inspection import SCHEMA
 from islands.io.inspection_text import WIDTH, format_inspection
 from islands.io.records.reading_options import ReadingOptions
 from support.known_records import delay, lag, measure, steps
+from support.parsed_files import list_parsed
 
 
 def write(path, time=None, drop=(), blank=(), header="t_s,u_V,y_um"):
@@ -30,6 +31,12 @@ def test_a_file_is_described_without_a_choice_of_columns(tmp_path):
     assert found.warnings == ()
     assert "--input u_V --output y_um" in found.command
     assert found.choice.confidence > 0.9
+
+
+def test_a_file_is_parsed_once(tmp_path, monkeypatch):
+    parsed = list_parsed(monkeypatch)
+    assert islands.inspect_record(write(tmp_path / "r.csv")).facts.facts
+    assert parsed == ["r.csv"]
 
 
 def test_gaps_are_reported_with_rows_and_no_fact_reads_across_them(tmp_path):

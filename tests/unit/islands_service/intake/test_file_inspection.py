@@ -17,9 +17,10 @@ import pytest
 
 from islands.errors import RecordError
 from islands_service.intake import file_inspection
-from islands_service.intake.file_inspection import InspectionRequest, inspect_file
+from islands_service.intake.file_inspection import InspectionRequest, describe_file, inspect_file
 from islands_service.intake.record_reading import RecordRequest, read_confined
 from support.odd_files import write_workbook
+from support.parsed_files import list_parsed
 from support.processes import alive, descendants, eventually
 from support.service import csv
 
@@ -95,6 +96,13 @@ def test_record_is_described(record):
     found = inspect(record, InspectionRequest(("u_V",), "y_um", 0.01, "0:100"))
     assert [column["name"] for column in found["columns"]] == ["t_s", "u_V", "y_um"]
     assert (found["samples"], found["dt"], found["time"]) == (200, 0.01, "t_s")
+
+
+@pytest.mark.parametrize("asked", [InspectionRequest(), InspectionRequest(("u_V",), "y_um", rows="0:100")])
+def test_a_file_is_parsed_once(record, monkeypatch, asked):
+    parsed = list_parsed(monkeypatch)
+    assert describe_file(record, asked)["inspection"]["facts"]
+    assert parsed == ["a.csv"]
 
 
 @pytest.mark.ci

@@ -3,8 +3,7 @@
 import pytest
 
 from islands.errors import RecordError
-from islands.facade.inspect_record import inspect_file
-from islands.io.records.preview import preview
+from islands.facade.inspect_record import inspect_record
 from support.hostile_tables import FAMILIES, reading_seconds
 
 #: Largest growth of the time when the size is doubled twice.
@@ -29,17 +28,12 @@ EXCESSIVE = (
 )
 
 
-def inspect(path):
-    """Read a file as a service does that receives it."""
-    return inspect_file(path, preview(path))
-
-
 @pytest.mark.parametrize("family", EXCESSIVE)
 def test_a_file_that_exceeds_a_limit_is_refused_with_its_place(tmp_path, family):
     path = tmp_path / "r.csv"
     path.write_text(FAMILIES[family](240_000))
     with pytest.raises(RecordError, match=r"^r\.csv(, line \d+| has more than 10000 columns)") as caught:
-        inspect(path)
+        inspect_record(path)
     assert len(str(caught.value)) < 500
 
 
@@ -50,6 +44,6 @@ def test_the_time_grows_in_proportion_to_the_size(tmp_path, family):
     times = []
     for size in (250_000, 1_000_000):
         path.write_bytes(FAMILIES[family](size).encode())
-        times.append(reading_seconds(inspect, path, 2))
+        times.append(reading_seconds(inspect_record, path, 2))
     # Below 50 ms the time is that of the start of the table and of the message.
     assert times[1] < 0.05 or times[1] <= LARGEST_RATIO * times[0], times

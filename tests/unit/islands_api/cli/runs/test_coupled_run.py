@@ -11,6 +11,7 @@ from islands.data.coupled_record import CoupledRecord
 from islands.simulation.coupled_free_run import coupled_free_run
 from support.command_line import fail, succeed
 from support.coupled_systems import TWO_MASSES, make_coupled_record
+from support.parsed_files import list_parsed
 from support.undrawn import undrawn_figures
 
 #: A search that takes a second.
@@ -31,13 +32,15 @@ def record(tmp_path_factory):
 
 
 @pytest.mark.ci
-def test_a_fitted_model_is_simulated_and_shown(record, tmp_path) -> None:
+def test_a_fitted_model_is_simulated_and_shown(record, tmp_path, monkeypatch) -> None:
     folder = tmp_path / "result"
     printed = succeed("fit", record, *COLUMNS, *SMALL, "--out", folder)
     assert "* y2(k-1)" in printed
     assert json.loads((folder / "result.json").read_text())["schema"] == "islands.coupled-result/1"
     out = tmp_path / "simulated.csv"
+    parsed = list_parsed(monkeypatch)
     printed = succeed("simulate", folder, record, "--out", out)
+    assert parsed == ["masses.csv"]
     assert "y1: MAPE 0.0000 %  R2 1.00000" in printed
     header, *rows = csv.reader(out.read_text().splitlines())
     assert header == ["time", "y1_sim", "y2_sim"]

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.formats.text.number_format import find_number_format
-from islands.io.records.formats.text.number_parsing import is_missing, parse_numbers
+from islands.io.records.formats.text.number_parsing import describe_numbers, is_missing, parse_numbers
 from islands.io.records.formats.text.table_start import TableStart, collapse_blanks, find_table
 from islands.io.records.formats.text.text_encoding import decode
 from islands.io.records.formats.text.time_stamps import (
@@ -30,6 +29,7 @@ from islands.io.records.formats.text.time_stamps import (
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.size_limits import (
     MOST_CHARACTERS,
+    MOST_LINE,
     check_cell,
     check_column_count,
     check_line,
@@ -104,7 +104,7 @@ class DelimitedText:
         """Return what was inferred: of the file, and how numbers are written, or that it is uncertain."""
         numeric = [name for name in names if name not in self.clocks]
         try:
-            written = find_number_format(
+            note = describe_numbers(
                 self._select_columns(numeric, self.cells),
                 self.rows,
                 self.options.decimal_mark,
@@ -112,7 +112,7 @@ class DelimitedText:
             )
         except RecordError as error:
             return (*self.notes, str(error))
-        return (*self.notes, *([written.note] if written.note else []))
+        return (*self.notes, *([note] if note else []))
 
     def _join_date(self, name: str, cells: Sequence[list[str]]) -> list[str]:
         """Return the time stamps of a column, each with the date in another column if there is one."""
@@ -186,8 +186,9 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
     RecordError
         There is no table, a line, a name or a cell is too long, or a quote is never closed.
     """
-    for number, line in enumerate(lines, 1):
-        check_line(len(line), f"{file}, {counted} {number}")
+    if max(map(len, lines), default=0) > MOST_LINE:
+        number, length = next((at, len(line)) for at, line in enumerate(lines, 1) if len(line) > MOST_LINE)
+        check_line(length, f"{file}, {counted} {number}")
     if not any(line.strip() for line in lines):
         raise RecordError(f"{file} is empty: a record has a header with names and one line per sample")
     start = find_table(lines, file, options)
@@ -210,7 +211,9 @@ def _read_rows(
     lines: Sequence[str], start: TableStart, file: str, counted: str
 ) -> tuple["array[int]", list[list[str]]]:
     """Return the line numbers and the cells of all samples, without blank lines at the end."""
-    below = (collapse_blanks(lines[at], start.separator) for at in range(start.first, len(lines)))
+    below = islice(lines, start.first, None)
+    if start.separator == " ":
+        below = (collapse_blanks(line, start.separator) for line in below)
     reader = csv.reader(below, delimiter=start.separator, strict=True)
     numbers = array("q")
     rows: list[list[str]] = []
@@ -252,10 +255,12 @@ def _name(start: TableStart, place: int) -> str:
 def _trim(names: tuple[str, ...], cells: list[list[str]]) -> tuple[tuple[str, ...], list[list[str]]]:
     """Remove empty columns at the end: cells that no line has, and cells behind the last name."""
     widths = {len(row) for row in cells if row}
-    if len(widths) == 1 and (width := widths.pop()) < len(names) and width > 1:
-        return names[:width], cells
-    width = len(names)
-    if len({len(row) for row in cells if row}) == 1 and not any(any(row[width:]) for row in cells):
+    if len(widths) != 1:
+        return names, cells
+    found, width = widths.pop(), len(names)
+    if 1 < found < width:
+        return names[:found], cells
+    if found > width and not any(any(row[width:]) for row in cells):
         return names, [row[:width] for row in cells]
     return names, cells
 
