@@ -10,12 +10,13 @@ from islands_api.server.http_server import HTTPServer, make_server_config
 from islands_api.server.listener import open_listener
 from islands_api.web.app import create_app
 from islands_api.web.auth import make_verifier
+from islands_service.liveness import FAILED, MISCONFIGURED, UNAVAILABLE
 from islands_service.logging_config import configure_logs
 from islands_service.process.process_settings import freeze_garbage_collector, raise_file_limit
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.store.backends.cached_blobs import open_blobs
-from islands_service.supervisor import MISCONFIGURED
+from islands_service.store.database import StoreError
 
 log = structlog.get_logger()
 
@@ -39,7 +40,9 @@ def main() -> int:
         listener = open_listener(settings.host, settings.port)
     except IslandsError as error:
         print(f"islands: {error}", file=sys.stderr)
-        return MISCONFIGURED if isinstance(error, SettingsError) else 1
+        if isinstance(error, StoreError):
+            return UNAVAILABLE
+        return MISCONFIGURED if isinstance(error, SettingsError) else FAILED
     server = HTTPServer(make_server_config(create_app(settings, store), settings))
     # The throughput is 50 % higher, and the slowest requests take a third of the time.
     freeze_garbage_collector()

@@ -1,4 +1,4 @@
-"""Heartbeat pipe between the supervisor and its child processes, and cooperative shutdown."""
+"""Supervisor and child processes: heartbeat pipe, exit statuses, and cooperative shutdown."""
 
 import os
 import signal
@@ -9,6 +9,17 @@ from threading import Event, Thread
 
 #: Seconds between two heartbeats.
 EVERY = 0.5
+
+#: Exit status after an error that only its message describes.
+FAILED = 1
+
+#: Exit status of a child that cannot run with these settings. It is not restarted, unless it has run with
+#: them before.
+MISCONFIGURED = 2
+
+#: Exit status of a child that waits for something outside, such as the database. It is started again as long
+#: as that takes.
+UNAVAILABLE = os.EX_TEMPFAIL
 
 
 def send_heartbeat(descriptor: int | None) -> None:

@@ -19,7 +19,7 @@ from time import monotonic
 from typing import IO
 
 from islands.errors import IslandsError
-from islands_service.liveness import StopRequest, stop_on_signals
+from islands_service.liveness import FAILED, MISCONFIGURED, UNAVAILABLE, StopRequest, stop_on_signals
 
 #: Seconds between two checks of the children.
 _POLL_SECONDS = 0.05
@@ -43,9 +43,8 @@ _STARTUP_TIMEOUT = 120.0
 #: Seconds that the children have to end by themselves.
 _SHUTDOWN_GRACE = 15.0
 
-#: Exit status of a child that cannot run with these settings. It is not restarted, unless it has run with
-#: them before.
-MISCONFIGURED = 2
+#: Number of exits with the same error at the start, without any longer run, that end the supervisor.
+_MOST_FAILURES = 5
 
 #: Option of Linux's prctl: the signal that a process receives when its parent ends.
 _PR_SET_PDEATHSIG = 1
@@ -84,6 +83,12 @@ class Role:
         Seconds before the start that follows the next exit.
     has_run : bool
         Whether an earlier process of this role has sent a heartbeat.
+    is_stable : bool
+        Whether an earlier process of this role has run for a while.
+    failure : int
+        Exit status of the last process if it ended at its start with an error, otherwise 0.
+    failures : int
+        Number of consecutive processes that ended with this status.
     """
 
     name: str
@@ -99,6 +104,9 @@ class Role:
     start_at: float = 0.0
     backoff: float = _FIRST_BACKOFF
     has_run: bool = False
+    is_stable: bool = False
+    failure: int = 0
+    failures: int = 0
 
 
 @contextmanager
@@ -138,7 +146,8 @@ def supervise(roles: Sequence[Role], environment: Mapping[str, str], log: IO[str
     Returns
     -------
     int
-        0, or `MISCONFIGURED` if a child exits with this status before it has ever run.
+        0; `MISCONFIGURED` if a child exits with this status before it has ever run; `FAILED` if a child ends
+        again and again at its start with the same error.
     """
     stopping = StopRequest()
     stop_on_signals(stopping)
@@ -182,6 +191,13 @@ def _check_role(
     # jobs run.
     if code == MISCONFIGURED and not has_run:
         return MISCONFIGURED
+    if role.failures == _MOST_FAILURES:
+        _print(
+            log,
+            f"{role.name} has ended {_MOST_FAILURES} times at its start ({code}): correct the error that it "
+            "has printed above, and start the service again",
+        )
+        return FAILED
     _print(log, f"{role.name} ended ({code}): it is started again")
     for other in roles:
         if role.name in other.needs and other.process is not None:
@@ -230,7 +246,22 @@ def _handle_exit(role: Role, now: float) -> None:
     role.start_at = now if stable else now + role.backoff
     role.backoff = _FIRST_BACKOFF if stable else min(2.0 * role.backoff, _MAX_BACKOFF)
     role.has_run = role.has_run or role.last_heartbeat is not None
+    role.is_stable = role.is_stable or (stable and role.last_heartbeat is not None)
+    _count_failures(role, role.process.returncode)
     role.process, role.pipe = None, -1
+
+
+def _count_failures(role: Role, code: int) -> None:
+    """Count an exit with the same error as the last one, unless a process of the role has run for a while.
+
+    What has run can be repaired while the jobs run; `MISCONFIGURED` is then such a cause. A killed process
+    has no error of its own: the supervisor kills those that hang, and those that need one that has ended.
+    """
+    if role.is_stable or code in (0, MISCONFIGURED, UNAVAILABLE, -signal.SIGKILL):
+        role.failure = role.failures = 0
+        return
+    role.failures = role.failures + 1 if code == role.failure else 1
+    role.failure = code
 
 
 def _shut_down(roles: Sequence[Role], log: IO[str]) -> None:

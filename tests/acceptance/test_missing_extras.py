@@ -2,8 +2,11 @@
 
 import ast
 import re
+import subprocess
 import sys
+import sysconfig
 import tomllib
+import venv
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -111,6 +114,43 @@ def test_a_missing_package_leads_to_the_extra_that_installs_it(extra, tmp_path, 
     (named,) = INSTRUCTION.findall(str(caught.value))
     assert named == extra
     assert use.requirement in {re.split(r"[\[>]", each)[0] for each in EXTRAS[extra]}
+
+
+@pytest.fixture
+def reduced(tmp_path):
+    """Return a function that makes an environment without some of the packages of this one."""
+
+    def make(*absent: str) -> Path:
+        venv.create(tmp_path / "venv", symlinks=True)
+        packages = Path(sysconfig.get_path("purelib"))
+        target = next((tmp_path / "venv").glob("lib/python*/site-packages"))
+        for each in packages.iterdir():
+            if not re.match(rf"({'|'.join(absent)})(-[\d.]+\.dist-info)?$", each.name):
+                (target / each.name).symlink_to(each)
+        return tmp_path / "venv/bin/python"
+
+    return make
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("absent", "options", "extras"),
+    [
+        (("uvicorn",), (), "'service'"),
+        (("structlog", "psycopg"), ("--database", "postgresql+psycopg://me@db/d"), "'service' and 'cluster'"),
+    ],
+)
+def test_a_service_without_some_of_its_packages_names_them_and_does_not_start(
+    reduced, tmp_path, absent, options, extras
+):
+    command = [reduced(*absent), "-m", "islands", "serve", "--data-dir", tmp_path / "data", *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    said = " ".join(done.stderr.split())
+    needs = f"needs the extra{'s' if len(absent) > 1 else ''} {extras}: pip install 'FOLDER/"
+    assert said.startswith(f"error: islands serve cannot run without {', '.join(absent)}; it {needs}")
+    assert said.endswith("".join(f" --extra {each}" for each in re.findall(r"'(\w+)'", extras)))
+    assert not (tmp_path / "data").exists()
 
 
 def test_a_search_on_one_core_for_lack_of_ray_says_how_to_install_it():

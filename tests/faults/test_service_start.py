@@ -11,7 +11,7 @@ import trustme
 
 from islands_api.__main__ import main
 from islands_api.server.listener import open_listener
-from islands_service.supervisor import MISCONFIGURED
+from islands_service.liveness import FAILED, MISCONFIGURED
 from support.command_line import succeed
 from support.processes import eventually, kill
 from support.service_processes import free_port, serving, started
@@ -23,15 +23,21 @@ API_ONLY = {"ISLANDS_COORDINATORS": "0"}
 
 
 def refused(*options: object, **environment: str) -> str:
-    process = started(*options, **{**API_ONLY, **environment})
-    try:
-        _, said = process.communicate(timeout=30)
-    finally:
-        process.kill()
-    assert process.returncode == 2, said
+    status, said = ended(*options, **environment)
+    assert status == MISCONFIGURED, said
     assert "Traceback" not in said
     assert "started again" not in said
-    return " ".join(said.split())
+    return said
+
+
+def ended(*options: object, **environment: str) -> tuple[int, str]:
+    """Return the exit status and the output of a service that ends by itself."""
+    process = started(*options, **{**API_ONLY, **environment})
+    try:
+        _, said = process.communicate(timeout=180)
+    finally:
+        process.kill()
+    return process.returncode, " ".join(said.split())
 
 
 def test_second_service_on_the_same_folder_is_refused(tmp_path: Path) -> None:
@@ -41,6 +47,34 @@ def test_second_service_on_the_same_folder_is_refused(tmp_path: Path) -> None:
         assert f"{folder} belongs to another 'islands serve' (process {service.process.pid})" in said
         assert "give another --data-dir" in said
         service.ready()
+
+
+def test_database_that_cannot_be_read_ends_the_service(tmp_path: Path) -> None:
+    """The API ends with this error at every start."""
+    (tmp_path / "islands.db").write_bytes(b"not a database" * 1000)
+    status, said = ended("--data-dir", tmp_path, "--port", free_port())
+    assert status == FAILED
+    assert "file is not a database" in said
+    assert said.count("api ended (1): it is started again") == 4
+    assert said.endswith(
+        "api has ended 5 times at its start (1): correct the error that it has printed above, and start the "
+        "service again"
+    )
+
+
+def test_service_waits_for_a_database_that_does_not_answer_yet(tmp_path: Path) -> None:
+    """The database of a machine may start after the service."""
+    url = f"postgresql+psycopg://islands@127.0.0.1:{free_port()}/islands"
+    process = started("--data-dir", tmp_path, "--port", free_port(), "--database", url, **API_ONLY)
+    with process:
+        try:
+            assert process.stderr is not None
+            again = (line for line in process.stderr if "it is started again" in line)
+            assert {next(again) for _ in range(7)} == {"islands serve: api ended (75): it is started again\n"}
+            process.terminate()
+            assert process.wait(30) == 0
+        finally:
+            process.kill()
 
 
 def test_port_in_use_is_refused(tmp_path: Path) -> None:

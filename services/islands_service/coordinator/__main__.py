@@ -11,11 +11,19 @@ from islands.errors import IslandsError
 from islands_service.coordinator.coordinator import Coordinator
 from islands_service.coordinator.coordinator_metrics import CoordinatorMetrics
 from islands_service.coordinator.process_restart import restart_process
-from islands_service.liveness import StopRequest, stop_on_signals, watch_supervisor
+from islands_service.liveness import (
+    FAILED,
+    UNAVAILABLE,
+    StopRequest,
+    stop_on_signals,
+    watch_supervisor,
+)
 from islands_service.logging_config import configure_logs
 from islands_service.process.process_metrics import serve_metrics
 from islands_service.process.process_settings import limit_threads
+from islands_service.runtime.errors import ClusterError
 from islands_service.settings import service_settings
+from islands_service.store.database import StoreError
 
 
 def main() -> int:
@@ -42,7 +50,8 @@ def main() -> int:
             Coordinator(settings, arguments.name, stopping, abandon, metrics).run()
     except IslandsError as error:
         print(f"coordinator: {error}", file=sys.stderr)
-        return 1
+        # The store and Ray are other processes, which may come back.
+        return UNAVAILABLE if isinstance(error, StoreError | ClusterError) else FAILED
     return 0
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import ray
 
 from islands.errors import IslandsError
-from islands_service.liveness import StopRequest, send_heartbeat, stop_on_signals
+from islands_service.liveness import FAILED, StopRequest, send_heartbeat, stop_on_signals
 from islands_service.runtime.cluster import cluster
 from islands_service.settings import service_settings
 
@@ -40,11 +40,11 @@ def main() -> int:
             if failure:
                 print(f"Ray: {failure}", file=sys.stderr, flush=True)
                 # A regular shutdown would wait for the lost process. The supervisor kills the remaining ones.
-                os._exit(1)
+                os._exit(FAILED)
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
     except IslandsError as error:
         print(f"Ray: {error}", file=sys.stderr)
-        return 1
+        return FAILED
     return 0
 
 

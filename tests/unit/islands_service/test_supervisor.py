@@ -123,7 +123,8 @@ def role(name: str, script: str = "stay()", patience: float = 60.0, **more: Any)
 
 
 def test_role_that_exits_is_restarted(supervised: Start) -> None:
-    running = supervised(role("api", "note('start'); sys.exit(7)"))
+    script = "if open(os.environ['JOURNAL']).read().count('start') < 3: note('start'); sys.exit(7)\nstay()"
+    running = supervised(role("api", script))
     pids = {pid for *_, pid in running.started(3)}
     assert len(pids) >= 3
     assert "islands serve: api ended (7): it is started again" in running.end()
@@ -187,6 +188,44 @@ def test_role_that_has_run_before_is_restarted_when_misconfigured(supervised: St
     running.started(4, "api")
     assert len(running.entries("start", "work")) == 1
     assert running.end().count("api ended (2): it is started again") == 2
+    assert running.process.returncode == 0
+
+
+@pytest.mark.parametrize("heartbeat", ["heartbeat(); ", ""])
+def test_role_that_always_ends_with_the_same_error_ends_all_roles_and_the_supervisor(
+    supervised: Start, heartbeat: str
+) -> None:
+    """A coordinator sends heartbeats before its first error."""
+    running = supervised(role("api"), role("work", f"note('start'); {heartbeat}sys.exit(7)"))
+    said = running.said()
+    assert running.process.returncode == 1
+    assert said.count("work ended (7): it is started again") == 4
+    assert said.splitlines()[-1] == (
+        "islands serve: work has ended 5 times at its start (7): correct the error that it has printed "
+        "above, and start the service again"
+    )
+    assert len(running.entries("start", "work")) == 5
+    assert running.order("signalled", "end") == ["api signalled", "api end"]
+
+
+@pytest.mark.parametrize("end", ["sys.exit(75)", "sys.exit(7 + count % 2)", "os.kill(os.getpid(), 9)"])
+def test_role_that_waits_for_another_process_or_was_killed_is_restarted(supervised: Start, end: str) -> None:
+    """Or that ends with several errors. 75 is `os.EX_TEMPFAIL`: the database does not answer yet."""
+    script = f"count = open(os.environ['JOURNAL']).read().count('start')\nnote('start'); {end}"
+    running = supervised(role("api", script), _FIRST_BACKOFF=0.01, _MAX_BACKOFF=0.01)
+    running.started(8)
+    running.end()
+    assert running.process.returncode == 0
+
+
+def test_role_that_has_run_for_a_while_is_restarted_after_any_number_of_errors(supervised: Start) -> None:
+    script = (
+        "count = open(os.environ['JOURNAL']).read().count('start')\n"
+        "note('start'); heartbeat(); time.sleep(0.0 if count else 0.3); sys.exit(7)"
+    )
+    running = supervised(role("api", script), _STABLE_AFTER=0.2, _FIRST_BACKOFF=0.01, _MAX_BACKOFF=0.01)
+    running.started(8)
+    running.end()
     assert running.process.returncode == 0
 
 

@@ -3,11 +3,14 @@
 import secrets
 import signal
 import sys
+from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from islands.distribution import describe_missing_extra, list_missing_packages
+from islands.errors import SettingsError
 from islands_api.cli.console import errors
 from islands_api.cli.service.store_options import refuse_password
 from islands_service.settings import ServiceSettings, service_settings
@@ -66,6 +69,7 @@ def serve(
 ) -> None:
     """Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next start."""
     settings = service_settings(**locals())
+    check_packages(settings)
     with folder_lock(settings.data_dir):
         scheme = "http" if settings.tls_key is None else "https"
         errors.print(
@@ -76,6 +80,27 @@ def serve(
         settings.ray_address_file.unlink(missing_ok=True)
         status = supervise(roles(settings), settings.environment())
     sys.exit(status)
+
+
+def check_packages(settings: ServiceSettings) -> None:
+    """Check that what the child processes import is installed: they would end at every start.
+
+    Raises
+    ------
+    SettingsError
+        The message names the missing packages.
+    """
+    uses = {
+        "service": True,
+        "cluster": not settings.url.startswith("sqlite"),
+        "oidc": settings.oidc_issuer,
+        "s3": settings.blob_store or settings.dataset_buckets,
+        "telemetry": settings.telemetry,
+    }
+    absent = {extra: list_missing_packages(extra) for extra, used in uses.items() if used}
+    if names := dict.fromkeys(chain(*absent.values())):
+        user = f"islands serve cannot run without {', '.join(names)}; it"
+        raise SettingsError(describe_missing_extra(user, *filter(absent.get, absent)))
 
 
 def roles(settings: ServiceSettings) -> list[Role]:
