@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from islands_api.schemas import JobView, ResponseModel
+from islands_api.schemas import ResponseModel
 from islands_service.domain.owner import DEFAULT_WEIGHT, MAX_QUOTA, WEIGHTS
 from islands_service.store.tenants.keys import SCOPES
 
@@ -127,19 +127,3 @@ class OwnerPage(ResponseModel):
     """All owners by name."""
 
     items: tuple[OwnerView, ...]
-
-
-class OwnedJobView(JobView):
-    """Job with its owner."""
-
-    # The examples of a job have no owner.
-    model_config = ConfigDict(frozen=True, extra="allow", json_schema_extra={"examples": []})
-
-    owner: str = Field(description="Owner of the job.")
-
-
-class OwnedJobPage(ResponseModel):
-    """Page of the jobs of all owners, newest first."""
-
-    items: tuple[OwnedJobView, ...]
-    next: str | None = Field(default=None, description="Cursor of the next page. None on the last page.")

@@ -178,6 +178,22 @@ class JobPage(ResponseModel):
     next: str | None = Field(default=None, description="Cursor of the next page. None on the last page.")
 
 
+class OwnedJobView(JobView):
+    """Job with its owner."""
+
+    # The examples of a job have no owner.
+    model_config = ConfigDict(frozen=True, extra="allow", json_schema_extra={"examples": []})
+
+    owner: str = Field(description="Owner of the job.")
+
+
+class OwnedJobPage(ResponseModel):
+    """Page of the jobs of all owners, newest first."""
+
+    items: tuple[OwnedJobView, ...]
+    next: str | None = Field(default=None, description="Cursor of the next page. None on the last page.")
+
+
 class ModelView(ResponseModel):
     """Model with its metrics, physics checks and residual tests, as in ``result.json``."""
 

@@ -8,7 +8,14 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, get_args, over
 
 import httpx
 
-from islands_api.client import calls, dataset_calls, diagnosis_calls, monitor_calls, webhook_calls
+from islands_api.client import (
+    admin_calls,
+    calls,
+    dataset_calls,
+    diagnosis_calls,
+    monitor_calls,
+    webhook_calls,
+)
 from islands_api.client.calls import RequestSpec, T
 from islands_api.client.errors import JobFailedError
 from islands_api.client.transport import (
@@ -100,6 +107,8 @@ class BaseClient(Generic[H]):
     webhooks = Endpoint(webhook_calls.webhooks)
     delete_webhook = Endpoint(webhook_calls.delete_webhook)
     deliveries = Endpoint(webhook_calls.deliveries)
+    admin_jobs = Endpoint(admin_calls.admin_jobs)
+    admin_cancel = Endpoint(admin_calls.admin_cancel)
 
     _http_class: type[H]
 

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
 
-from islands_api.admin_schemas import OwnedJobPage, OwnedJobView
+from islands_api.schemas import OwnedJobPage, OwnedJobView
 from islands_api.web.auth import Administrator
 from islands_api.web.dependencies import AppStateDep
 from islands_api.web.job_submission import describe_job, describe_jobs

@@ -124,6 +124,13 @@ def client(connect: Callable[..., Any], service: Service, me: Me) -> Any:
 
 
 @pytest.fixture
+def administrator(connect: Callable[..., Any], service: Service) -> Any:
+    """Client of an administrator."""
+    _, secret = service.store.keys.create("administrator", frozenset({"admin"}))
+    return connect(service.url, secret)
+
+
+@pytest.fixture
 def claimed(service: Service) -> Callable[[Any], Lease]:
     """Return a function that claims a job like its coordinator."""
 

@@ -372,3 +372,23 @@ def test_calls_declare_whether_they_are_repeatable() -> None:
         call.repeatable
         for call in (calls.job("0"), calls.submit("0", ["u"], "y"), dataset_calls.upload("r.csv"))
     )
+
+
+# Administration.
+
+
+def test_administrators_list_and_cancel_the_jobs_of_all_owners(
+    client: Any, service: Service, administrator: Any
+) -> None:
+    with pytest.raises(ServiceError, match="admin"):
+        client.admin_jobs()
+    jobs = {queued(service.store, owner).id: owner for owner in ("first lab", "second lab")}
+    listed = administrator.admin_jobs(limit=2)
+    assert {job.id: job.owner for job in listed.items} == jobs
+    (job,) = administrator.admin_jobs("first lab", "queued").items
+    assert (job.owner, job.state) == ("first lab", "queued")
+    assert administrator.admin_jobs(limit=1, cursor=administrator.admin_jobs(limit=1).next).items[0] == job
+    cancelled = administrator.admin_cancel(job)
+    assert (cancelled.id, cancelled.owner, cancelled.state) == (job.id, "first lab", "cancelled")
+    with pytest.raises(ServiceError, match="cancelled"):
+        administrator.admin_cancel(job.id)
