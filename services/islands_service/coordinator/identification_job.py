@@ -28,7 +28,7 @@ from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_notes import JobNotes
-from islands_service.domain.job import JobOutcome, JobState, Lease, ProgressReport
+from islands_service.domain.job import RUN_TIME, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.runtime.errors import ClusterError
@@ -93,7 +93,7 @@ def run_identification_job(
         f"the search ended at the limit of the run time of one job, {stop.reason.limit} s, with its "
         "best models so far; the operator can raise the limit"
     )
-    ended = replace(found, search=replace(found.search, ended_by="run time"))
+    ended = replace(found, search=replace(found.search, ended_by=RUN_TIME))
     return make_outcome(ended, "; ".join(filter(None, [start.note, note])))
 
 

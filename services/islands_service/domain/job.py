@@ -50,6 +50,9 @@ ACTIVE = (JobState.QUEUED, JobState.RUNNING)
 #: States from which a job can be resumed.
 RESUMABLE = (JobState.FAILED, JobState.CANCELLED)
 
+#: Why a search ended that was stopped at the limit of its run time, in its result.
+RUN_TIME = "run time"
+
 #: Kind of a job that identifies a model; a key of ``JOB_RUNNERS`` in
 #: `islands_service.coordinator.job_runners`.
 IDENTIFICATION = "identification"

@@ -203,7 +203,7 @@ def result(
     key: ApiKey = None,
     as_json: Json = False,
 ) -> None:
-    """Show the result of a job that has succeeded, and download it."""
+    """Show the result of a job, and download it. A cancelled search has the models found so far."""
     if out is not None:
         for kind in views.RESULTS.values():
             check_folder(out, force, kind.file)
@@ -275,6 +275,10 @@ def _follow(url: str, key: str | None, job: JobView, as_json: bool, watch: bool 
             views.show_findings(job)
         elif job.state == JobState.SUCCEEDED:
             views.show_models(client, job, client.models(job))
+            if kept := views.describe_kept_models(job):
+                output.print(f"The job {kept}.", markup=False)
     if job.state != JobState.SUCCEEDED:
+        if kept := views.describe_kept_models(job):
+            raise JobFailedError(f"job {job.id} {kept}")
         detail = (job.problem or {}).get("detail", "resume it to continue")
         raise JobFailedError(f"job {job.id} {job.state}: {detail}")

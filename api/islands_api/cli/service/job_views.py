@@ -18,7 +18,7 @@ from islands.io.simulator_spec.specification import EXTENDED_FILE
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
-from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, TERMINAL, JobState
+from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, RUN_TIME, TERMINAL, JobState
 
 #: Largest number of islands that have a line each.
 _SHOWN_ISLANDS = 16
@@ -49,8 +49,25 @@ def show_job(job: JobView, as_json: bool) -> None:
         # Results of earlier versions have no sentences.
         for sentence in job.summary.get("words", job.summary["equation"]).splitlines():
             output.print("\n".join(wrap(sentence.strip())), markup=False)
+        if kept := describe_kept_models(job):
+            output.print("\n".join(wrap(f"The job {kept}.")), markup=False)
     if job.problem is not None:
         output.print(job.problem["detail"], markup=False)
+
+
+def describe_kept_models(job: JobView) -> str:
+    """Return what a search has kept that did not end by itself, and how to get it; empty for other jobs."""
+    summary = job.summary or {}
+    if job.kind != IDENTIFICATION or not summary:
+        return ""
+    count = summary["models"]
+    models = f"{count} model{'s' if count > 1 else ''} found so far"
+    get = f"'islands jobs result {job.id} --out FOLDER' writes {'them' if count > 1 else 'it'} to a folder"
+    if job.state == JobState.CANCELLED:
+        return f"was cancelled and kept the {models}: {get}, 'islands jobs resume {job.id}' continues"
+    if summary.get("ended_by") == RUN_TIME:
+        return f"ended at its limit of run time and kept the {models}: {get}"
+    return ""
 
 
 def show_findings(job: JobView) -> None:

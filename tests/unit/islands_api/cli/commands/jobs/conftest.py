@@ -72,11 +72,21 @@ def found(service: Service) -> JobOutcome:
 
 
 @pytest.fixture
-def done(service: Service, owner: str, found: JobOutcome) -> str:
+def finish(service: Service, owner: str) -> Callable[[JobOutcome], str]:
+    """Return a function that makes a job with an outcome and figures."""
+
+    def make(outcome: JobOutcome) -> str:
+        job = ahead(service, owner)
+        service.store.leases.finish(taken(service.store, job), outcome)
+        blob = Blobs(service.settings.blobs).write(b"<svg/>")
+        names = {f"{name}.svg": blob for name in FIGURES[:4]}
+        service.store.results.keep(job, names | {f"1/{name}.svg": blob for name in FIGURES[4:]})
+        return job
+
+    return make
+
+
+@pytest.fixture
+def done(finish: Callable[[JobOutcome], str], found: JobOutcome) -> str:
     """A succeeded job with figures."""
-    job = ahead(service, owner)
-    service.store.leases.finish(taken(service.store, job), found)
-    blob = Blobs(service.settings.blobs).write(b"<svg/>")
-    names = {f"{name}.svg": blob for name in FIGURES[:4]} | {f"1/{name}.svg": blob for name in FIGURES[4:]}
-    service.store.results.keep(job, names)
-    return job
+    return finish(found)

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from typing import Any
 import pytest
 
 from islands_api.cli.service import client_options
-from islands_service.domain.job import JobOutcome
+from islands_service.domain.job import RUN_TIME, JobOutcome, JobState
 from support.command_line import COLUMNS, ISLANDS
 from support.processes import eventually
 from support.service import FIGURES, Service, ahead, kept, queued, spec
@@ -123,6 +124,40 @@ def test_watch_prints_the_problem_of_a_failed_job(run: Run, service: Service, ow
     code, out, _ = run("watch", job, "--json")
     assert code == 2
     assert json.loads(out)["problem"]["detail"] == "it broke"
+
+
+@pytest.mark.ci
+def test_watch_states_the_models_of_a_cancelled_job_and_how_to_get_them(
+    run: Run, service: Service, owner: str, found: JobOutcome, finish: Callable[[JobOutcome], str]
+) -> None:
+    job = finish(replace(found, state=JobState.CANCELLED))
+    get = f"'islands jobs result {job} --out FOLDER' writes them to a folder"
+    kept = f"was cancelled and kept the {len(found.models)} models found so far: {get}"
+    code, out, err = run("watch", job)
+    assert (code, out) == (2, "")
+    assert err.splitlines()[-1] == f"error: job {job} {kept}, 'islands jobs resume {job}' continues"
+    assert f"The job {kept}, " in " ".join(run("show", job)[1].split())
+    # The stated command works.
+    code, _, err = run("result", job, "--out", "kept")
+    assert code == 0, err
+    assert len(list(Path("kept/models").iterdir())) == len(found.models)
+    empty = ahead(service, owner)
+    service.store.leases.finish(taken(service.store, empty), JobOutcome(JobState.CANCELLED))
+    assert run("watch", empty)[2].endswith(f"error: job {empty} cancelled: resume it to continue\n")
+
+
+@pytest.mark.ci
+def test_watch_states_that_a_job_at_its_limit_of_run_time_kept_its_models(
+    run: Run, found: JobOutcome, finish: Callable[[JobOutcome], str]
+) -> None:
+    assert "limit of run time" not in run("watch", finish(found))[1]
+    job = finish(replace(found, summary={**(found.summary or {}), "ended_by": RUN_TIME}))
+    code, out, _ = run("watch", job)
+    assert code == 0
+    assert " ".join(out.split()).endswith(
+        f"The job ended at its limit of run time and kept the {len(found.models)} models found so far: "
+        f"'islands jobs result {job} --out FOLDER' writes them to a folder."
+    )
 
 
 @pytest.mark.ci
