@@ -1,5 +1,6 @@
 """Page of an identification job; the test acts as the coordinator."""
 
+import re
 from collections.abc import Callable, Iterator
 from math import sqrt
 from typing import Any
@@ -11,7 +12,7 @@ from support.played import advance, squared_error, stored
 from support.processes import eventually
 from support.screen import Screen
 from support.service_processes import Service
-from support.stores import taken
+from support.stores import LONG, taken
 
 PROBLEM = {"type": "invalid-record", "title": "The job failed", "detail": "row 7 <b>column y</b> is empty"}
 
@@ -48,6 +49,28 @@ def test_the_convergence_chart_grows_with_the_events(
     sizes = page.locator("figure.chart").last
     expect(sizes.locator("circle.line")).to_have_count(5)
     expect(sizes.locator(".position")).to_have_text("terms 5")
+
+
+@pytest.mark.ci
+def test_a_job_shows_its_run_time_and_the_limit(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500)
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    expect(page.locator(".title .state")).to_have_text("queued")
+    run_time = page.locator("dt", has_text="Run time").locator("xpath=following-sibling::dd[1]")
+    expect(run_time).to_have_count(0)
+    with stored(desk) as store:
+        lease = taken(store, job)
+        expect(run_time).to_have_text(re.compile(r"^[\d.]+ s of 1 h$"))
+        shown = run_time.text_content()
+        advance(store, lease, 0, 40)
+        # The time runs on with every report.
+        eventually(lambda: run_time.text_content() != shown)
+        store.leases.renew(lease, LONG, ran=7500.0)
+        store.leases.finish(lease, JobOutcome(JobState.FAILED, problem=PROBLEM))
+    expect(page.locator(".title .state")).to_have_text("failed")
+    expect(run_time).to_have_text("2 h 5 min of 1 h")
 
 
 @pytest.mark.ci

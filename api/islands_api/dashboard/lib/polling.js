@@ -64,7 +64,8 @@ export function poll(task, signal) {
 }
 
 /**
- * Follow a job: call `show(job)` at each change, and `lost(problem)` if the job does not exist.
+ * Follow a job: call `show(job)` at each change, and `lost(problem)` if the job does not exist. The time of
+ * `performance.now()` at which the whole job was received is its `loaded`.
  * Return a function that takes a newer state of the job, received as the response to another request.
  */
 export function followJob(id, { show, lost }, signal) {
@@ -73,8 +74,8 @@ export function followJob(id, { show, lost }, signal) {
 
   function update(job) {
     if (current !== null && job.version < current.version) return;
-    current = job;
-    show(job);
+    current = { loaded: performance.now(), ...job };
+    show(current);
   }
 
   async function check() {

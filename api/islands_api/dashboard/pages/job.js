@@ -91,6 +91,15 @@ function makeActions(updateJob, heading) {
 
 const getSeconds = (job) => (Date.parse(job.finished ?? job.updated) - Date.parse(job.started)) / 1000;
 
+/** Format the run time of all attempts and its limit; null before the first attempt. */
+function formatRunTime({ state, started, run_seconds: counted, max_run_seconds: limit, loaded }) {
+  if (!started || !Number.isFinite(counted)) return null;
+  // Progress events do not contain the run time.
+  const since = state === "running" ? (performance.now() - loaded) / 1000 : 0;
+  const written = formatDuration(counted + since);
+  return Number.isFinite(limit) ? `${written} of ${formatDuration(limit)}` : written;
+}
+
 function makeJobFacts(job, unit) {
   const progress = job.progress ?? {};
   const { best_error: best, seconds_left: left, evaluations_per_second: rate } = progress;
@@ -103,6 +112,7 @@ function makeJobFacts(job, unit) {
     ["Evaluations", progress.evaluations === undefined ? null : formatCount(progress.evaluations)],
     ["Per second", running && rate ? formatCount(rate) : null],
     ["Time left", running && Number.isFinite(left) ? `about ${formatDuration(left)}` : null],
+    ["Run time", formatRunTime(job)],
     ["Note", running && progress.note ? progress.note : null],
     ["Duration", job.finished && job.started ? formatDuration(getSeconds(job)) : null],
     ["Stopped by", job.summary?.ended_by],
