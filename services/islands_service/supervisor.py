@@ -255,7 +255,7 @@ def _count_failures(role: Role, code: int) -> None:
     """Count an exit with the same error as the last one, unless a process of the role has run for a while.
 
     What has run can be repaired while the jobs run; `MISCONFIGURED` is then such a cause. A killed process
-    has no error of its own: the supervisor kills those that hang, and those that need one that has ended.
+    may be free of errors: the supervisor kills those that hang, and those that need one that has ended.
     """
     if role.is_stable or code in (0, MISCONFIGURED, UNAVAILABLE, -signal.SIGKILL):
         role.failure = role.failures = 0

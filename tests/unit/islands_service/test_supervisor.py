@@ -192,7 +192,7 @@ def test_role_that_has_run_before_is_restarted_when_misconfigured(supervised: St
 
 
 @pytest.mark.parametrize("heartbeat", ["heartbeat(); ", ""])
-def test_role_that_always_ends_with_the_same_error_ends_all_roles_and_the_supervisor(
+def test_role_that_always_fails_at_its_start_ends_the_supervisor(
     supervised: Start, heartbeat: str
 ) -> None:
     """A coordinator sends heartbeats before its first error."""
@@ -209,7 +209,7 @@ def test_role_that_always_ends_with_the_same_error_ends_all_roles_and_the_superv
 
 
 @pytest.mark.parametrize("end", ["sys.exit(75)", "sys.exit(7 + count % 2)", "os.kill(os.getpid(), 9)"])
-def test_role_that_waits_for_another_process_or_was_killed_is_restarted(supervised: Start, end: str) -> None:
+def test_role_that_waits_or_was_killed_is_restarted(supervised: Start, end: str) -> None:
     """Or that ends with several errors. 75 is `os.EX_TEMPFAIL`: the database does not answer yet."""
     script = f"count = open(os.environ['JOURNAL']).read().count('start')\nnote('start'); {end}"
     running = supervised(role("api", script), _FIRST_BACKOFF=0.01, _MAX_BACKOFF=0.01)
@@ -218,7 +218,7 @@ def test_role_that_waits_for_another_process_or_was_killed_is_restarted(supervis
     assert running.process.returncode == 0
 
 
-def test_role_that_has_run_for_a_while_is_restarted_after_any_number_of_errors(supervised: Start) -> None:
+def test_role_that_has_run_for_a_while_is_always_restarted(supervised: Start) -> None:
     script = (
         "count = open(os.environ['JOURNAL']).read().count('start')\n"
         "note('start'); heartbeat(); time.sleep(0.0 if count else 0.3); sys.exit(7)"
