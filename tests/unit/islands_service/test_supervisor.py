@@ -192,9 +192,7 @@ def test_role_that_has_run_before_is_restarted_when_misconfigured(supervised: St
 
 
 @pytest.mark.parametrize("heartbeat", ["heartbeat(); ", ""])
-def test_role_that_always_fails_at_its_start_ends_the_supervisor(
-    supervised: Start, heartbeat: str
-) -> None:
+def test_role_that_always_fails_at_its_start_ends_the_supervisor(supervised: Start, heartbeat: str) -> None:
     """A coordinator sends heartbeats before its first error."""
     running = supervised(role("api"), role("work", f"note('start'); {heartbeat}sys.exit(7)"))
     said = running.said()
