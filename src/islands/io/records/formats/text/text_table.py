@@ -6,7 +6,7 @@ ways. `text_encoding`, `table_start` and `number_parsing` do that; a preview sta
 
 import csv
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from io import StringIO
 from itertools import islice
@@ -211,7 +211,7 @@ def _read_rows(
     lines: Sequence[str], start: TableStart, file: str, counted: str
 ) -> tuple["array[int]", list[list[str]]]:
     """Return the line numbers and the cells of all samples, without blank lines at the end."""
-    below = islice(lines, start.first, None)
+    below: Iterable[str] = islice(lines, start.first, None)
     if start.separator == " ":
         below = (collapse_blanks(line, start.separator) for line in below)
     reader = csv.reader(below, delimiter=start.separator, strict=True)
