@@ -1,0 +1,130 @@
+"""A model with preprocessing has the same figures over REST, in its downloaded folder and in a monitor."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.signal_map import match_rate
+from islands.evolution.engine import SerialEngine
+from islands.validation.metrics import metrics
+from islands_api.client import Client
+from islands_service.coordinator.identification_job import run_identification_job
+from islands_service.domain.job import JobState
+from islands_service.store.blobs import Blobs
+from support.command_line import fail, succeed
+from support.monitoring_jobs import analyse_next
+from support.stores import LONG, taken
+from support.undrawn import undrawn_figures
+
+pytestmark = pytest.mark.ci
+
+COLUMNS = ("u_V", "y_um")
+
+#: A search of a second.
+SMALL = {"population": 10, "generations": 3, "max_terms": 3, "shooting": 50, "max_height": 3, "islands": 2}
+
+#: Seconds for a request that draws figures in another process.
+PATIENCE = 300.0
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """Record of a system of the first order with offsets, 100 samples a second."""
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 60), 20)
+    y = np.zeros(len(u))
+    for k in range(1, len(u)):
+        y[k] = 0.95 * y[k - 1] + 0.1 * u[k - 1]
+    y += rng.normal(scale=0.02, size=len(y))
+    table = np.column_stack([0.01 * np.arange(len(u)), u + 3.0, y + 40.0])
+    folder = tmp_path_factory.mktemp("record") / "records"
+    folder.mkdir()
+    np.savetxt(folder / "r.csv", table, "%.8f", ",", header="t_s,u_V,y_um", comments="")
+    return folder / "r.csv"
+
+
+@pytest.fixture
+def client(service):
+    with Client(service.url, timeout=PATIENCE) as connected:
+        yield connected
+
+
+def search(service, client, dataset, **settings) -> str:
+    """Run a job in this process; return its id."""
+    job = client.submit(dataset, *COLUMNS, preset="narx", **SMALL, **settings)
+    blobs, lease = Blobs(service.settings.blobs), taken(service.store, job.id)
+    outcome = run_identification_job(lease, service.store, blobs, SerialEngine(), lambda: None, LONG)
+    service.store.leases.finish(lease, outcome)
+    return job.id
+
+
+def test_a_job_that_averages_samples_has_the_same_figures_everywhere(service, client, path, tmp_path):
+    dataset = client.upload(path)
+    job = search(service, client, dataset, average=2)
+    succeed("jobs", "result", job, "--out", tmp_path / "result", "--url", service.url)
+    best = islands.read_result(tmp_path / "result").best
+    record = islands.read_record(path, *COLUMNS)
+    assert best.model.average == 2
+
+    # The record as measured: library and command.
+    simulated = best.simulate(record)
+    succeed("simulate", tmp_path / "result", path, "--out", tmp_path / "s.csv")
+    time, y = np.genfromtxt(tmp_path / "s.csv", delimiter=",", skip_header=1).T
+    np.testing.assert_allclose(y, simulated.y, rtol=1e-9)
+    assert np.diff(time) == pytest.approx(0.02)
+
+    # The validation data: service and library.
+    rank = client.job(job).summary["rank"]
+    answer = service.client.get(f"/v1/jobs/{job}/models/{rank}/simulation", timeout=PATIENCE)
+    assert answer.status_code == 200, answer.text
+    shown = answer.json()
+    averaged = match_rate(best.model, record)
+    held_out = averaged[averaged.samples - len(shown["measured"]) :]
+    np.testing.assert_allclose(shown["measured"], held_out.y, rtol=1e-9)
+    again = best.simulate(held_out)
+    np.testing.assert_allclose(np.array(shown["free_run"], dtype=float), again.y, rtol=1e-9)
+    assert client.job(job).summary["metrics"]["rmse"] == pytest.approx(metrics(held_out.y, again.y).rmse)
+
+    # A monitor reads every sample. It refuses the model, by the same message over REST and as a command.
+    model = {"kind": "model", "model": json.loads(client.export(job, rank, "json"))}
+    monitor = client.create_monitor(simulation=model, input="u_V", output="y_um", training=12)
+    client.add_record(monitor, dataset)
+    refused = analyse_next(service)
+    assert refused.state == JobState.FAILED
+    reason = "each value is the mean of 2 samples of the record, and a diagnosis reads every sample"
+    assert reason in refused.problem["detail"]
+    file = tmp_path / "result/models" / f"{rank:02d}.json"
+    assert reason in monitored(path, file, tmp_path / "monitored", fail)
+
+
+def test_a_model_of_deviations_has_the_same_figures_in_a_monitor(service, client, path, tmp_path):
+    with undrawn_figures():
+        options = ("--detrend", "constant", "--max-terms", 3, "--average", 1, "--out", tmp_path / "result")
+        succeed("fit", path, "--input", "u_V", "--output", "y_um", *options)
+    best = islands.read_result(tmp_path / "result").best
+    assert best.model.preprocessing.output_offset == pytest.approx(40.0, abs=1.0)
+    record = islands.read_record(path, *COLUMNS)
+    expected = metrics(record.y, best.simulate(record).y).rmse
+    files = (tmp_path / "result/models").iterdir()
+    file = next(each for each in files if islands.read_model(each) == best.model)
+    model = {"kind": "model", "model": json.loads(file.read_text(encoding="utf-8"))}
+    monitor = client.create_monitor(simulation=model, input="u_V", output="y_um", training=12)
+    client.add_record(monitor, client.upload(path))
+    analysed = analyse_next(service)
+    assert analysed.state == JobState.SUCCEEDED, analysed.problem
+    found = analysed.document["record"]["rmse"]
+    # The monitor estimates the parameters of the model again.
+    assert 0.95 * expected < found < 1.02 * expected
+    monitored(path, file, tmp_path / "monitored", succeed)
+    state = json.loads((tmp_path / "monitored/monitor.json").read_text(encoding="utf-8"))
+    assert [each["rmse"] for each in state["records"]] == [pytest.approx(found, rel=1e-9)]
+
+
+def monitored(path: Path, file: Path, out: Path, run) -> str:
+    """Return what ``islands monitor`` prints about the folder of a record."""
+    simulation = ("--simulation", f"model:{file}", "--input", "u_V", "--output", "y_um")
+    printed = run("monitor", path.parent, *simulation, "--training", 12, "--settle", 0, "--out", out)
+    return " ".join(printed.split())
