@@ -9,6 +9,7 @@ from threading import Event, Thread
 
 import pytest
 
+from islands.available_cpus import count_cpus
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
@@ -122,7 +123,7 @@ def test_loss_of_all_actors_does_not_change_the_result(posed, undisturbed, engin
             for pid in actors():
                 kill(pid)
     assert found == undisturbed
-    assert sum("was lost" in message for message in messages) == min(3, len(os.sched_getaffinity(0)))
+    assert sum("was lost" in message for message in messages) == min(3, count_cpus())
 
 
 @pytest.mark.nightly
@@ -132,7 +133,7 @@ def test_standby_actor_replaces_a_lost_one_until_its_restart(posed, engine, mess
     monkeypatch.setattr(actor_pool, "STANDBY_AFTER", 0.0)
     found = actor_pool.IslandActorPool(posed, 3, messages.append)
     try:
-        full_size = min(3, len(os.sched_getaffinity(0))) + 1
+        full_size = min(3, count_cpus()) + 1
         eventually(lambda: found.maintain(at_once=True) and len(found.slots) == full_size)
         regular = [found.actor_for(island) for island in range(3)]
         kill(min(eventually(actors)))
@@ -211,7 +212,7 @@ def test_a_cluster_with_an_autoscaler_is_asked_for_a_cpu_for_each_island(
         return sum(each.count for each in state.pending_resource_requests)
 
     missing = 3
-    islands = len(os.sched_getaffinity(0)) + missing
+    islands = count_cpus() + missing
     for autoscaling, expected in ((False, 0), (True, missing)):
         seen = []
         pool = actor_pool.IslandActorPool(

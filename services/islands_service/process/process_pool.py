@@ -1,6 +1,5 @@
 """Parallel map on processes of this computer."""
 
-import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -13,6 +12,7 @@ from typing import Any, TypeVar
 
 import cloudpickle
 
+from islands.available_cpus import count_cpus
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.errors import IslandsError
 
@@ -63,7 +63,7 @@ def process_pool(
     ProcessPoolError
         A process has ended. Errors of the function itself are raised unchanged.
     """
-    workers = workers or len(os.sched_getaffinity(0))
+    workers = workers or count_cpus()
     if workers == 1:
         yield partial(_map_here, check)
         return

@@ -26,9 +26,9 @@ from ray.exceptions import (
     WorkerCrashedError,
 )
 
+from islands.available_cpus import count_cpus
 from islands.distribution import read_version
 from islands_service.runtime.errors import ClusterError
-from islands_service.settings.setting_checks import count_cpus
 
 #: Bytes of shared memory of a local Ray: it holds the record and the migrants.
 OBJECT_STORE_BYTES = 200_000_000

@@ -8,6 +8,7 @@ from platformdirs import user_data_path
 from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from islands.available_cpus import count_cpus
 from islands.errors import SettingsError
 from islands_service.settings.setting_checks import (
     DEFAULT_ROLES,
@@ -18,7 +19,6 @@ from islands_service.settings.setting_checks import (
     Networks,
     Positive,
     check_separate,
-    count_cpus,
     read_secret,
 )
 

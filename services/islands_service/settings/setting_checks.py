@@ -1,8 +1,6 @@
 """Types of settings with their checks: numbers in a range, and lists of networks or hosts as text."""
 
-import os
 import re
-from contextlib import suppress
 from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated
@@ -20,15 +18,6 @@ _HOST = re.compile(r"(?:[A-Za-z0-9_](?:[A-Za-z0-9._-]{0,252})|\[[0-9A-Fa-f:.]+\]
 
 #: Bucket and prefix.
 _BUCKET = re.compile(r"s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9._-]+)*/?")
-
-
-def count_cpus() -> int:
-    """Return the number of cores that a container or an affinity mask leaves to this process."""
-    cores = len(os.sched_getaffinity(0))
-    with suppress(OSError, ValueError):
-        quota, period = map(int, Path("/sys/fs/cgroup/cpu.max").read_text().split())
-        cores = min(cores, max(1, quota // period))
-    return cores
 
 
 def split_list(text: str) -> tuple[str, ...]:

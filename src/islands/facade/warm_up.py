@@ -5,11 +5,11 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from multiprocessing import cpu_count
 from signal import SIGKILL, raise_signal
 from threading import Thread
 from typing import Final
 
+from islands.available_cpus import count_cpus
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.estimation.estimate import estimate
@@ -99,7 +99,7 @@ def _second_process() -> Iterator[None]:
 
     This process compiles the kernels that the other one has not stored, since it fails or is late.
     """
-    if cpu_count() == 1 or cache_folder() is None:
+    if count_cpus() == 1 or cache_folder() is None:
         yield
         return
     # Garbage collection visits the objects of the compiler again and again; the process ends soon.

@@ -4,9 +4,11 @@ import os
 import signal
 import time
 from multiprocessing import active_children
+from pathlib import Path
 
 import pytest
 
+from islands import available_cpus
 from islands.evolution.progress import StoppedError
 from islands_service.process.process_pool import ProcessPoolError, process_pool
 
@@ -31,6 +33,16 @@ def test_one_process_and_the_first_seconds_need_no_pool() -> None:
     for workers in (1, 2):
         with process_pool(workers, start_after=60.0) as parallel_map:
             assert set(parallel_map(lambda _: os.getpid(), range(3))) == {os.getpid()}
+
+
+def test_quota_of_a_container_bounds_the_number_of_processes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cpu.max").write_text("100000 100000\n")
+    monkeypatch.setattr(available_cpus, "CGROUPS", tmp_path)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
+    with process_pool(start_after=0.0) as parallel_map:  # one core: no other process
+        assert set(parallel_map(lambda _: os.getpid(), range(3))) == {os.getpid()}
 
 
 def test_error_of_the_function_is_raised_and_ends_the_processes() -> None:
