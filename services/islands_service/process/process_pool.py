@@ -5,7 +5,7 @@ from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import lru_cache, partial
-from multiprocessing import active_children, forkserver, get_context
+from multiprocessing import active_children, forkserver, get_context, resource_tracker
 from signal import SIG_BLOCK, SIG_IGN, SIG_SETMASK, SIGINT, pthread_sigmask, signal
 from time import monotonic
 from typing import Any, TypeVar
@@ -71,7 +71,8 @@ def process_pool(
     context = get_context("forkserver")
     context.set_forkserver_preload(_PRELOADED)
     # It imports while this process computes. Ctrl-C in a terminal would end these imports with a traceback:
-    # it starts with the signal blocked.
+    # it starts with the signal blocked. The start of the resource tracker unblocks signals.
+    resource_tracker.ensure_running()
     unblocked = pthread_sigmask(SIG_BLOCK, {SIGINT})
     try:
         forkserver.ensure_running()

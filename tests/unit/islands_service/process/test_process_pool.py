@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from multiprocessing import active_children
 from pathlib import Path
@@ -79,6 +81,19 @@ def test_results_may_contain_functions_without_a_name() -> None:
     with process_pool(2, start_after=0.0) as parallel:
         doubled = list(parallel(lambda factor: lambda value: factor * value, [1, 2, 3]))
     assert [function(2) for function in doubled] == [2, 4, 6]
+
+
+def test_server_that_forks_the_processes_starts_with_sigint_blocked() -> None:
+    """Ctrl-C in a terminal reaches it while it imports, and would end it with a traceback."""
+    code = (
+        "from multiprocessing import forkserver; from pathlib import Path\n"
+        "from islands_service.process.process_pool import process_pool\n"
+        "with process_pool(2):\n"
+        "    status = Path(f'/proc/{forkserver._forkserver._forkserver_pid}/status').read_text()\n"
+        "print(status.partition('SigBlk:')[2].split()[0])"
+    )
+    blocked = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert int(blocked, 16) & 1 << signal.SIGINT - 1
 
 
 @pytest.mark.parametrize("workers", [1, 2])
