@@ -6,7 +6,8 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import lru_cache, partial
 from multiprocessing import active_children, forkserver, get_context, resource_tracker
-from signal import SIG_BLOCK, SIG_IGN, SIG_SETMASK, SIGINT, pthread_sigmask, signal
+from os import kill
+from signal import SIG_BLOCK, SIG_IGN, SIG_SETMASK, SIGINT, SIGKILL, pthread_sigmask, signal
 from time import monotonic
 from typing import Any, TypeVar
 
@@ -91,10 +92,25 @@ def process_pool(
 
     try:
         yield parallel_map
+    except BaseException:
+        _end_server()
+        raise
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         for process in set(active_children()) - others:
             process.kill()  # its result is not needed any more
+
+
+def _end_server() -> None:
+    """End the fork server, which would keep the standard output open until it has imported everything.
+
+    The next pool starts another one.
+    """
+    # `multiprocessing` has no public names for this process and its end.
+    server: Any = forkserver._forkserver
+    if server._forkserver_pid is not None:
+        kill(server._forkserver_pid, SIGKILL)
+        server._stop()
 
 
 def _map_here(

@@ -83,17 +83,25 @@ def test_results_may_contain_functions_without_a_name() -> None:
     assert [function(2) for function in doubled] == [2, 4, 6]
 
 
-def test_server_that_forks_the_processes_starts_with_sigint_blocked() -> None:
+def test_server_of_the_processes_starts_with_sigint_blocked_and_ends_at_an_error() -> None:
     """Ctrl-C in a terminal reaches it while it imports, and would end it with a traceback."""
     code = (
-        "from multiprocessing import forkserver; from pathlib import Path\n"
+        "import os; from multiprocessing import forkserver; from pathlib import Path\n"
         "from islands_service.process.process_pool import process_pool\n"
-        "with process_pool(2):\n"
-        "    status = Path(f'/proc/{forkserver._forkserver._forkserver_pid}/status').read_text()\n"
-        "print(status.partition('SigBlk:')[2].split()[0])"
+        "try:\n"
+        "    with process_pool(2):\n"
+        "        server = forkserver._forkserver._forkserver_pid\n"
+        "        status = Path(f'/proc/{server}/status').read_text()\n"
+        "        raise KeyboardInterrupt\n"
+        "except KeyboardInterrupt:\n"
+        "    print(status.partition('SigBlk:')[2].split()[0], os.path.exists(f'/proc/{server}'))"
     )
-    blocked = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, timeout=60, capture_output=True, text=True
+    )
+    blocked, is_alive = done.stdout.split()
     assert int(blocked, 16) & 1 << signal.SIGINT - 1
+    assert is_alive == "False"
 
 
 @pytest.mark.parametrize("workers", [1, 2])
