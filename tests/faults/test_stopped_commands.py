@@ -156,7 +156,11 @@ def check_kept(folder: Path, err: str) -> None:
         assert not results
     for path in results:
         assert succeed("show", path.parent)
-    for name in ("discrepancy.json", "plan.json", "fits.json"):
+    if (diagnosis := folder / "out" / "discrepancy.json").exists():
+        left_out = json.loads(diagnosis.read_text())["left_out"]
+        assert all(step in err for step in left_out)
+        assert left_out or "which is complete" in err
+    for name in ("plan.json", "fits.json"):
         if (folder / "out" / name).exists():
             assert json.loads((folder / "out" / name).read_text())
 

@@ -76,10 +76,18 @@ def exit_code(interrupt: KeyboardInterrupt) -> int:
 
 
 class StopRequests:
-    """Whether a signal has requested a stop. Calling it returns whether one has."""
+    """Whether a signal has requested a stop. Calling it returns whether one has.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    interrupt : KeyboardInterrupt, optional
+        Exception of a signal that has ended the step before.
+    """
+
+    def __init__(self, interrupt: KeyboardInterrupt | None = None) -> None:
         self.number: int | None = _raised[-1] if _raised else None
+        if interrupt is not None:
+            self.number = signal.SIGTERM if isinstance(interrupt, Terminated) else signal.SIGINT
 
     def __call__(self) -> bool:
         """Return whether a stop is requested."""

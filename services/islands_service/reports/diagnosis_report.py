@@ -24,6 +24,7 @@ _VERDICTS = {
     Verdict.UNKNOWN: "The simulation is wrong, and no known effect explains the discrepancy.",
     Verdict.FAMILY: "The simulation lacks an effect of this kind, whose shape is that of no known effect.",
     Verdict.DISCOVERED: "The simulation lacks terms, which were found. Known effects alone explain less.",
+    Verdict.STOPPED: "The diagnosis was stopped before a verdict: the causes are unknown.",
     Verdict.GROSS_ERROR: "Record and simulation do not match as they are: correct the record first.",
 }
 
@@ -53,8 +54,8 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     elif discovery is not None:
         effects = f", with {' and '.join(discovery.effects)}" if discovery.effects else ""
         lines.append(f"Equations that explain the record as well{effects}: {discovery.equations}")
-    if found.verdict == Verdict.UNKNOWN:
-        nearest = ", ".join(candidate.name for candidate in found.candidates[:3])
+    if found.verdict in (Verdict.UNKNOWN, Verdict.STOPPED):
+        nearest = ", ".join(candidate.name for candidate in found.candidates[:3]) or "none yet"
         dependence = ", ".join(found.residual_structure) or "its own past"
         lines.append(f"  nearest: {nearest}; the residual depends on: {dependence}")
     if found.gain is not None:
@@ -72,7 +73,19 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
             f"This formula explains {100 * proposal.explains:.0f} % of the residual on held-out data: "
             f"{proposal.formula}"
         )
+    if left_out := describe_left_out(found):
+        lines.append(left_out)
     return "\n".join(lines)
+
+
+def describe_left_out(found: Diagnosis) -> str:
+    """Return a sentence with the steps that a stopped diagnosis has left out; empty for a complete one."""
+    if not found.left_out:
+        return ""
+    return (
+        f"The diagnosis was stopped, without: {', '.join(found.left_out)}. "
+        "The complete diagnosis may have another verdict."
+    )
 
 
 def _verdict(found: Diagnosis) -> str:
@@ -183,6 +196,7 @@ def diagnosis_report(
         name=name,
         found=found,
         verdict=_verdict(found),
+        left_out=describe_left_out(found),
         findings=[_finding(finding) for finding in found.effects],
         proposal=proposal,
         floor=_floor(found),

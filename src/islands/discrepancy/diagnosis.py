@@ -44,6 +44,13 @@ from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator, find_read_channels, get_tolerances
+from islands.discrepancy.interim_findings import (
+    EVIDENCE,
+    FREE_FORMS,
+    MISSING_TERMS,
+    MODEL_ERROR,
+    InterimFindings,
+)
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.output_equation import add_output_equation
 from islands.errors import RecordError
@@ -61,6 +68,7 @@ def diagnose(
     progress: ProgressCallback = ignore_progress,
     parallel_map: ParallelMap = map,
     catalogue: Sequence[Effect] = EFFECTS,
+    interim: InterimFindings | None = None,
 ) -> Diagnosis:
     """Diagnose a simulation on a record.
 
@@ -83,6 +91,8 @@ def diagnose(
         Calibrates the effects. The result does not depend on it.
     catalogue : sequence of Effect
         The effects that are searched for, and the free forms that they are compared with.
+    interim : InterimFindings, optional
+        Receives what is found on the way.
 
     Raises
     ------
@@ -93,6 +103,7 @@ def diagnose(
         A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, two effects have the
         same name, or an effect is invalid.
     """
+    interim = interim or InterimFindings()
     prior_std = validate_prior({**get_tolerances(simulator), **(tolerance or {})}, simulator)
     fitted = count_fitted_samples(record)
     record, record_findings = admit_channels(record, fitted, find_read_channels(simulator))
@@ -108,24 +119,29 @@ def diagnose(
     target = make_target(record, fitted, prior_std)
     progress("calibrating the simulation", 0.0)
     base = calibrate(simulation, target, simulation.nominal)
+    interim.begin(record, base, target, fitted, record_findings)
     progress("looking for gross errors of the record", 0.01)
     if gross_errors := find_gross_errors(record, simulator, base, fitted, prior_std):
         found = make_gross_diagnosis(record, base, gross_errors, fitted)
-        return replace(found, record_findings=(*found.record_findings, *record_findings))
+        return interim.complete(replace(found, record_findings=(*found.record_findings, *record_findings)))
     if is_rounding_error(record.y - base.output, record.y):
         found = make_diagnosis(record, make_exact_outcome(base, target), base, None, (), fitted, rng, map)
-        return replace(found, record_findings=tuple(record_findings))
+        return interim.complete(replace(found, record_findings=tuple(record_findings)))
     effects = select_effects(simulator, context, prior_std, catalogue)
-    base, outcome = _search(base, target, effects, progress, parallel_map)
+    base, outcome = _search(base, target, effects, progress, parallel_map, interim)
     simulator = base.simulation.simulator
+    interim.reach(EVIDENCE)
     progress("analysing the residual", 0.9)
-    outcome = assess_evidence(outcome, fitted, effects, rng)
+    outcome = interim.keep_outcome(
+        base, assess_evidence(outcome, fitted, effects, rng), effects, step=MODEL_ERROR
+    )
     is_unknown = outcome.verdict == Verdict.UNKNOWN
     is_noise = outcome.verdict == Verdict.NOTHING and outcome.hypothesis.fit.noise.order
     if is_noise or (is_unknown and not explain_all(base, target, fitted, seed, parallel_map)):
         model_error = search_with_model_error(base, target, effects, progress, parallel_map)
         second = assess_evidence(model_error, fitted, effects, rng)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome
+    interim.keep_outcome(base, outcome, effects, step=FREE_FORMS)
     # Coloured noise may hide a discrepancy that no effect of the catalogue explains.
     is_clean = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
     if not is_clean:
@@ -133,16 +149,19 @@ def diagnose(
         forms = select_effects(simulator, context, prior_std, catalogue, free=True)
         outcome = compare_with_free_forms(outcome, forms, fitted, (*effects, *forms), rng, parallel_map)
         effects = [*effects, *(form for form in forms if form in outcome.hypothesis.effects)]
+    interim.keep_outcome(base, outcome, effects, step=MISSING_TERMS)
     progress("searching for missing terms", 0.92)
-    terms = (
+    terms = interim.keep_terms(
         None if is_clean else find_missing_terms(base, outcome, target, effects, fitted, rng, parallel_map)
     )
     progress("screening alternative causes", 0.95)
-    found = make_diagnosis(record, outcome, base, terms, effects, fitted, rng, parallel_map)
+    found = interim.keep_diagnosis(
+        make_diagnosis(record, outcome, base, terms, effects, fitted, rng, parallel_map)
+    )
     if terms is not None and replaces_effects(terms, base, outcome, target, fitted, rng):
         found = extend_equations(found, terms, target, effects, rng, parallel_map)
     closed_loop = find_closed_loop(found.best, record.y, fitted, record.input_names[0])
-    return replace(found, record_findings=(*record_findings, *closed_loop))
+    return interim.complete(replace(found, record_findings=(*record_findings, *closed_loop)))
 
 
 def _search(
@@ -151,6 +170,7 @@ def _search(
     effects: Sequence[Effect],
     progress: ProgressCallback,
     parallel_map: ParallelMap,
+    interim: InterimFindings,
 ) -> tuple[CalibrationResult, SearchOutcome]:
     """Search with the intersample behaviour and the step size that suit the simulation with the effects.
 
@@ -168,7 +188,8 @@ def _search(
         tried.add(current)
         base = calibrate(replace(simulation, simulator=simulator), target, base.values)
         progress(f"screening {len(effects)} effects", 0.02)
-        screened = screen_effects(base, target, effects, parallel_map)
+        screened = screen_effects(base, target, effects, interim.record_screening(base, parallel_map))
+        interim.keep_screening(base, screened)
         selected = select_intersample(best_single(base, screened), target)
         if (known := found.get(get_discretisation(selected))) is not None:
             return known

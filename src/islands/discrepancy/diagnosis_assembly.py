@@ -159,7 +159,8 @@ def make_diagnosis(
             findings, equivalents, gain, verdict = (), (), None, Verdict.UNKNOWN
     residual = (record.y - hypothesis.fit.output)[:fitted]
     context = hypothesis.fit.simulation.context
-    noise = describe_noise(record.y[:fitted], residual, context) if verdict != Verdict.UNKNOWN else ()
+    is_explained = verdict not in (Verdict.UNKNOWN, Verdict.STOPPED)
+    noise = describe_noise(record.y[:fitted], residual, context) if is_explained else ()
     as_given = evaluate_fit(base.simulation, target, base.simulation.nominal)
     nominal = fit_initial_states(as_given, target, 0).output
     return Diagnosis(

@@ -40,7 +40,7 @@ class Diagnosis:
     verdict : Verdict
     effects : tuple of Finding
         The named causes, the most important first, then the properties of the noise. "nothing" has properties
-        of the noise only, and "unknown" has none.
+        of the noise only, and "unknown" and "stopped" have none.
     candidates : tuple of Candidate
         All screened effects, the best first.
     gain : HoldoutGain or None
@@ -69,6 +69,8 @@ class Diagnosis:
         named cause otherwise. None if there are none.
     shape : EffectShape or None
         Curve of a single named effect next to the free curve in its place; None if it has none.
+    left_out : tuple of str
+        Steps that a stopped diagnosis has left out; empty for a complete one.
     """
 
     verdict: Verdict
@@ -87,6 +89,7 @@ class Diagnosis:
     record_findings: tuple[RecordFinding, ...] = ()
     discovery: Discovery | None = None
     shape: EffectShape | None = None
+    left_out: tuple[str, ...] = ()
 
     @property
     def causes(self) -> tuple[Finding, ...]:

@@ -18,6 +18,9 @@ from islands.facade.identify import SearchCallback, identify
 from islands.model.equations import named_equation
 from islands.simulation.predictors import free_run
 
+#: Name of this step of a diagnosis.
+FORMULA = "a formula for the unexplained residual"
+
 #: Settings of the search: few terms, so that the formula is readable.
 SEARCH: Mapping[str, Any] = MappingProxyType(
     {

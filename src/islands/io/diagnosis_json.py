@@ -53,6 +53,7 @@ def diagnosis_document(
         **_describe_self_test(tested),
         "extended_model": None if diagnosis.gain is None else "extended.json",
         "record_findings": [each.as_document() for each in diagnosis.record_findings],
+        "left_out": list(diagnosis.left_out),
         "wall_s": wall_s,
     }
 

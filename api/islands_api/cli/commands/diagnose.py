@@ -1,6 +1,6 @@
 """``islands diagnose``: errors of a simulation on a record, their causes, and the gain of a correction."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -12,16 +12,18 @@ import typer
 
 from islands.data.dataset import Dataset
 from islands.data.split import hold_out
+from islands.discrepancy.calibration.fit_journal import FitJournal
 from islands.discrepancy.detectability import SelfTest, self_test
 from islands.discrepancy.diagnosis import diagnose as run_diagnosis
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.interim_findings import InterimFindings
 from islands.discrepancy.planning.experiment_plan import plan_experiment
 from islands.errors import SettingsError
 from islands.evolution.progress import Steps, StoppedError
-from islands.facade.explain_residual import explain_residual
+from islands.facade.explain_residual import FORMULA, explain_residual
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.result_text.text_layout import wrap
@@ -33,7 +35,7 @@ from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
-from islands_api.cli.runs.diagnosis_fits import keep_fits, write_fits
+from islands_api.cli.runs.diagnosis_fits import keep_fits, say_to_continue, write_fits
 from islands_api.cli.runs.plan_run import (
     PLAN,
     PlanOptions,
@@ -42,7 +44,7 @@ from islands_api.cli.runs.plan_run import (
     with_plan_options,
     write_plan,
 )
-from islands_api.cli.stop_requests import REPEAT, stop_requests
+from islands_api.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands_service.process.process_pool import process_pool
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
@@ -52,8 +54,8 @@ RESULT = "discrepancy.json"
 #: File of the report.
 REPORT = "report.html"
 
-#: Names of steps without which a diagnosis is complete.
-FORMULA, SELF_TEST = "a formula for the unexplained residual", "self-test"
+#: Name of a step without which a diagnosis is complete.
+SELF_TEST = "self-test"
 
 #: Options of a diagnosis.
 NO_PLAN = PlanOptions()
@@ -134,9 +136,9 @@ def diagnose(
         simulator = make_simulator(spec, data, columns)
         tolerances = options.tolerances(tolerance or [])
         began = perf_counter()
-        with keep_fits(out) as fits, process_pool(workers) as parallel:
-            diagnosis = run_diagnosis(data, simulator, tolerances, seed, show, fits.record(parallel))
-        with stop_requests() as stop:
+        run = partial(run_diagnosis, data, simulator, tolerances, seed, show)
+        diagnosis, fits, before = _diagnose_until_stopped(run, out, seed, workers)
+        with stop_requests(before) as stop:
             steps = Steps(show, stop)
             show(FORMULA, 0.8)
             formula = _find_formula(diagnosis, seed, steps)
@@ -153,11 +155,41 @@ def diagnose(
     if limits is not None:
         output.print(summarise_self_test(limits), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
-    stop.end(out, steps.left_out, "repeat the command with --force, which continues with its fits")
+    stop.end(
+        out,
+        (*diagnosis.left_out, *steps.left_out),
+        "repeat the command with --force, which continues with its fits",
+    )
+
+
+def _diagnose_until_stopped(
+    run: Callable[..., Diagnosis], out: Path, seed: int, workers: int | None
+) -> tuple[Diagnosis, FitJournal, StopRequests | None]:
+    """Run a diagnosis; if a signal ends it, return what it has found so far, and the request to stop.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        The signal arrived before the first result.
+    """
+    interim = InterimFindings()
+    try:
+        with keep_fits(out) as fits, process_pool(workers) as parallel:
+            return run(fits.record(parallel), interim=interim), fits, None
+    except KeyboardInterrupt as interrupt:
+        with stop_requests(StopRequests(interrupt)) as stop:
+            found = interim.make_diagnosis(seed)
+        if found is None:
+            say_to_continue(out)
+            raise
+        return found, fits, stop
 
 
 def _find_formula(diagnosis: Diagnosis, seed: int, steps: Steps) -> ResidualFormula | None:
     """Search for a formula of the residual, as an optional step."""
+    if diagnosis.left_out:
+        steps.skip(FORMULA)
+        return None
     with suppress(StoppedError):
         return explain_residual(diagnosis, seed, stop=partial(steps.skip, FORMULA))
     return None
@@ -183,6 +215,8 @@ def write(
         (folder / REPORT).write_bytes(diagnosis_report(name, diagnosis, tested, formula))
     if diagnosis.gain is not None:
         (folder / EXTENDED_FILE).write_text(extended_json(diagnosis.best, diagnosis.record))
+    if steps is not None:
+        diagnosis = replace(diagnosis, left_out=(*diagnosis.left_out, *steps.left_out))
     document = diagnosis_document(diagnosis, wall_s, tested, formula)
     (folder / RESULT).write_text(as_json(document))
 
@@ -196,6 +230,8 @@ def _run_self_test(
     steps: Steps,
 ) -> SelfTest | None:
     """Run the self-test, as an optional step, and show the remaining time."""
+    if steps.skip(SELF_TEST):
+        return None
     steps.report(SELF_TEST, 0.0)
     began = perf_counter()
 

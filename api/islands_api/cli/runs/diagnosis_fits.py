@@ -25,9 +25,14 @@ def keep_fits(folder: Path) -> Iterator[FitJournal]:
         yield journal
     except KeyboardInterrupt:
         write_fits(folder, journal)
-        errors.print(f"interrupted; {path} keeps what is known: the same command continues", markup=False)
         raise
     path.unlink(missing_ok=True)
+
+
+def say_to_continue(folder: Path) -> None:
+    """Say that a diagnosis without a result so far continues with its fits."""
+    if (path := folder / FITS).exists():
+        errors.print(f"interrupted; {path} keeps what is known: the same command continues", markup=False)
 
 
 def write_fits(folder: Path, journal: FitJournal) -> None:

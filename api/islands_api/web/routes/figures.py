@@ -19,7 +19,7 @@ from islands_api.web.job_submission import get_job_of_kind, get_result
 from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import Rank, get_model
-from islands_service.domain.job import IDENTIFICATION, MONITORING, REPORT
+from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, MONITORING, REPORT
 from islands_service.domain.job_spec import parse_identification
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
@@ -163,6 +163,10 @@ async def report(job: Id, caller: Reader, state: AppStateDep) -> Response:
     if found.kind == MONITORING:
         raise ResourceNotFoundError(
             f"job {job} has analysed a record of a monitor and has no report: see its /result"
+        )
+    if found.kind == DISCREPANCY and not await state.run_blocking(state.store.results.artefact, job, REPORT):
+        raise ResourceNotFoundError(
+            f"job {job} was cancelled and has no report: see its /result, or resume it"
         )
     response = await _figure_response(state, caller, job, REPORT, None, "text/html; charset=utf-8")
     response.headers["Content-Security-Policy"] = _REPORT_POLICY

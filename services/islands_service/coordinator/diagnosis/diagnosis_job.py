@@ -1,6 +1,7 @@
 """Discrepancy job: diagnose a simulation, write the report and the extended simulation."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from time import sleep
 
 import structlog
@@ -9,13 +10,15 @@ from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.discrepancy.interim_findings import InterimFindings
 from islands.evolution.engine import Engine
-from islands.facade.explain_residual import explain_residual
+from islands.facade.explain_residual import FORMULA, explain_residual
 from islands.io.diagnosis_json import diagnosis_document
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
 from islands_service.coordinator.diagnosis.diagnosis_checkpoints import DiagnosisCheckpoints
 from islands_service.coordinator.diagnosis.diagnosis_progress import DiagnosisProgress
+from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, Lease
 from islands_service.domain.job_spec import parse_discrepancy
@@ -44,6 +47,8 @@ def run_diagnosis_job(
 ) -> JobOutcome:
     """Run a discrepancy job from its last checkpoint.
 
+    A job that is cancelled ends with what it has found so far, without formula and report.
+
     Parameters
     ----------
     check : callable
@@ -55,8 +60,10 @@ def run_diagnosis_job(
 
     Raises
     ------
+    JobCancelled
+        The job was cancelled before the first result.
     IslandsError
-        The record or the simulation is unusable, or any error that ``check`` raises.
+        The record or the simulation is unusable, or any other error that ``check`` raises.
     """
     checkpoints = DiagnosisCheckpoints(lease.job, blobs)
     state = checkpoints.read()
@@ -69,24 +76,40 @@ def run_diagnosis_job(
     record, columns = read_record_and_columns(spec, datasets, blobs)
     simulator = make_simulator(spec.simulation, record, columns)
     fits = state.journal.record(map_cases or ray_map(check=check))
-    found = diagnose(record, simulator, spec.tolerance, spec.seed, report, report.count(fits))
-    report("a formula for the unexplained residual", 0.95)
+    interim, formula, artefacts = InterimFindings(), None, dict[str, str]()
+    left_out = [FORMULA, REPORT]
 
     def stop() -> bool:
         check()
         return False
 
-    start = state.begin_search(found)
-    formula = explain_residual(found, spec.seed, progress=report.count_epochs, stop=stop, start=start)
-    wall_s = report.spent
-    report("writing the report", 0.98)
-    names = ", ".join(datasets[part.dataset].name for part in spec.parts)
-    artefacts = {REPORT: _keep(diagnosis_report(names, found, proposal=formula), blobs, check)}
-    if found.gain is not None:
-        artefacts[EXTENDED] = _keep(extended_json(found.best, found.record).encode(), blobs, check)
+    try:
+        found = diagnose(
+            record, simulator, spec.tolerance, spec.seed, report, report.count(fits), interim=interim
+        )
+        report(FORMULA, 0.95)
+        start = state.begin_search(found)
+        formula = explain_residual(found, spec.seed, progress=report.count_epochs, stop=stop, start=start)
+        left_out.remove(FORMULA)
+        wall_s = report.spent
+        report("writing the report", 0.98)
+        names = ", ".join(datasets[part.dataset].name for part in spec.parts)
+        artefacts[REPORT] = _keep(diagnosis_report(names, found, proposal=formula), blobs, check)
+        left_out.remove(REPORT)
+        if found.gain is not None:
+            artefacts[EXTENDED] = _keep(extended_json(found.best, found.record).encode(), blobs, check)
+        ended = JobState.SUCCEEDED
+    except JobCancelled:
+        so_far = interim.make_diagnosis(spec.seed)
+        if so_far is None:
+            raise
+        found = replace(so_far, left_out=(*so_far.left_out, *left_out))
+        wall_s, ended = report.spent, JobState.CANCELLED
+        if found.gain is not None and EXTENDED not in artefacts:
+            artefacts[EXTENDED] = blobs.write(extended_json(found.best, found.record).encode())
     document = diagnosis_document(found, wall_s, proposal=formula)
     summary = _make_summary(found, formula, simulator.name, wall_s, state.note)
-    return JobOutcome(JobState.SUCCEEDED, document, summary=summary, artefacts=artefacts)
+    return JobOutcome(ended, document, summary=summary, artefacts=artefacts)
 
 
 def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:

@@ -44,6 +44,7 @@ class Verdict(StrEnum):
     FAMILY = "family"
     DISCOVERED = "discovered"
     GROSS_ERROR = "gross error"
+    STOPPED = "stopped"
 
 
 def remove_chance_effects(

@@ -1,6 +1,6 @@
 """Discrepancy job: progress, result, and unusable input."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -10,13 +10,11 @@ import pytest
 
 from islands.discrepancy.inference import noise_floor
 from islands.errors import RecordError, SettingsError
+from islands.facade.explain_residual import FORMULA
 from islands_service.coordinator.diagnosis import diagnosis_job
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_failures import make_problem_document
-from islands_service.domain.job import (
-    Job,
-    JobState,
-)
+from islands_service.domain.job import EXTENDED, Job, JobState
 from islands_service.store import Store
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import Blobs
@@ -69,6 +67,58 @@ def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs
     assert document["record"]["names"]["inputs"] == ["u_V", "T_K"]
     assert document["verdict"] == "named"
     assert phases(store, job)[-1] == "writing the report"
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("phase", "verdict", "left_out"),
+    [
+        ("screening ", "stopped", "combinations of effects"),
+        ("searching for missing terms", "named", "search for missing terms"),
+        (FORMULA, "named", "report.html"),
+    ],
+)
+def test_cancelled_job_keeps_what_its_diagnosis_has_found(
+    store: Store, blobs: Blobs, submit: Submit, phase: str, verdict: str, left_out: str
+) -> None:
+    job = submit()
+
+    def check() -> None:
+        if any(reported.startswith(phase) for reported in phases(store, job)[-1:]):
+            raise JobCancelled("cancelled")
+
+    def checked_map(function: Callable[[Any], Any], arguments: Iterable[Any], /) -> Iterator[Any]:
+        for argument in arguments:
+            check()
+            yield function(argument)
+
+    lease = claim(store)
+    outcome = run_job(lease, store, blobs, check, checked_map)
+    store.leases.finish(lease, outcome)
+    document, summary = outcome.document or {}, outcome.summary or {}
+    assert (outcome.state, document["verdict"], summary["verdict"]) == (JobState.CANCELLED, verdict, verdict)
+    assert left_out in document["left_out"]
+    assert all(step in summary["words"] for step in document["left_out"])
+    assert (EXTENDED in outcome.artefacts) == (verdict == "named")
+    # The resumed job replaces the result.
+    store.jobs.resume(ALICE, job.id)
+    lease = claim(store)
+    store.leases.finish(lease, run_job(lease, store, blobs))
+    resumed = store.results.document(job.id) or {}
+    assert (resumed["verdict"], resumed["left_out"]) == ("named", [])
+
+
+@pytest.mark.ci
+def test_job_that_is_cancelled_before_its_first_result_has_none(
+    store: Store, blobs: Blobs, submit: Submit
+) -> None:
+    submit()
+
+    def cancel() -> None:
+        raise JobCancelled("cancelled")
+
+    with pytest.raises(JobCancelled):
+        run_job(claim(store), store, blobs, cancel)
 
 
 @pytest.mark.ci
