@@ -312,6 +312,15 @@ def test_a_diagnosis_without_effects_has_no_extended_simulation(service, order):
     assert "its verdict is nothing" in detail
 
 
+def test_a_cancelled_diagnosis_has_a_result_and_no_report(service, order):
+    job = submit_diagnosis(service, **order).json()["id"]
+    found = JobOutcome(JobState.CANCELLED, {"verdict": "stopped"}, summary={"verdict": "stopped"})
+    service.store.leases.finish(claimed(service.store), found)
+    assert service.client.get(f"/v1/jobs/{job}/result").json()["verdict"] == "stopped"
+    detail = problem_of(service.client.get(f"/v1/jobs/{job}/report"), 404, "not-found")
+    assert "was cancelled and has no report: see its /result, or resume it" in detail
+
+
 def test_results_of_a_running_diagnosis_are_not_ready(service, order):
     job = submit_diagnosis(service, **order).json()["id"]
     lease = service.store.leases.claim("test", LONG)
