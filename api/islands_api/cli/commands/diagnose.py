@@ -165,7 +165,7 @@ def diagnose(
 def _diagnose_until_stopped(
     run: Callable[..., Diagnosis], out: Path, seed: int, workers: int | None
 ) -> tuple[Diagnosis, FitJournal, StopRequests | None]:
-    """Run a diagnosis; if a signal ends it, return what it has found so far, and the request to stop.
+    """Run a diagnosis; if a signal ends it, return the findings so far, and the request to stop.
 
     Raises
     ------

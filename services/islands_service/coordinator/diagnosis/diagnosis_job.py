@@ -47,7 +47,7 @@ def run_diagnosis_job(
 ) -> JobOutcome:
     """Run a discrepancy job from its last checkpoint.
 
-    A job that is cancelled ends with what it has found so far, without formula and report.
+    A job that is cancelled ends with its findings so far, without formula and report.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def test_results_may_contain_functions_without_a_name() -> None:
     assert [function(2) for function in doubled] == [2, 4, 6]
 
 
-def test_server_of_the_processes_starts_with_sigint_blocked_and_ends_at_an_error() -> None:
+def test_fork_server_starts_with_sigint_blocked_and_ends_at_an_error() -> None:
     """Ctrl-C in a terminal reaches it while it imports, and would end it with a traceback."""
     code = (
         "import os; from multiprocessing import forkserver; from pathlib import Path\n"
