@@ -5,9 +5,9 @@ from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import lru_cache, partial
-from multiprocessing import active_children, forkserver, get_context, resource_tracker
+from multiprocessing import active_children, forkserver, get_context
 from os import kill
-from signal import SIG_BLOCK, SIG_IGN, SIG_SETMASK, SIGINT, SIGKILL, pthread_sigmask, signal
+from signal import SIG_IGN, SIGINT, SIGKILL, signal
 from time import monotonic
 from typing import Any, TypeVar
 
@@ -16,6 +16,7 @@ import cloudpickle
 from islands.available_cpus import count_cpus
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.errors import IslandsError
+from islands_service.process.blocked_signals import block_sigint
 
 #: Seconds of a computation before the first process is used. Shorter ones need none.
 START_AFTER = 1.0
@@ -72,13 +73,9 @@ def process_pool(
     context = get_context("forkserver")
     context.set_forkserver_preload(_PRELOADED)
     # It imports while this process computes. Ctrl-C in a terminal would end these imports with a traceback:
-    # it starts with the signal blocked. The start of the resource tracker unblocks signals.
-    resource_tracker.ensure_running()
-    unblocked = pthread_sigmask(SIG_BLOCK, {SIGINT})
-    try:
+    # it starts with the signal blocked.
+    with block_sigint():
         forkserver.ensure_running()
-    finally:
-        pthread_sigmask(SIG_SETMASK, unblocked)
     pool = ProcessPoolExecutor(workers, context, initializer=signal, initargs=(SIGINT, SIG_IGN))
 
     def parallel_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:

@@ -18,6 +18,7 @@ from islands.performance.benchmark.run import measure
 from islands.performance.benchmark.scaling import save_scalings
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
+from islands_service.process.blocked_signals import block_sigint
 from islands_service.process.process_settings import THREADS
 
 
@@ -55,7 +56,8 @@ def _run_measurement(quick: bool, show: ProgressCallback) -> BenchmarkReport:
     context = get_context("spawn")
     receiving, sending = context.Pipe(duplex=False)
     process = context.Process(target=_measure, args=(quick, sending))
-    process.start()
+    with block_sigint():  # this process receives Ctrl-C and ends the other one
+        process.start()
     sending.close()
     try:
         return _receive_report(receiving, show)
@@ -90,8 +92,6 @@ def _measure(quick: bool, sending: Connection) -> None:
         )
     except IslandsError as error:
         sending.send(error)
-    except KeyboardInterrupt:
-        pass  # Ctrl-C reaches the parent process too, which reports it
 
 
 def _print_report(report: BenchmarkReport) -> None:
