@@ -13,7 +13,6 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from islands.data.averaging import average_samples
 from islands.data.dataset import Dataset
@@ -187,10 +186,16 @@ def _apply_play(u: NDArray[np.float64], width: float) -> NDArray[np.float64]:
 
 
 def _filter(u: NDArray[np.float64], constant: float) -> NDArray[np.float64]:
-    """Return a signal behind a first-order low-pass filter in the steady state of its first value."""
-    decay = np.exp(-1.0 / constant)
-    filtered: NDArray[np.float64] = lfilter([1.0 - decay], [1.0, -decay], u, zi=[decay * u[0]])[0]
-    return filtered
+    """Return a signal behind a first-order low-pass filter in the steady state of its first value.
+
+    For some thousand samples, importing `scipy.signal` would take longer.
+    """
+    decay = float(np.exp(-1.0 / constant))
+    output, at = [], float(u[0])
+    for value in u.tolist():
+        at = (1.0 - decay) * value + decay * at
+        output.append(at)
+    return np.array(output)
 
 
 def _measure_errors(columns: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:

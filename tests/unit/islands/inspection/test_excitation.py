@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+import scipy
 
 from islands.inspection.channel import channels
-from islands.inspection.excitation import measure_excitation
+from islands.inspection.excitation import estimate_spectrum, measure_excitation
 from support.known_records import measure, slow, steps, white
 
 
@@ -20,6 +21,15 @@ def test_band_contains_the_sines_of_an_input():
     low, high = excite(sines(2.0, 5.0, 11.0))["band"].interval
     assert 1.0 < low < 2.2
     assert 10.0 < high < 12.0
+
+
+@pytest.mark.parametrize("samples", [2, 20, 201, 4096, 4097, 20_000])
+def test_spectrum_is_that_of_scipy(samples):
+    values = 3.0 + white(samples, 1)
+    frequency, power = estimate_spectrum(values, 0.01)
+    expected = scipy.signal.welch(values - values.mean(), 100.0, nperseg=min(samples, 4096), detrend=False)
+    np.testing.assert_array_equal(frequency, expected[0])
+    np.testing.assert_allclose(power, expected[1], atol=1e-13 * expected[1].max())
 
 
 def test_white_noise_fills_the_band_up_to_half_the_sampling_rate():

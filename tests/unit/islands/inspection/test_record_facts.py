@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -64,3 +67,21 @@ def test_extreme_values_have_facts(scale):
 def test_unknown_fact_is_an_error():
     with pytest.raises(KeyError, match="colour"):
         measure_facts(Dataset(white(50, 0), white(50, 1), 1.0)).find("colour")
+
+
+#: Measures the facts of a record with loops, and prints the imported modules that take long.
+IMPORTS = """
+import sys, numpy, islands.inspection.record_facts as record_facts
+from islands.data.dataset import Dataset
+u = numpy.sin(0.05 * numpy.arange(2000)) * numpy.sin(0.007 * numpy.arange(2000))
+y = numpy.convolve(u, numpy.ones(9) / 9.0)[: u.size]
+assert record_facts.measure_facts(Dataset(u, y, 0.01)).find("loop").value is not None
+print(*sorted({name.partition(".")[0] for name in sys.modules} & {"scipy", "numba"}))
+"""
+
+
+@pytest.mark.ci
+def test_facts_are_measured_without_libraries_that_take_a_second_to_import():
+    """A service inspects every file in a new process."""
+    done = subprocess.run([sys.executable, "-c", IMPORTS], capture_output=True, text=True, check=True)
+    assert done.stdout == "\n"
