@@ -113,7 +113,10 @@ MARKED = [name if name in ESSENTIAL else pytest.param(name, marks=pytest.mark.ni
 
 @pytest.fixture(scope="module", params=MARKED)
 def proxied(request, serve, tmp_path_factory) -> Iterator[tuple[Service, httpx.Client, str]]:
-    """Provide a service with keys, a client of a proxy in front of it, and the prefix of the proxy."""
+    """Provide a service with keys, a client of a proxy in front of it, and the prefix of the proxy.
+
+    The service has one data set, which is uploaded through the proxy.
+    """
     program, start, prefix = PROXIES[request.param]
     if shutil.which(program) is None:
         pytest.skip(f"needs {program}: apt-get install {program}")
@@ -122,14 +125,15 @@ def proxied(request, serve, tmp_path_factory) -> Iterator[tuple[Service, httpx.C
         forwarded(start, service.port, tmp_path_factory.mktemp("proxy") / "files") as url,
         httpx.Client(base_url=url, headers=service.key(), timeout=30.0, trust_env=False) as client,
     ):
+        answer = client.post(f"{prefix}/v1/datasets", files={"file": ("record.csv", csv())})
+        assert answer.status_code == 201, answer.text
         yield service, client, prefix
 
 
 def submit(proxied: tuple[Service, httpx.Client, str], **headers: str) -> httpx.Response:
     _, client, prefix = proxied
-    answer = client.post(f"{prefix}/v1/datasets", files={"file": ("record.csv", csv())})
-    assert answer.status_code in (200, 201), answer.text
-    return client.post(f"{prefix}/v1/jobs", json=spec(answer.json()["id"]), headers=headers)
+    (dataset,) = client.get(f"{prefix}/v1/datasets").json()["items"]
+    return client.post(f"{prefix}/v1/jobs", json=spec(dataset["id"]), headers=headers)
 
 
 def test_the_page_behind_a_proxy_submits_jobs(proxied):

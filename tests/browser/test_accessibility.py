@@ -45,7 +45,7 @@ def opened(screen: Screen, place: str) -> Any:
 @pytest.mark.parametrize(
     ("scheme", "width", "height"),
     [
-        pytest.param("light", *WIDE, marks=pytest.mark.ci),
+        pytest.param("light", *WIDE, marks=pytest.mark.nightly),
         pytest.param("dark", *NARROW, marks=pytest.mark.ci),
         pytest.param("light", *NARROW, marks=pytest.mark.nightly),
         pytest.param("dark", *WIDE, marks=pytest.mark.nightly),

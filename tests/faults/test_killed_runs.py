@@ -9,6 +9,7 @@ import pytest
 
 from support.command_line import BUDGET, COLUMNS, ISLANDS, found, stored, succeed, write_hysteresis
 from support.processes import actors, alive, descendants, eventually, kill
+from support.undrawn import undrawn_figures
 
 JOB = (*COLUMNS, *BUDGET, "--islands", "2", "--migrate-every", "1")
 
@@ -35,7 +36,10 @@ def shortened(out: Path, generations: int) -> None:
 def undisturbed(record: Path, generations: int) -> dict[str, bytes]:
     out = record.parent / f"undisturbed-{generations}"
     if not out.exists():
-        succeed("identify", record, *JOB, "--generations", generations, "--engine", "serial", "--out", out)
+        with undrawn_figures():
+            succeed(
+                *("identify", record, *JOB, "--generations", generations, "--engine", "serial", "--out", out)
+            )
     return found(out)
 
 
@@ -56,7 +60,8 @@ def test_killed_run_leaves_no_process_and_resumes_to_the_same_result(record: Pat
     # Two of Ray's own processes check only now and then whether their parent lives.
     eventually(lambda: not alive(children), seconds=120.0)
     shortened(out, 20)
-    succeed("identify", "--resume", out, "--engine", engine)
+    with undrawn_figures():
+        succeed("identify", "--resume", out, "--engine", engine)
     assert found(out) == undisturbed(record, 20)
 
 

@@ -70,7 +70,7 @@ def test_three_killed_actors_do_not_change_the_result(posed, undisturbed, engine
     assert messages.count("an actor was lost: its islands continue from their last epoch") == 3
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_frozen_actor_is_replaced_and_does_not_change_the_result(posed, undisturbed, engine, messages):
     """The three islands share two actors: a frozen one has a queue, and the other waits for its emigrants."""
     found, frozen = [], 0

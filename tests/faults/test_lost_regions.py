@@ -83,7 +83,7 @@ def test_a_killed_coordinator_of_a_region_changes_neither_result_nor_checkpoint(
     assert sum("the coordinator of the islands" in message for message in messages) == 1
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_lost_islands_are_a_loss_of_the_cluster(posed, whole, messages):
     import ray
 

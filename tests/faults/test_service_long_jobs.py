@@ -12,7 +12,7 @@ pytestmark = pytest.mark.ci
 ENDLESS = 1_000_000
 
 #: Limit of run time in seconds, longer than the short job takes on a busy machine.
-LIMIT = 40
+LIMIT = 20
 
 
 def test_long_job_leaves_room_for_others_and_ends_with_its_models(tmp_path):

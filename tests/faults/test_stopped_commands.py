@@ -171,7 +171,6 @@ def check_kept(folder: Path, err: str) -> None:
         *(
             pytest.param(*case, marks=pytest.mark.ci)
             for case in [
-                ("identify", 70, signal.SIGINT),
                 ("fit", 80, signal.SIGTERM),
                 ("diagnose", 70, signal.SIGINT),
             ]

@@ -125,7 +125,7 @@ def test_injection_at_nominal_values_does_not_change_the_surrogate(
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.ci)])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.nightly)])
 def test_stronger_injection_has_a_larger_misfit(
     surrogates: Surrogates, effects: Sequence[Effect], seed: int
 ) -> None:

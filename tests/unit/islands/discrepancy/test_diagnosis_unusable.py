@@ -185,7 +185,9 @@ def test_tanks_with_negative_levels_have_a_verdict(record: Dataset, effects: tup
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("name", ["column", "python", "bouc-wen-piezo"])
+@pytest.mark.parametrize(
+    "name", ["column", "python", pytest.param("bouc-wen-piezo", marks=pytest.mark.nightly)]
+)
 def test_simulation_equal_to_the_record_has_no_discrepancy(record: Dataset, name: str) -> None:
     """The simulation equals the record bit for bit, without noise."""
     record = record[:300]

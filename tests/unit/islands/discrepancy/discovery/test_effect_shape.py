@@ -5,9 +5,16 @@ import pytest
 
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.discrepancy.effects import CATALOGUE
 from islands.figures.diagnosis.form_values import draw_effect_shape
 from islands.performance.trials.cases import CASES
 from islands.performance.trials.injection.measurement import inject
+
+#: Effects that are searched for: the free curves, both faults and a cause of another kind.
+EFFECTS = tuple(
+    CATALOGUE[name]
+    for name in ("cubic-stiffness", "coulomb-friction", "stiffness-curve", "damping-curve", "offset")
+)
 
 
 def diagnose_fault(name: str, seed: int) -> Diagnosis:
@@ -17,7 +24,7 @@ def diagnose_fault(name: str, seed: int) -> Diagnosis:
         np.random.default_rng(seed),
         *(None, "white", (1.0, 4.0), False, case.system, case.perturbed, case.free),
     )
-    return diagnose(faulty.record, case.make(faulty), case.tolerance, seed)
+    return diagnose(faulty.record, case.make(faulty), case.tolerance, seed, catalogue=EFFECTS)
 
 
 @pytest.mark.ci

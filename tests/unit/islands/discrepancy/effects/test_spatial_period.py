@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import islands
+from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.effects.spatial_period import COGGING, CYCLIC_ERROR
 from islands.discrepancy.interfaces.context import ForceCoordinate, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect
@@ -91,7 +92,10 @@ def simulate_axis(cogging: float, pitch: float, samples: int, rng: np.random.Gen
 
 @pytest.mark.ci
 def test_cogging_of_an_axis_is_named_with_its_pitch() -> None:
-    found = islands.diagnose(simulate_axis(1.0, 0.24, 1500, np.random.default_rng(3)), "rigid-axis")
+    others = ("coulomb-friction", "periodic-disturbance", "offset", "damping-curve", "backlash")
+    effects = [*EFFECTS, *(CATALOGUE[name] for name in others)]
+    record = simulate_axis(1.0, 0.24, 1500, np.random.default_rng(3))
+    found = islands.diagnose(record, "rigid-axis", effects=effects)
     assert [each.name for each in found.effects] == ["cogging"]
     values = {name: each.value for name, each in found.effects[0].parameters.items()}
     assert values["frequency"] == pytest.approx(1.0 / 0.24, rel=0.01)

@@ -49,10 +49,9 @@ def measure_gain(noise: np.ndarray, effect: Effect) -> tuple[float, float]:
     "kind",
     [
         "pink",
-        "heavy-tailed",
         *(
             pytest.param(kind, marks=pytest.mark.nightly)
-            for kind in ("white", "slow-ar", "multiplicative", "brown")
+            for kind in ("white", "slow-ar", "multiplicative", "brown", "heavy-tailed")
         ),
     ],
 )

@@ -195,7 +195,9 @@ def test_a_missing_stiffness_is_discovered_in_the_equation_of_an_fmu() -> None:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("interface", ["model-exchange", "co-simulation"])
+@pytest.mark.parametrize(
+    "interface", ["model-exchange", pytest.param("co-simulation", marks=pytest.mark.nightly)]
+)
 def test_a_clean_record_gets_no_terms(interface: str) -> None:
     spec = FmuSpec(kind="fmu", file=oscillator(), interface=interface)  # type: ignore[arg-type]
     assert search(spec, make_record(make_fmu({}), noise=2e-3)) is None

@@ -88,7 +88,13 @@ def test_exact_model_meets_every_positive_target_error():
 
 
 @pytest.mark.parametrize(
-    "budget", [*(pytest.param(each, marks=pytest.mark.ci) for each in (1, 30, 151)), 31, 91]
+    "budget",
+    [
+        31,
+        91,
+        pytest.param(1, marks=pytest.mark.ci),
+        *(pytest.param(each, marks=pytest.mark.nightly) for each in (30, 151)),
+    ],
 )
 def test_search_ends_with_the_first_epoch_that_reaches_max_evaluations(data, states, budget):
     seen = []
@@ -102,7 +108,7 @@ def test_search_ends_with_the_first_epoch_that_reaches_max_evaluations(data, sta
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("place", [0, 2, 4])
+@pytest.mark.parametrize("place", [2, *(pytest.param(each, marks=pytest.mark.nightly) for each in (0, 4))])
 def test_search_ends_with_the_first_epoch_that_reaches_target_error(data, states, place):
     seen = []
     target = nextafter(min(states[place].history[-1].islands) ** 0.5, inf)

@@ -88,7 +88,7 @@ def test_constrained_models_have_property_1_and_standard_errors(result):
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("seed", [0, 1, 3])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.nightly) for each in (1, 3))])
 def test_models_without_property_1_are_rejected_under_the_constraint(data, seed):
     """With y(k-2) instead of y(k-1) the cluster sums are met, but two undamped solutions interleave."""
     states = []
@@ -117,7 +117,7 @@ def test_equal_seeds_give_equal_bits_and_other_seeds_other_results(data, result)
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("stop", [0, 2, 4])
+@pytest.mark.parametrize("stop", [2, *(pytest.param(each, marks=pytest.mark.nightly) for each in (0, 4))])
 def test_run_from_a_start_state_equals_an_uninterrupted_run(data, result, states, stop, tmp_path):
     write_checkpoint(states[stop].archipelago, tmp_path / "checkpoint.json", {})
     stored = replace(states[stop], archipelago=read_checkpoint(tmp_path / "checkpoint.json")[0])

@@ -44,7 +44,10 @@ def test_validation_data_do_not_affect_the_search(data, result):
 @pytest.mark.parametrize(
     ("seed", "changes"),
     # Strong pruning removes the seeds from the first population, but they remain final candidates.
-    [(0, {}), (1, {}), (1, {"prune": 1.0, "tolerance": 0.05})],
+    [
+        *(pytest.param(seed, {}, marks=pytest.mark.nightly) for seed in (0, 1)),
+        (1, {"prune": 1.0, "tolerance": 0.05}),
+    ],
 )
 def test_result_is_never_worse_than_its_forward_selection_seeds(seed, changes):
     """The comparison uses the validation data, for each size."""

@@ -97,9 +97,14 @@ def test_a_matlab_function_simulates_like_the_package(tmp_path):
         compare(found, expected)
 
 
-@pytest.mark.ci
 @needs_compiler
-@pytest.mark.parametrize("name", SIMULATIONS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.ci if name in ("model", "column") else pytest.mark.nightly)
+        for name in SIMULATIONS
+    ],
+)
 def test_every_effect_has_a_program(name, tmp_path):
     simulator = make(name)
     for effect in list_effects(simulator, RECORD):
