@@ -35,7 +35,7 @@ MAX_EQUIVALENTS = 5
 
 nightly = pytest.mark.nightly
 
-#: Cases of the level ci. In short records, they have an effect of each family and some that are similar to others.
+#: Cases of the level ci. In short records, they have effects of each family.
 FEW = (
     *("delay", "jump", "coulomb-friction", "loop-asymmetry", "gain-step", "cross-coupling", "dead-zone"),
     *("cyclic-error", "exponential-creep", "relaxation", "viscous-asymmetry", "second-hysteresis"),

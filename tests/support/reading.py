@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-#: Colour schemes and widths of a page, the two most different ones at the level ci.
+#: Colour schemes and widths of a page. Other tests of the level ci see the pages in light colours and wide.
 APPEARANCES = [
-    pytest.param("light", 1280, marks=pytest.mark.ci),
+    pytest.param("light", 1280, marks=pytest.mark.nightly),
     pytest.param("dark", 360, marks=pytest.mark.ci),
     pytest.param("light", 360, marks=pytest.mark.nightly),
     pytest.param("dark", 1280, marks=pytest.mark.nightly),
