@@ -14,8 +14,15 @@ from support.command_line import ISLANDS, islands
 @pytest.mark.parametrize(
     ("arguments", "is_joined"),
     [
-        *((each, False) for each in ("", "--help", "--version", "fit --help", "jobs --help", "systems list")),
-        *((each, True) for each in ("--help", "systems list", "fitt", "show no-result")),
+        *((each, False) for each in ("", "fit --help", "systems list")),
+        *((each, True) for each in ("--help", "show no-result")),
+        *(
+            pytest.param(*each, marks=pytest.mark.nightly)
+            for each in [
+                *((each, False) for each in ("--help", "--version", "jobs --help")),
+                *((each, True) for each in ("systems list", "fitt")),
+            ]
+        ),
     ],
 )
 def test_command_with_a_closed_output_exits_quietly(arguments: str, is_joined: bool) -> None:

@@ -32,9 +32,14 @@ def make_case(name):
     return replace(simulator, shots=None), record
 
 
-@pytest.mark.ci
 @needs_octave
-@pytest.mark.parametrize("name", BUILT_IN)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.ci if name == "second-order" else pytest.mark.nightly)
+        for name in BUILT_IN
+    ],
+)
 def test_every_effect_of_a_built_in_system_is_simulated_like_the_package(name, tmp_path):
     simulator, record = make_case(name)
     programs, outputs = [], []
