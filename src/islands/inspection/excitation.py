@@ -57,9 +57,11 @@ def estimate_spectrum(
     length = min(len(values), _PERIODOGRAM)
     window = np.hanning(length + 1)[:-1]
     parts = np.lib.stride_tricks.sliding_window_view(values - values.mean(), length)[:: length - length // 2]
-    power = np.mean(np.abs(np.fft.rfft(window * parts)) ** 2, axis=0) * dt / np.sum(window**2)
+    power: NDArray[np.float64] = (
+        np.mean(np.abs(np.fft.rfft(window * parts)) ** 2, axis=0) * dt / np.sum(window**2)
+    )
     power[1 : (length + 1) // 2] *= 2.0  # negative frequencies; half the sampling rate has none
-    return np.fft.rfftfreq(length, dt), power
+    return np.asarray(np.fft.rfftfreq(length, dt), np.float64), power
 
 
 def _measure_band(channel: Channel, record: Dataset) -> Fact:
