@@ -62,7 +62,7 @@ def _scale(samples: int = 200, **factors: float) -> bytes:
 
 @pytest.mark.ci
 @pytest.mark.parametrize("name", ["u_V", "y_um"])
-@pytest.mark.parametrize("factor", [1e300, 1e-300])
+@pytest.mark.parametrize("factor", [1e300, pytest.param(1e-300, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("kind", ["jobs", "discrepancies"])
 def test_a_job_on_extreme_magnitudes_fails_with_a_sentence_that_says_what_to_do(
     service: Service, kind: str, factor: float, name: str
@@ -76,7 +76,9 @@ def test_a_job_on_extreme_magnitudes_fails_with_a_sentence_that_says_what_to_do(
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("rows", ["0:30", "0:36", "0:44"])
+@pytest.mark.parametrize(
+    "rows", ["0:36", *(pytest.param(each, marks=pytest.mark.nightly) for each in ("0:30", "0:44"))]
+)
 def test_a_job_on_few_samples_succeeds_or_asks_for_more(service: Service, tmp_path: Path, rows: str) -> None:
     """Models of different lags had predictions of different lengths, which the recommendation compared."""
     write_record(make_piezo(), tmp_path / "piezo.csv")
