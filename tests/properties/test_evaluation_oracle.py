@@ -79,6 +79,17 @@ def smallest_pivot(psi, S, c):
     return np.linalg.svd(scaled.T @ found[1], compute_uv=False).min(initial=1.0) ** 2
 
 
+def converges_at_constant_input(regressors, theta):
+    """Return whether the roots of the linear output terms, other than 1, lie inside the unit circle."""
+    feedback = {item.output_lag: value for item, value in zip(regressors, theta, strict=True)}
+    feedback.pop(0, None)
+    roots = np.roots([1.0, *(-feedback.get(lag, 0.0) for lag in range(1, max(feedback) + 1))])
+    largest = np.abs(np.delete(roots, np.argmin(np.abs(roots - 1.0)))).max(initial=0.0)
+    if abs(largest - 1.0) < 1e-5:
+        raise UncertainError("a root near the unit circle")
+    return largest < 1.0
+
+
 def expected(genes, pruned, data, setting):
     """Return regressors, and either a status or model, simulation, norms and smallest pivot."""
     warm_up = setting.maximum_lag
@@ -110,6 +121,8 @@ def expected(genes, pruned, data, setting):
     if not constrained.has_signs(estimate.theta):
         return regressors, Status.INFEASIBLE
     theta = tuple(estimate.theta.tolist())
+    if constraint(setting.constraints).sums and not converges_at_constant_input(regressors, theta):
+        return regressors, Status.INFEASIBLE
     model = Model(regressors, theta, data.input_names)
     interval = FITNESSES[setting.fitness](setting.shooting)
     simulated = multiple_shooting(model, data, interval, warm_up)

@@ -74,6 +74,16 @@ def test_individuals_without_crossover_and_mutation_are_copies():
     assert set(following.population) <= set(island.population)
 
 
+def test_copies_that_were_not_pruned_remain_so_if_the_settings_say_so():
+    changes = {"crossover": 0.0, "mutation": 0.0, "tolerance": 0.01, "constraints": "none"}
+    for prune_copies in (True, False):
+        evaluator = Evaluator(record(), replace(SMALL, prune=0.0, prune_copies=prune_copies, **changes))
+        island, _ = first_generation(0, 1, evaluator)
+        following, _ = step(island, evaluator, settings=replace(evaluator.settings, prune=1.0))
+        copies = {each.key for each in following.population}
+        assert (copies <= {each.key for each in island.population}) is not prune_copies
+
+
 # Steps are pure functions.
 
 
@@ -271,6 +281,7 @@ def test_ties_for_the_elite_are_broken_by_size_and_then_by_text():
     assert select_elite((large, late, early, early), 2, False) == (early, early)
     assert select_elite((large, late, early, early), 2, True) == (early, large)
     assert select_elite((large, late, early, early), 3, True) == (early, late, large)
+    assert select_elite((large, late, early, early), 2, True, niches=False) == (early, late)
 
 
 def finite(fitness, text="y(k-1)"):
@@ -294,7 +305,7 @@ def test_failures_never_enter_the_hall_of_fame():
 
 @pytest.mark.parametrize("crossover", [0.0, 1.0])
 def test_bred_children_differ_from_their_parents(crossover):
-    """A single attempt gives a quarter of children with the structure of a parent, several nearly none."""
+    """A single attempt gives a quarter of children with the structure of a parent, several a twentieth."""
     setting = replace(SMALL, crossover=crossover, mutation=1.0, prune=0.0, max_terms=5)
     evaluator = Evaluator(record(), setting)
     same = bred = 0
@@ -307,4 +318,4 @@ def test_bred_children_differ_from_their_parents(crossover):
             for genes in _breed_pair(parents, evaluator, setting, rng, ()):
                 bred += 1
                 same += evaluator.gene_indices(Individual(genes)) in known
-    assert same < 0.05 * bred
+    assert same < 0.1 * bred

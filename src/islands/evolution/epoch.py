@@ -109,7 +109,7 @@ def receive_migrants(
     population = list(island.population)
     for place, each in zip(places, immigrants, strict=True):
         population[place] = each
-    elite = select_elite((*island.elite, *immigrants), settings.elites, settings.distinct)
+    elite = select_elite((*island.elite, *immigrants), settings.elites, settings.distinct, settings.niches)
     return replace(island, population=tuple(population), elite=elite)
 
 

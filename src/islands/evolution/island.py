@@ -1,7 +1,7 @@
 """State of one island, and the step from one generation to the next."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf, isfinite
@@ -147,7 +147,8 @@ def step(
     for couple in range(pairs):
         pair = [parent.genes for parent in parents[2 * couple : 2 * couple + 2]]
         offspring += _breed_pair(pair, evaluator, settings, rng, pool)
-    return _evaluate_generation(following, offspring[: settings.population], evaluator, settings)
+    copied = frozenset[Genes]() if settings.prune_copies else frozenset(each.genes for each in parents)
+    return _evaluate_generation(following, offspring[: settings.population], evaluator, settings, copied)
 
 
 def _breed_pair(
@@ -195,17 +196,22 @@ def _breed_new(
 
 
 def _evaluate_generation(
-    island: Island, genes: Sequence[Genes], evaluator: Evaluator, settings: Settings
+    island: Island,
+    genes: Sequence[Genes],
+    evaluator: Evaluator,
+    settings: Settings,
+    copied: Collection[Genes] = (),
 ) -> tuple[Island, StepInfo]:
+    """Evaluate the genes of a generation; copies of parents remain as they are, the others may be pruned."""
     rng = Stream(island.seed, island.index, island.generation, Purpose.PRUNING)
     # Draw for every individual, also for known structures, so that caches never change the random stream.
-    candidates = [(Individual(each), rng.chance(settings.prune)) for each in genes]
+    candidates = [(Individual(each), rng.chance(settings.prune) and each not in copied) for each in genes]
     threshold = _abandon_threshold(island, settings)
     thresholds = _thresholds_by_size(island.hall_of_fame, threshold, settings.max_terms)
     population, _ = evaluator.evaluate(candidates, thresholds)
     worst = _elite_threshold(island, settings)
     contenders = (each for each in (*island.elite, *population) if each.fitness <= worst)
-    elite = select_elite(contenders, settings.elites, settings.distinct)
+    elite = select_elite(contenders, settings.elites, settings.distinct, settings.niches)
     hall = with_entries(island.hall_of_fame, population)
     known = {each.key for each in (*island.elite, *island.population)}
     info = StepInfo(
@@ -245,19 +251,24 @@ def _thresholds_by_size(hall: HallOfFame, threshold: float, largest: int) -> lis
     return [max(threshold, entry.get(size, inf)) for size in range(largest + 1)]
 
 
-def select_elite(contenders: Iterable[Individual], count: int, distinct: bool) -> Population:
+def select_elite(
+    contenders: Iterable[Individual], count: int, distinct: bool, niches: bool = True
+) -> Population:
     """Return the fittest individuals; ties are broken by size, then by the text of the structure.
 
-    If they have to be distinct, the fittest of every niche come first, and others only fill the elite.
+    If they have to be distinct, every structure occurs once. With niches, the fittest of every niche then
+    come first, and others only fill the elite.
     """
     ordered = sorted(contenders, key=_elite_order)
-    if distinct:
-        structures = unique_structures(ordered)
-        leading = unique_niches(structures)[:count]
-        keys = {each.key for each in leading}
-        others = [each for each in structures if each.key not in keys]
-        ordered = sorted((*leading, *others[: count - len(leading)]), key=_elite_order)
-    return tuple(ordered[:count])
+    if not distinct:
+        return tuple(ordered[:count])
+    structures = unique_structures(ordered)
+    if not niches:
+        return structures[:count]
+    leading = unique_niches(structures)[:count]
+    keys = {each.key for each in leading}
+    others = [each for each in structures if each.key not in keys]
+    return tuple(sorted((*leading, *others[: count - len(leading)]), key=_elite_order))
 
 
 def _elite_order(individual: Individual) -> tuple[float, int, tuple[str, ...]]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, field
 from math import inf
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from islands.data.averaging import check_average
@@ -26,6 +27,11 @@ from islands.model.user_primitive import primitive_table
 
 #: Maximum number of islands, limited by the memory of a coordinator.
 MOST_ISLANDS = 10_000
+
+#: What becomes of children with too many genes, by name.
+OVERLONG: Mapping[str, str] = MappingProxyType(
+    {"truncate": "the last genes are left out", "parent": "a parent takes the place of the child"}
+)
 
 T = TypeVar("T")
 
@@ -71,6 +77,9 @@ class Settings:
         MTPB, probability that an individual mutates if it did not recombine.
     prune : float
         PRPB, probability that an evaluated individual is pruned by FROE.
+    prune_copies : bool
+        Whether individuals that selection copies unchanged are pruned with the same probability. Otherwise
+        an individual that was not pruned remains so, as in the authors' toolbox.
     tolerance : float
         Smallest error reduction ratio of a term that pruning keeps.
     err_target : str
@@ -93,7 +102,7 @@ class Settings:
     shooting : int
         Samples of the record, before averaging, in each interval of multiple shooting.
     tournament : int
-        Contestants of a tournament. The paper does not give it; 3 is the usual choice of its toolbox.
+        Contestants of a tournament. The paper does not give it; its authors' toolbox takes 2.
     high_level : float
         Probability that a crossover exchanges whole genes, not subtrees; not given in the paper.
     outer : float
@@ -103,6 +112,10 @@ class Settings:
     initial_height : int
         Largest height of genes in the first population and of random subtrees, at most ``max_height``; not
         given in the paper.
+    overlong : str
+        An entry of ``OVERLONG``: what becomes of children with more than ``max_terms`` genes. ``truncate``
+        leaves out the last genes; ``parent`` takes a parent in place of the child, as in the authors'
+        toolbox.
     library : str
         Candidate library. Its constrained forward selection seeds the first population, and outer mutation
         may insert its regressors. Empty for no library.
@@ -116,8 +129,9 @@ class Settings:
     from_library : float
         Probability that an outer mutation uses the library; no effect without a library.
     distinct : bool
-        Whether the elite contains each structure only once, and of structures that differ only in their
-        lags the fittest one first.
+        Whether the elite contains each structure only once.
+    niches : bool
+        Whether a distinct elite has, of structures that differ only in their lags, the fittest one first.
     refine : bool
         Whether to refine the parameters of the hall of fame by minimising the shooting error.
     estimator : str
@@ -153,15 +167,16 @@ class Settings:
 
     population: int = _option(500, "Individuals of an island.")
     generations: int = _option(500, "Generations of a search, at most.")
-    elite: float = 0.1
-    crossover: float = 0.8
-    mutation: float = 0.2
-    prune: float = 0.5
-    tolerance: float = 1e-5
+    elite: float = _option(0.1, "Fraction of the population that is kept as elite.")
+    crossover: float = _option(0.8, "CXPB: probability that a pair recombines.")
+    mutation: float = _option(0.2, "MTPB: probability of a mutation if there was no crossover.")
+    prune: float = _option(0.5, "PRPB: probability that an individual is pruned.")
+    prune_copies: bool = True
+    tolerance: float = _option(1e-5, "Smallest error reduction ratio of a term that pruning keeps.")
     err_target: str = "output"
     max_terms: int = _option(10, "Terms of the largest model.")
     max_height: int = _option(5, "Height of an expression tree, at most.")
-    shifts: tuple[int, ...] = (1, 2, 3, 4, 5)
+    shifts: tuple[int, ...] = _option((1, 2, 3, 4, 5), "Back-shifts of genes; repeat it: 1, 2, ...")
     primitives: tuple[str | Primitive, ...] = _option(
         ("mul", "phi1", "phi2"),
         f"Repeat it: {', '.join(PRIMITIVES)}.",
@@ -172,11 +187,12 @@ class Settings:
     constraints: str = _option("hysteresis", f"{', '.join(CONSTRAINTS)}, or statements: {'; '.join(FORMS)}.")
     fitness: str = "shooting"
     shooting: int = _option(500, "Samples of a shooting interval, before averaging.", after="max_height")
-    tournament: int = 3
+    tournament: int = _option(3, "Contestants of a tournament, which selects a parent.")
     high_level: float = 0.5
     outer: float = 0.5
     initial_terms: tuple[int, int] = (1, 10)
     initial_height: int = 3
+    overlong: str = "truncate"
     library: str = ""
     library_degree: int = 5
     library_lags: int = 3
@@ -186,6 +202,7 @@ class Settings:
     swap_search: bool = False
     from_library: float = 0.0
     distinct: bool = False
+    niches: bool = True
     refine: bool = False
     estimator: str = _option(
         "", f"{', '.join(ESTIMATORS)}; by default validation selects.", after="constraints"
@@ -235,6 +252,7 @@ class Settings:
         lookup(STRUCTURES, self.structure, "structure")
         constraint(self.constraints)
         lookup(FITNESSES, self.fitness, "fitness")
+        lookup(OVERLONG, self.overlong, "overlong")
         lookup(ERR_TARGETS, self.err_target, "err_target")
         if self.estimator:
             lookup(ESTIMATORS, self.estimator, "estimator")

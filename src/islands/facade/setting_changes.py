@@ -15,6 +15,7 @@ class SettingChanges(TypedDict, total=False):
     crossover: float
     mutation: float
     prune: float
+    prune_copies: bool
     tolerance: float
     err_target: str
     max_terms: int
@@ -30,6 +31,7 @@ class SettingChanges(TypedDict, total=False):
     outer: float
     initial_terms: tuple[int, int]
     initial_height: int
+    overlong: str
     library: str
     library_degree: int
     library_lags: int
@@ -37,6 +39,7 @@ class SettingChanges(TypedDict, total=False):
     swap_search: bool
     from_library: float
     distinct: bool
+    niches: bool
     refine: bool
     estimator: str
     average: int | str

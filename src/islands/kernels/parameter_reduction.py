@@ -40,6 +40,8 @@ class Groups(NamedTuple):
     signs : ndarray of float64, shape (terms,) or (0,)
         1 if the term's parameter must not be negative, -1 if it must not be positive, otherwise 0. Empty if
         no parameter has a sign.
+    output_lag : ndarray of int64, shape (terms,) or (0,)
+        Lag of a linear output term, otherwise 0. Empty if the output need not converge at constant input.
     """
 
     group: NDArray[np.int64]
@@ -49,6 +51,7 @@ class Groups(NamedTuple):
     coefficients: NDArray[np.float64]
     targets: NDArray[np.float64]
     signs: NDArray[np.float64]
+    output_lag: NDArray[np.int64]
 
 
 class Reduction(NamedTuple):

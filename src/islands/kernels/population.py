@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.kernels.characteristic_roots import converges
 from islands.kernels.codegen import NodeArrays, generate_program
 from islands.kernels.constrained_lstsq import (
     ILL_CONDITIONED,
@@ -64,6 +65,9 @@ TOO_FEW_ROWS = 7
 
 #: Status of an individual: a parameter has the wrong sign.
 WRONG_SIGN = 8
+
+#: Status of an individual: at constant input the output does not converge (Property 1).
+NOT_CONVERGENT = 9
 
 
 class PopulationContext(NamedTuple):
@@ -247,7 +251,23 @@ def _estimate(chosen, context, matrix, operand_index, theta):
         for position in range(size):
             if context.groups.signs[chosen[position]] * theta[position] < 0.0:
                 return WRONG_SIGN
+    if context.groups.output_lag.size > 0 and not _has_equilibria(chosen, theta, context.groups.output_lag):
+        return NOT_CONVERGENT
     return OK
+
+
+@kernel
+def _has_equilibria(chosen, theta, output_lag):
+    """Return whether the linear output terms converge at constant input."""
+    order = 0
+    for term in chosen:
+        order = max(order, output_lag[term])
+    feedback = np.zeros(order)
+    for position in range(chosen.size):
+        lag = output_lag[chosen[position]]
+        if lag > 0:
+            feedback[lag - 1] = theta[position]
+    return converges(feedback)
 
 
 @kernel

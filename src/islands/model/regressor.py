@@ -61,6 +61,14 @@ class Regressor:
         """Largest lag; 0 for a constant."""
         return max((lag for _, lag in self.lags), default=0)
 
+    @property
+    def output_lag(self) -> int:
+        """Lag i of a linear output y(k-i); 0 for any other regressor."""
+        match self.expression:
+            case Lagged(0, lag):
+                return lag
+        return 0
+
 
 def regressor(expression: Expression) -> tuple[float, Regressor | None]:
     """Bring an expression into canonical form.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset, join
 from islands.estimation.parameter_constraints import PROPERTY_1
+from islands.kernels.characteristic_roots import converges
 from islands.model import rendering
 from islands.model.clusters import OUTPUT_AT_REST, clusters
 from islands.model.model import Model
@@ -111,23 +112,29 @@ class PhysicsChecks:
     Attributes
     ----------
     clusters : tuple of ClusterSum
+    convergent : bool
+        Whether the linear output terms converge at constant input; true if their parameters do not sum to 1.
     holds : tuple of HoldTest
         Holds at five levels, each reached while loading and while unloading.
     excursions : tuple of ExcursionTest
     """
 
     clusters: tuple[ClusterSum, ...]
+    convergent: bool
     holds: tuple[HoldTest, ...]
     excursions: tuple[ExcursionTest, ...]
 
     @property
     def property_1(self) -> bool:
-        """Whether every cluster sum meets its target and every hold is bounded and constant.
+        """Whether the cluster sums meet their targets, and the output converges at constant input.
 
-        The sums are not sufficient: y(k) = 2.5 y(k-1) - 1.5 y(k-2) meets them but diverges.
+        The sums are not sufficient: y(k) = 2.5 y(k-1) - 1.5 y(k-2) meets them but diverges. Nor are the
+        holds: the output of y(k) = y(k-8) is constant in a hold if its last eight values were equal.
         """
-        return all(entry.met for entry in self.clusters) and all(
-            entry.bounded and entry.constant for entry in self.holds
+        return (
+            all(entry.met for entry in self.clusters)
+            and self.convergent
+            and all(entry.bounded and entry.constant for entry in self.holds)
         )
 
     @property
@@ -160,7 +167,7 @@ def check_physics(model: Model, record: Dataset) -> PhysicsChecks:
             holds.append(_evaluate_hold(kind, at_rest, record.output_range))
         else:
             excursions.append(_evaluate_excursion(kind, signal, y, record.output_range))
-    return PhysicsChecks(cluster_sums(model), tuple(holds), tuple(excursions))
+    return PhysicsChecks(cluster_sums(model), is_convergent(model), tuple(holds), tuple(excursions))
 
 
 def cluster_sums(model: Model) -> tuple[ClusterSum, ...]:
@@ -174,6 +181,19 @@ def cluster_sums(model: Model) -> tuple[ClusterSum, ...]:
         ClusterSum(rendering.at_rest(state, model.inputs), total, PROPERTY_1.get(state, 0.0))
         for state, total in ({OUTPUT_AT_REST: 0.0} | sums).items()
     )
+
+
+def is_convergent(model: Model) -> bool:
+    """Return whether the linear output terms converge at constant input: to one equilibrium of a continuum.
+
+    Their characteristic polynomial has a single root at 1, and all other roots inside the unit circle. True
+    as well if their parameters do not sum to 1.
+    """
+    feedback = np.zeros(model.maximum_lag)
+    for item, parameter in zip(model.regressors, model.parameters, strict=True):
+        if item.output_lag:
+            feedback[item.output_lag - 1] = parameter
+    return bool(converges(feedback))
 
 
 def hold_response(

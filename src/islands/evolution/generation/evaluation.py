@@ -45,6 +45,9 @@ _OUTCOMES = {
     kernel.NO_TERMS: EvaluationOutcome(Status.INFEASIBLE, "no gene is left"),
     kernel.OVERFLOW: EvaluationOutcome(Status.DIVERGED, "a regressor overflows on the record"),
     kernel.WRONG_SIGN: EvaluationOutcome(Status.INFEASIBLE, "a parameter has the wrong sign"),
+    kernel.NOT_CONVERGENT: EvaluationOutcome(
+        Status.INFEASIBLE, "at constant input the linear output terms do not converge (Property 1)"
+    ),
     kernel.TOO_FEW_ROWS: EvaluationOutcome(Status.TOO_FEW_ROWS, "there are not more rows than parameters"),
 }
 

@@ -66,9 +66,17 @@ def low_level_crossover(one: Genes, other: Genes, settings: Settings, rng: Strea
 
 
 def high_level_crossover(one: Genes, other: Genes, settings: Settings, rng: Stream) -> tuple[Genes, Genes]:
-    """Exchange the genes after a cut point in each parent; the number of genes may change."""
+    """Exchange the genes after a cut point in each parent; the number of genes may change.
+
+    Children with too many genes are truncated, or replaced by a parent.
+    """
     i, j = rng.randrange(len(one) + 1), rng.randrange(len(other) + 1)
     first, second = one[:i] + other[j:], other[:j] + one[i:]
+    if settings.overlong == "parent":
+        first, second = (
+            child if len(child) <= settings.max_terms else parent
+            for child, parent in ((first, one), (second, other))
+        )
     return first[: settings.max_terms] or one, second[: settings.max_terms] or other
 
 

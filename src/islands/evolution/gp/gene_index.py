@@ -46,6 +46,7 @@ class GeneIndex:
         self._targets = np.array([part.target for part in constraint.equalities], np.float64)
         self._coefficients = np.zeros((64, len(self._targets)))
         self._signs, self._sign = constraint.signs, np.zeros(64 if constraint.signs else 0)
+        self._output_lag = np.zeros(64 if constraint.sums else 0, np.int64)
         self._arrays: Groups | None = None
         for target in targets:
             self._store.term(target)
@@ -78,6 +79,7 @@ class GeneIndex:
                 self._coefficients,
                 self._targets,
                 self._sign,
+                self._output_lag,
             )
         return self._arrays
 
@@ -114,9 +116,13 @@ class GeneIndex:
             self._coefficients = np.vstack([self._coefficients, more])
             if self._signs:
                 self._sign = np.append(self._sign, np.zeros(number))
+            if self._constraint.sums:
+                self._output_lag = np.append(self._output_lag, np.zeros(number, np.int64))
         self._coefficients[number] = self._constraint.weigh(regressor)
         if self._signs:
             self._sign[number] = self._signs.get(regressor, 0)
+        if self._constraint.sums:
+            self._output_lag[number] = regressor.output_lag
         weight, state = self._constraint.group(regressor)
         if weight:
             if state not in self._groups:

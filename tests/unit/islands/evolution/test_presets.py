@@ -70,14 +70,21 @@ def test_paper_presets_have_the_printed_numbers(preset, printed):
 def test_paper_cases_are_constrained_and_not_seeded(preset):
     made = PRESETS[preset]
     assert (made.structure, made.constraints, made.fitness) == ("phi", "hysteresis", "shooting")
-    assert (made.library, made.from_library, made.distinct, made.refine) == ("", 0.0, False, False)
+    assert (made.library, made.from_library, made.refine) == ("", 0.0, False)
 
 
 @pytest.mark.parametrize("preset", ["paper-appendix", "paper-appendix-s2"])
 def test_paper_appendix_minimises_the_one_step_error_of_polynomials(preset):
     made = PRESETS[preset]
     assert (made.structure, made.constraints, made.fitness) == ("free", "none", "one-step")
-    assert (made.library, made.from_library, made.distinct, made.refine) == ("", 0.0, False, False)
+    assert (made.library, made.from_library, made.refine) == ("", 0.0, False)
+
+
+@pytest.mark.parametrize("preset", [name for name in PRESETS if name.startswith("paper")])
+def test_paper_presets_complete_the_paper_by_the_toolbox_of_its_authors(preset):
+    made = PRESETS[preset]
+    assert (made.tournament, made.distinct, made.niches) == (2, True, False)
+    assert (made.overlong, made.prune_copies) == ("parent", False)
 
 
 def test_paper_presets_differ_only_in_the_printed_settings():
@@ -86,6 +93,7 @@ def test_paper_presets_differ_only_in_the_printed_settings():
         return {name for name in here if here[name] != there[name]}
 
     assert difference("paper-case1", "paper-case2") == {"tolerance", "shooting"}
+    assert difference("paper-case1", "paper-case1-islands") == {"islands", "topology"}
     assert difference("paper-appendix", "paper-appendix-s2") == {"max_height", "max_terms", "initial_terms"}
 
 

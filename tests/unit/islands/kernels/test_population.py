@@ -65,7 +65,7 @@ def record(seed=0, segments=(400, 150)):
 RECORD = record()
 
 #: No equalities and no signs.
-PLAIN = np.empty((len(TERMS) + 1, 0)), np.empty(0), np.empty(0)
+PLAIN = np.empty((len(TERMS) + 1, 0)), np.empty(0), np.empty(0), np.empty(0, np.int64)
 
 
 def make_groups(terms, constrained):

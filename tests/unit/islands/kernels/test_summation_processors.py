@@ -59,7 +59,7 @@ for row, size in zip(structures, sizes):
     row[:size] = np.arange(size) + 1
 structures[3, :3] = 3, 4, 5
 weight = np.ones(count + 1)
-plain = np.empty((count + 1, 0)), np.empty(0), np.empty(0)
+plain = np.empty((count + 1, 0)), np.empty(0), np.empty(0), np.empty(0, np.int64)
 clusters = Groups(np.array([-1, 0, 0, 1, 1, 1, *[-1] * (count - 5)]), weight, np.array([1.0, 0.0]), 1, *plain)
 free = Groups(np.full(count + 1, -1), weight, np.empty(0), 0, *plain)
 for name, groups in (("clusters", clusters), ("free", free)):

@@ -88,6 +88,13 @@ def test_output_alternating_between_two_values_is_not_constant():
     assert checked.property_1 is False
 
 
+def test_output_that_repeats_its_last_values_is_not_convergent_even_if_the_holds_are_constant():
+    # The rounded samples of a slow input have equal neighbours, so all eight solutions reach the same value.
+    checked = check_physics(model({"y(k-8)": 1.0, "sign(u(k-1) - u(k-2))": 0.0}), record())
+    assert all(entry.bounded and entry.constant for entry in checked.holds)
+    assert (checked.convergent, checked.property_1) == (False, False)
+
+
 def test_decaying_transient_does_not_violate_property_1():
     # Modes 1 and -0.4: a transient remains when the hold starts, but has decayed in its second half.
     settling = model({"y(k-1)": 0.6, "y(k-2)": 0.4, "u(k-1) - u(k-2)": 0.1})

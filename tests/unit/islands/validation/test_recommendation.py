@@ -28,6 +28,7 @@ class Candidate:
     def assessment(self):
         physics = PhysicsChecks(
             (ClusterSum("y", 1.0 if self.property_1 else 0.5, 1.0),),
+            True,
             (HoldTest(0.0, True, True, True, 0.0),),
             (ExcursionTest("rate x 5", self.bounded, 0.0, 100.0),),
         )

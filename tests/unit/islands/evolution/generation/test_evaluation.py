@@ -148,20 +148,19 @@ def test_regressor_that_is_zero_on_the_record_is_singular():
 
 
 def test_model_whose_simulation_leaves_the_bound_has_diverged():
-    """The constraint allows a second, undamped solution, which one-step-ahead prediction does not show."""
+    """One-step-ahead prediction does not show that the second solution of y(k-2) is undamped."""
     texts, data = ("y(k-2)", "y(k-3)"), searches.record()
     model = estimate(
-        [make_regressor(parse(text)) for text in texts], data, "hysteresis", SETTINGS.maximum_lag
+        [make_regressor(parse(text)) for text in texts], data, "none", SETTINGS.maximum_lag
     ).model
-    assert max(map(abs, model.parameters)) > 1.0
     assert not multiple_shooting(model, data, 60, SETTINGS.maximum_lag).outcome
-    found = evaluate_one(individual(*texts), data, shooting=60)
+    found = evaluate_one(individual(*texts), data, shooting=60, constraints="none")
     assert (found.outcome.verdict, found.outcome.reason) == (
         Status.DIVERGED,
         "the simulation left the divergence bound in an interval",
     )
     assert (found.fitness, found.theta, found.size) == (np.inf, (), 2)
-    assert evaluate_one(individual(*texts), data, fitness="one-step").outcome
+    assert evaluate_one(individual(*texts), data, fitness="one-step", constraints="none").outcome
 
 
 def test_regressor_that_overflows_on_the_record_has_diverged():
@@ -252,6 +251,26 @@ def test_duplicates_are_counted_within_a_batch_and_in_the_cache():
     assert found[1].genes == (same.genes[1],)
     assert evaluator.evaluate([(other, False), (same, True), (individual("u(k-1)"), False)])[1] == 2
     assert evaluator.evaluate([]) == ((), 0)
+
+
+@pytest.mark.parametrize(
+    ("terms", "feasible"),
+    [
+        (("y(k-1)",), True),
+        (("y(k-15)",), False),
+        (("y(k-1)", "y(k-2)"), True),
+        (("y(k-4)", "u(k-1)*y(k-1)", "u(k-2)*y(k-2)"), False),
+    ],
+)
+def test_structures_that_do_not_converge_at_constant_input_are_infeasible(terms, feasible):
+    """They meet the sum of Property 1 and have small errors over short intervals, but diverge in free run."""
+    terms = (*terms, "phi1(u(k-1), u(k-2))")
+    found = evaluate_one(individual(*terms), max_height=16, constraints="hysteresis")
+    assert (found.outcome.verdict is Status.OK) is feasible
+    if not feasible:
+        assert (found.outcome.verdict, found.theta, found.fitness) == (Status.INFEASIBLE, (), float("inf"))
+        assert "converge" in found.outcome.reason
+    assert evaluate_one(individual(*terms), max_height=16, constraints="none").outcome.verdict is Status.OK
 
 
 MODEL_13 = (

@@ -78,6 +78,18 @@ def test_child_with_too_many_genes_is_truncated():
             assert 1 <= len(child) <= 4
 
 
+def test_parent_takes_the_place_of_a_child_with_too_many_genes():
+    tight = replace(SETTINGS, max_terms=4, initial_terms=(1, 4), overlong="parent")
+    replaced = 0
+    for seed in SEEDS:
+        expected = high_level_crossover(LETTERS, NUMBERS, SETTINGS, stream(seed))
+        children = high_level_crossover(LETTERS, NUMBERS, tight, stream(seed))
+        for child, whole, parent in zip(children, expected, (LETTERS, NUMBERS), strict=True):
+            assert child == (whole if len(whole) <= 4 else parent)
+            replaced += len(whole) > 4
+    assert replaced > 10
+
+
 # Low-level crossover: subtrees of one gene each.
 
 
