@@ -49,7 +49,7 @@ def search_settings() -> str:
         section("Presets", _presets()),
         section(
             "Settings",
-            "The defaults are those of the preset `paper-case1`.",
+            "A default holds unless the preset has another value.",
             table(("Setting", "Type", "Default", "Meaning"), rows),
         ),
         section("Gene structures", "Values of `structure`.", entries("Structure", STRUCTURES)),

@@ -171,9 +171,13 @@ class Settings:
     crossover: float = _option(0.8, "CXPB: probability that a pair recombines.")
     mutation: float = _option(0.2, "MTPB: probability of a mutation if there was no crossover.")
     prune: float = _option(0.5, "PRPB: probability that an individual is pruned.")
-    prune_copies: bool = True
+    prune_copies: bool = _option(
+        True, "Prune unchanged copies of parents as well.", "--prune-copies/--no-prune-copies"
+    )
     tolerance: float = _option(1e-5, "Smallest error reduction ratio of a term that pruning keeps.")
-    err_target: str = "output"
+    err_target: str = _option(
+        "output", f"What the error reduction ratio refers to: {', '.join(ERR_TARGETS)}."
+    )
     max_terms: int = _option(10, "Terms of the largest model.")
     max_height: int = _option(5, "Height of an expression tree, at most.")
     shifts: tuple[int, ...] = _option((1, 2, 3, 4, 5), "Back-shifts of genes; repeat it: 1, 2, ...")
@@ -192,7 +196,7 @@ class Settings:
     outer: float = 0.5
     initial_terms: tuple[int, int] = (1, 10)
     initial_height: int = 3
-    overlong: str = "truncate"
+    overlong: str = _option("truncate", f"Children with too many genes: {', '.join(OVERLONG)}.")
     library: str = ""
     library_degree: int = 5
     library_lags: int = 3
@@ -201,8 +205,10 @@ class Settings:
     )
     swap_search: bool = False
     from_library: float = 0.0
-    distinct: bool = False
-    niches: bool = True
+    distinct: bool = _option(False, "Keep each structure once in the elite.", "--distinct/--no-distinct")
+    niches: bool = _option(
+        True, "Prefer structures that differ in more than their lags.", "--niches/--no-niches"
+    )
     refine: bool = False
     estimator: str = _option(
         "", f"{', '.join(ESTIMATORS)}; by default validation selects.", after="constraints"

@@ -8,6 +8,8 @@ import typer
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.data.preprocessing import preprocess
+from islands.data.preprocessing_steps import DETREND
 from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
 from islands.facade.library_fit import SHOOTING
@@ -53,6 +55,13 @@ def simulate(
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     reading: ReadingOptions = DEFAULT_READING,
+    detrend: Annotated[
+        str,
+        typer.Option(
+            "--detrend",
+            help=f"{', '.join(DETREND)}: subtract means or a line; for models that state no preprocessing.",
+        ),
+    ] = "none",
     shooting: Annotated[
         int | None,
         typer.Option(
@@ -84,6 +93,7 @@ def simulate(
     if coupled is not None:
         if mode != "free-run" or bands is not None:
             raise SettingsError("a model of several outputs has free runs only: leave out --mode and --bands")
+        _check_detrend(detrend, False, "a model of several outputs")
         first = read_warm_up(model) if warm_up is None else warm_up
         columns = (options.columns(inputs or []), outputs)
         simulate_coupled(coupled, record, *columns, dt, parse_rows(rows), reading, first, out)
@@ -95,6 +105,7 @@ def simulate(
     if bands is not None and (mode != "free-run" or extended is not None):
         raise SettingsError("--bands are for free runs of models of a result folder")
     if extended is not None:
+        _check_detrend(detrend, False, "a simulation")
         _simulate_extended(extended, record, mode, out, inputs, output_column, dt, rows, reading)
         return
     chosen = options.model(model)
@@ -109,7 +120,8 @@ def simulate(
     )
     for step in recorded.reading:
         output.print(step, markup=False)
-    data = match_rate(chosen, recorded)
+    _check_detrend(detrend, chosen.preprocessing is None, "a model that states its preprocessing")
+    data = match_rate(chosen, preprocess(recorded, detrend=detrend))
     if statement := named_signals(chosen):
         output.print(f"as in the model, {statement}", markup=False)
     compile_kernels()
@@ -123,6 +135,11 @@ def simulate(
     _print_metrics(
         data, simulation.y, f"{mode} after a warm-up of {first} samples: {simulation.outcome}", out, band
     )
+
+
+def _check_detrend(detrend: str, allowed: bool, model: str) -> None:
+    if detrend != "none" and not allowed:
+        raise SettingsError(f"{model} reads the record as measured: leave out --detrend")
 
 
 def _simulate_extended(

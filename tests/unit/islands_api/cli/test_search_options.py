@@ -44,6 +44,39 @@ def test_given_options_are_the_only_changes() -> None:
     assert found == SearchOptions("narx", 7, {"max_terms": 6, "target_error": 0.5})
 
 
+def test_every_switch_of_the_search_is_one_option() -> None:
+    words = (
+        *(
+            "--crossover",
+            "0.5",
+            "--mutation",
+            "0.4",
+            "--elite",
+            "0.2",
+            "--prune",
+            "0.3",
+            "--tolerance",
+            "1e-4",
+        ),
+        *("--shifts", "1", "--shifts", "3", "--tournament", "2", "--overlong", "parent"),
+        *("--no-prune-copies", "--distinct", "--no-niches", "--err-target", "increment"),
+    )
+    assert run(*words).changes == {
+        "crossover": 0.5,
+        "mutation": 0.4,
+        "elite": 0.2,
+        "prune": 0.3,
+        "tolerance": 1e-4,
+        "shifts": [1, 3],
+        "tournament": 2,
+        "overlong": "parent",
+        "prune_copies": False,
+        "distinct": True,
+        "niches": False,
+        "err_target": "increment",
+    }
+
+
 def test_options_lie_between_preset_and_seed_in_declared_order() -> None:
     names = list(parameters())
     assert names == ["preset", *SETTINGS, "seed"]
