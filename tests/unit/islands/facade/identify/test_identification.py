@@ -89,7 +89,7 @@ def test_constrained_models_have_property_1_and_standard_errors(result):
 
 @pytest.mark.ci
 @pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.nightly) for each in (1, 3))])
-def test_models_without_property_1_are_rejected_under_the_constraint(data, seed):
+def test_models_without_property_1_do_not_enter_the_hall_of_fame_under_the_constraint(data, seed):
     """With y(k-2) instead of y(k-1) the cluster sums are met, but two undamped solutions interleave."""
     states = []
     budget = {"preset": "paper-case1", "population": 30, "generations": 2, "max_terms": 4, "shooting": 100}
@@ -101,7 +101,8 @@ def test_models_without_property_1_are_rejected_under_the_constraint(data, seed)
         estimate(entry.regressors, estimation, "hysteresis", 26).model
         for entry in states[-1].archipelago.hall_of_fame.entries
     ]
-    assert not all(check_physics(model, estimation).property_1 for model in known)
+    assert len(known) > 5
+    assert all(check_physics(model, estimation).property_1 for model in known)
 
 
 # Seeds and starts.
