@@ -9,24 +9,30 @@ from signal import SIGKILL, raise_signal
 from threading import Thread
 from typing import Final
 
+import numpy as np
+
 from islands.available_cpus import count_cpus
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
+from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.certificate import certify
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.island import first_generation
+from islands.evolution.gp.gene_index import GeneIndex
 from islands.evolution.presets import resolve_settings
 from islands.facade.fit import fit
 from islands.facade.identify import identify
 from islands.facade.setting_changes import SettingChanges
 from islands.kernels.jit_cache import cache_folder, ready
+from islands.kernels.pair_table import complete_pairs, pair_table
+from islands.kernels.population import PopulationContext, empty_results, evaluate_individuals
 from islands.model.expression import Lagged
 from islands.model.model import make_model
+from islands.program.regressor_matrix import select_rows
 from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.coupled_model import CoupledModel
-from islands.simulation.predictors import free_run
+from islands.simulation.layout import layout
+from islands.simulation.predictors import divergence_bound, free_run
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED
 
@@ -39,6 +45,9 @@ SMALL: Final[SettingChanges] = {
     "library_degree": 1,
     "shooting": 100,
 }
+
+#: Terms of one structure, which consists of term 1, and its size.
+_ONE_TERM = np.ones((1, 1), np.int64), np.ones(1, np.int64)
 
 
 def warm_up(report: Callable[[str], None] = print) -> bool:
@@ -62,7 +71,7 @@ def _use_all_kernels() -> None:
     record = _make_record()
     with _second_process():
         # Half of the time, and all that this process compiles if the other one compiles the rest meanwhile.
-        first_generation(0, 0, Evaluator(record, resolve_settings("hysteresis", SMALL)))
+        _evaluate_individual(_make_context(record))
         for constraints in ("none", "hysteresis"):
             changes: SettingChanges = {**SMALL, "constraints": constraints}
             identify(record, preset="hysteresis", **changes)
@@ -70,9 +79,11 @@ def _use_all_kernels() -> None:
     _simulate_two_outputs(record)
 
 
-def use_kernels_of_one_model() -> None:
-    """Call all kernels but the evaluation of populations, which fits and searches call."""
+def use_other_kernels() -> None:
+    """Call all kernels but the evaluation of individuals."""
     record = _make_record()
+    context = _make_context(record)
+    complete_pairs(*_ONE_TERM, context.target, context.nodes, context.pairs, context.rows)
     model = PUBLISHED["13"].model
     problem = make_selection_problem(model.regressors, record, "none")
     if isinstance(problem, SelectionProblem):
@@ -95,7 +106,7 @@ def end_with_parent() -> None:
 
 @contextmanager
 def _second_process() -> Iterator[None]:
-    """Compile the kernels of one model in another process during the context, if there is a core for it.
+    """Compile the other kernels in another process during the context, if there is a core for it.
 
     This process compiles the kernels that the other one has not stored, since it fails or is late.
     """
@@ -105,7 +116,7 @@ def _second_process() -> Iterator[None]:
     # Garbage collection visits the objects of the compiler again and again; the process ends soon.
     code = (
         f"import gc; gc.disable(); import {__name__} as work; work.end_with_parent(); "
-        f"work.{use_kernels_of_one_model.__name__}()"
+        f"work.{use_other_kernels.__name__}()"
     )
     nowhere = subprocess.DEVNULL
     command = [sys.executable, "-c", code]
@@ -115,6 +126,22 @@ def _second_process() -> Iterator[None]:
             process.wait()
         finally:
             process.kill()
+
+
+def _make_context(record: Dataset) -> PopulationContext:
+    """Return the context of a population of a search on the record."""
+    settings = resolve_settings("hysteresis", SMALL)
+    index = GeneIndex(constraint(settings.constraints), (Lagged(0, 0), Lagged(0, 1)))
+    warm_up, bound = settings.maximum_lag, divergence_bound(record)
+    intervals = layout(record, warm_up, settings.shooting)
+    rows = select_rows(record, warm_up)
+    return PopulationContext(0, 1, 0.0, index.nodes, index.groups, pair_table(0), rows, intervals, bound)
+
+
+def _evaluate_individual(context: PopulationContext) -> None:
+    """Evaluate an individual with the term y(k-1) whose inner products are missing: as zeros."""
+    nothing_pruned, unlimited = np.zeros(1, np.bool_), np.full(2, np.inf)
+    evaluate_individuals(*_ONE_TERM, nothing_pruned, unlimited, context, empty_results(1, 1))
 
 
 def _make_record() -> Dataset:

@@ -55,11 +55,15 @@ def find_pair(pairs, key):
 
 
 @kernel
-def complete_pairs(structures, sizes, target, nodes, pairs, rows, operand_index):
-    """Compute the inner products that the table lacks for some structures, each column once.
-
-    ``operand_index`` is scratch memory of `generate_program`.
-    """
+def complete_pairs(
+    structures,  # int64 [individual, most terms]
+    sizes,  # int64 [individual]: number of terms
+    target,  # the term y(k)
+    nodes,
+    pairs,  # updated
+    rows,
+):
+    """Compute the inner products that the table lacks for some structures, each column once."""
     local = np.full(nodes.degree.size, -1, np.int64)
     terms = np.empty_like(local)
     most = 0
@@ -89,6 +93,7 @@ def complete_pairs(structures, sizes, target, nodes, pairs, rows, operand_index)
                 count += 1
     if count == 0:
         return
+    operand_index = np.full(nodes.operation.size, -1, np.int64)
     program = generate_program(nodes, terms[:used], operand_index)
     if count == used * (used + 1) // 2:
         products = np.empty((used, used))

@@ -1,4 +1,4 @@
-"""Evaluation of a whole population in one call (the paper, section 5.2): prune, estimate, simulate.
+"""Evaluation of a whole population (the paper, section 5.2): prune, estimate, simulate.
 
 First, the inner products that the pair table lacks are computed together, each column once. Then the
 individuals are evaluated one after the other. The result of an individual depends on that individual alone,
@@ -140,19 +140,42 @@ def empty_results(individuals: int, most: int) -> PopulationResults:
     )
 
 
-@kernel
 def evaluate(
-    structures,  # int64 [individual, most terms]: terms in the order of their content
-    sizes,  # int64 [individual]
-    pruned,  # bool [individual]: whether the individual is pruned
-    allowed,  # float64 [size]: a model of that size is abandoned if its sum of squared errors is larger
-    context,
-    results,  # out
-):
-    """Evaluate individuals."""
+    structures: NDArray[np.int64],
+    sizes: NDArray[np.int64],
+    pruned: NDArray[np.bool_],
+    allowed: NDArray[np.float64],
+    context: PopulationContext,
+    results: PopulationResults,
+) -> None:
+    """Evaluate individuals.
+
+    Parameters
+    ----------
+    structures : ndarray of int64, shape (individuals, most terms)
+        Terms in the order of their content.
+    sizes : ndarray of int64, shape (individuals,)
+        Number of terms.
+    pruned : ndarray of bool, shape (individuals,)
+        Whether the individual is pruned.
+    allowed : ndarray of float64, shape (sizes,)
+        A model of a size is abandoned if its sum of squared errors is larger.
+    context : PopulationContext
+    results : PopulationResults
+        Written.
+    """
+    complete_pairs(structures, sizes, context.target, context.nodes, context.pairs, context.rows)
+    evaluate_individuals(structures, sizes, pruned, allowed, context, results)
+
+
+@kernel
+def evaluate_individuals(structures, sizes, pruned, allowed, context, results):
+    """Evaluate individuals, as `evaluate`, whose inner products are in the table of pairs.
+
+    A kernel of its own, because it takes half of the time of all compilations.
+    """
     nodes, layout, bound = context.nodes, context.layout, context.bound
     operand_index = np.full(nodes.operation.size, -1, np.int64)
-    complete_pairs(structures, sizes, context.target, nodes, context.pairs, context.rows, operand_index)
     most = structures.shape[1]
     matrix = np.empty((most + 1, most + 1))
     lanes = layout.start.size
