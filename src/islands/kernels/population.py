@@ -172,7 +172,7 @@ def evaluate(
 def evaluate_individuals(structures, sizes, pruned, allowed, context, results):
     """Evaluate individuals, as `evaluate`, whose inner products are in the table of pairs.
 
-    A kernel of its own, because it takes half of the time of all compilations.
+    It takes half of the time of all compilations, so it is not part of the same kernel.
     """
     nodes, layout, bound = context.nodes, context.layout, context.bound
     operand_index = np.full(nodes.operation.size, -1, np.int64)

@@ -89,7 +89,7 @@ def test_constrained_models_have_property_1_and_standard_errors(result):
 
 @pytest.mark.ci
 @pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.nightly) for each in (1, 3))])
-def test_models_without_property_1_do_not_enter_the_hall_of_fame_under_the_constraint(data, seed):
+def test_models_without_property_1_do_not_enter_the_hall_of_fame(data, seed):
     """With y(k-2) instead of y(k-1) the cluster sums are met, but two undamped solutions interleave."""
     states = []
     budget = {"preset": "paper-case1", "population": 30, "generations": 2, "max_terms": 4, "shooting": 100}

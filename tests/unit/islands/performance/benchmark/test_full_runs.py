@@ -52,7 +52,9 @@ def test_duplicates_are_offspring_with_a_known_structure(piezo):
             return found, known
 
     # In tournaments of size one abandoned individuals win as well, some of them repeatedly.
-    setting = replace(SMALL, population=60, generations=12, tournament=1)
+    setting = replace(
+        SMALL, population=60, generations=12, tournament=1, constraints="none", structure="free"
+    )
     evaluator = Counting(piezo, setting)
     island, info = first_generation(0, 0, evaluator)
     reported = info.duplicates
