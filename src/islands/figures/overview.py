@@ -1,54 +1,18 @@
 """Overview of a record: signals over time, spectra, input-output plane and impulse response."""
 
-from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any
-
 import numpy as np
-from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from islands.data.dataset import Dataset
 from islands.figures.diverging_lines import break_line
 from islands.figures.downsampling import downsample
-from islands.figures.style import REMARK, STEPS, blank, finish, house_style, label
+from islands.figures.style import REMARK, STEPS, blank, finish, label
+from islands.figures.themes import Theme, themed_style
 from islands.inspection.channel import Channel, channels
 from islands.inspection.excitation import estimate_spectrum
 from islands.inspection.record_facts import RecordFacts
 from islands.inspection.response.impulse_response import estimate_impulse_response
-
-
-@dataclass(frozen=True, slots=True)
-class _Theme:
-    """Colours of a figure."""
-
-    background: str
-    text: str
-    grid: str
-    frame: str
-    inputs: tuple[str, ...]
-    output: str
-    mark: str
-
-
-#: Colours by the name of the theme.
-THEMES = MappingProxyType(
-    {
-        "light": _Theme(
-            *("#ffffff", "#222222", "#ececec", "#5a5a5a"),
-            ("#0072b2", "#009e73", "#8c6bb1"),
-            "#3a3a3a",
-            "#d55e00",
-        ),
-        "dark": _Theme(
-            *("#16181d", "#dcdfe4", "#2c3038", "#8a909b"),
-            ("#56b4e9", "#4fc39a", "#b9a3e3"),
-            "#e6e6e6",
-            "#f0935a",
-        ),
-    }
-)
 
 #: Inputs that are drawn, at most.
 _MOST_INPUTS = 3
@@ -70,28 +34,13 @@ def draw_overview(record: Dataset, facts: RecordFacts, theme: str = "light") -> 
     facts : RecordFacts
         Facts of the record, which mark bands and the dead time.
     theme : str
-        An entry of `THEMES`.
+        An entry of `islands.figures.themes.THEMES`.
     """
-    colours = THEMES[theme]
-    settings: dict[Any, Any] = {
-        "axes.edgecolor": colours.frame,
-        "axes.facecolor": colours.background,
-        "axes.labelcolor": colours.text,
-        "axes.titlecolor": colours.text,
-        "figure.facecolor": colours.background,
-        "grid.color": colours.grid,
-        "savefig.facecolor": colours.background,
-        "text.color": colours.text,
-        "xtick.color": colours.frame,
-        "xtick.labelcolor": colours.text,
-        "ytick.color": colours.frame,
-        "ytick.labelcolor": colours.text,
-    }
-    with house_style(), rc_context(settings):
+    with themed_style(theme) as colours:
         return _draw(record, facts, colours)
 
 
-def _draw(record: Dataset, facts: RecordFacts, colours: _Theme) -> Figure:
+def _draw(record: Dataset, facts: RecordFacts, colours: Theme) -> Figure:
     *inputs, output = channels(record)
     shown = [*inputs[:_MOST_INPUTS], output]
     figure = blank(0.6 + 1.15 * len(shown) + 2.1)
@@ -129,7 +78,7 @@ def _draw_spectrum(
     channel: Channel,
     colour: str,
     facts: RecordFacts,
-    colours: _Theme,
+    colours: Theme,
     first: bool,
     last: bool,
 ) -> None:
@@ -158,14 +107,14 @@ def _draw_spectrum(
         axes.tick_params(labelbottom=False)
 
 
-def _draw_plane(axes: Axes, record: Dataset, output: Channel, driven: Channel, colours: _Theme) -> None:
+def _draw_plane(axes: Axes, record: Dataset, output: Channel, driven: Channel, colours: Theme) -> None:
     line = downsample(break_line(record, driven.values), break_line(record, output.values), _VERTICES)
     axes.plot(*line, color=colours.output, linewidth=0.5, alpha=0.8)
     axes.set_xlabel(label(driven.name, driven.unit))
     axes.set_ylabel(label(output.name, output.unit))
 
 
-def _draw_response(axes: Axes, record: Dataset, facts: RecordFacts, colours: _Theme) -> None:
+def _draw_response(axes: Axes, record: Dataset, facts: RecordFacts, colours: Theme) -> None:
     """Draw the impulse response to the first input with its 95 % band, and the dead time."""
     response = estimate_impulse_response(record, 0)
     axes.set_xlabel("lag (samples)")

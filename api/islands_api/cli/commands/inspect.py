@@ -46,8 +46,9 @@ def inspect(
         _write(out, document, text)
         if found.record is not None:
             # Imported here, because it loads matplotlib.
-            from islands.figures.overview import THEMES, draw_overview  # noqa: PLC0415
+            from islands.figures.overview import draw_overview  # noqa: PLC0415
             from islands.figures.style import save  # noqa: PLC0415
+            from islands.figures.themes import THEMES  # noqa: PLC0415
 
             for theme in THEMES:
                 suffix = "" if theme == "light" else f"-{theme}"

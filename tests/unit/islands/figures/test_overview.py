@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.figures.overview import THEMES, draw_overview
+from islands.figures.overview import draw_overview
 from islands.figures.style import save
+from islands.figures.themes import THEMES
 from islands.inspection.record_facts import measure_facts
 from support.known_records import delay, lag, measure, steps, white
 
