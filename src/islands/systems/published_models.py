@@ -21,6 +21,8 @@ class Published:
     ----------
     model : Model
         Model with the published parameters, which are rounded to three digits.
+    terms : mapping
+        Terms and parameters as printed, in the order of Table 2.
     source : str
         Equation, method and data.
     mape, r2 : tuple of float
@@ -28,6 +30,7 @@ class Published:
     """
 
     model: Model
+    terms: Mapping[str, float]
     source: str
     mape: tuple[float, float]
     r2: tuple[float, float]
@@ -74,18 +77,21 @@ PUBLISHED: Mapping[str, Published] = MappingProxyType(
     {
         "12": Published(
             _make_published_model(_MODEL_12, 1e-3),
+            MappingProxyType(_MODEL_12),
             "equation (12), after Martins and Aguirre: ERR, AIC and constraints",
             (0.32874, 0.33374),
             (0.99940, 0.99984),
         ),
         "13": Published(
             _make_published_model(_MODEL_13, 1e-3),
+            MappingProxyType(_MODEL_13),
             "equation (13), case 1: MGGP/FROE on the Bouc-Wen piezo",
             (0.31189, 0.25250),
             (0.99940, 0.99990),
         ),
         "14": Published(
             _make_published_model(_MODEL_14, 5e-5),
+            MappingProxyType(_MODEL_14),
             "equation (14), case 2: MGGP/FROE on the measured micromanipulator at 5 V and 300 Hz",
             (1.01111, 1.01039),
             (0.99888, 0.99887),

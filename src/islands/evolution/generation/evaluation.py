@@ -119,10 +119,18 @@ class Evaluator:
     limits : Limits, optional
     abandon : bool
         Whether evaluations stop at their threshold. Affects the speed of a search, never its result.
+    root_rule : bool
+        Whether structures are infeasible whose linear output terms do not converge at constant input. False
+        only to measure the effect of this rule: such structures are rejected after a search in any case.
     """
 
     def __init__(
-        self, record: Dataset, settings: Settings, limits: Limits | None = None, abandon: bool = True
+        self,
+        record: Dataset,
+        settings: Settings,
+        limits: Limits | None = None,
+        abandon: bool = True,
+        root_rule: bool = True,
     ) -> None:
         self.record, self.settings, self.limits, self.abandon = record, settings, limits or Limits(), abandon
         self.warm_up = settings.maximum_lag
@@ -136,7 +144,11 @@ class Evaluator:
         }
         self._pairs = pair_table(self.limits.pairs)
         self._evaluations: dict[_Key, Evaluation] = {}
-        self._gene_index = GeneIndex(self._constraint, (Lagged(0, 0), Lagged(0, 1)))
+        self._root_rule = root_rule
+        self._gene_index = self._empty_index()
+
+    def _empty_index(self) -> GeneIndex:
+        return GeneIndex(self._constraint, (Lagged(0, 0), Lagged(0, 1)), self._root_rule)
 
     @property
     def memory(self) -> dict[str, tuple[int, int]]:
@@ -158,7 +170,7 @@ class Evaluator:
         """Empty all caches."""
         clear(self._pairs)
         self._evaluations.clear()
-        self._gene_index = GeneIndex(self._constraint, (Lagged(0, 0), Lagged(0, 1)))
+        self._gene_index = self._empty_index()
 
     def evaluate(
         self, population: Sequence[tuple[Individual, bool]], thresholds: Sequence[float] | None = None

@@ -32,9 +32,11 @@ class GeneIndex:
     constraint : Constraint
     targets : sequence of Term
         Terms that receive the first numbers.
+    root_rule : bool
+        Whether the linear output terms have to converge at constant input if the constraint fixes their sum.
     """
 
-    def __init__(self, constraint: Constraint, targets: Sequence[Term]) -> None:
+    def __init__(self, constraint: Constraint, targets: Sequence[Term], root_rule: bool = True) -> None:
         self._constraint = constraint
         self._store = TermPool()
         self._known: dict[Expression, int] = {}
@@ -46,7 +48,8 @@ class GeneIndex:
         self._targets = np.array([part.target for part in constraint.equalities], np.float64)
         self._coefficients = np.zeros((64, len(self._targets)))
         self._signs, self._sign = constraint.signs, np.zeros(64 if constraint.signs else 0)
-        self._output_lag = np.zeros(64 if constraint.sums else 0, np.int64)
+        self._root_rule = root_rule and bool(constraint.sums)
+        self._output_lag = np.zeros(64 if self._root_rule else 0, np.int64)
         self._arrays: Groups | None = None
         for target in targets:
             self._store.term(target)
@@ -116,12 +119,12 @@ class GeneIndex:
             self._coefficients = np.vstack([self._coefficients, more])
             if self._signs:
                 self._sign = np.append(self._sign, np.zeros(number))
-            if self._constraint.sums:
+            if self._root_rule:
                 self._output_lag = np.append(self._output_lag, np.zeros(number, np.int64))
         self._coefficients[number] = self._constraint.weigh(regressor)
         if self._signs:
             self._sign[number] = self._signs.get(regressor, 0)
-        if self._constraint.sums:
+        if self._root_rule:
             self._output_lag[number] = regressor.output_lag
         weight, state = self._constraint.group(regressor)
         if weight:

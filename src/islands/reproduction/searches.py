@@ -1,0 +1,148 @@
+"""Searches of one island as the paper describes them, and the statistics that the comparison needs."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from islands.data.dataset import Dataset
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.gp.individual import Individual
+from islands.evolution.island import Island, first_generation, step
+from islands.evolution.presets import resolve_settings, with_tuples
+from islands.model.equations import plain_text
+from islands.model.model import Model, make_model
+from islands.model.parsing import parse
+from islands.reproduction.tasks import Document
+from islands.simulation.predictors import free_run
+from islands.validation.metrics import metrics
+from islands.validation.physics import check_physics, cluster_sums, is_convergent
+
+#: Points of a trace over the generations.
+_TRACED = 20
+
+#: Metrics that the paper prints.
+METRICS = ("mape", "r2")
+
+
+def measure_errors(model: Model, records: Mapping[str, Dataset]) -> Document:
+    """Return MAPE and R2 of the free run on each record, each None if it diverged.
+
+    A free run starts after the largest lag of the model.
+    """
+    errors: Document = {}
+    for name, record in records.items():
+        simulated = free_run(model, record)
+        found = metrics(record.y, simulated.y)
+        errors[name] = {
+            metric: float(getattr(found, metric)) if simulated.outcome else None for metric in METRICS
+        }
+    return errors
+
+
+def model_document(model: Model) -> Document:
+    """Return a model as a document: its equation, and the terms that `read_document` reads."""
+    return {
+        "equation": plain_text(model),
+        "size": model.size,
+        "terms": [[item.text, value] for item, value in zip(model.regressors, model.parameters, strict=True)],
+    }
+
+
+def read_document(document: Mapping[str, Any], record: Dataset) -> Model:
+    """Return the model of a document; the names of its signals are those of the record."""
+    terms = ((parse(text), value) for text, value in document["terms"])
+    return make_model(terms, record.input_names, record.output_name, record.dt)
+
+
+def search_island(
+    record: Dataset,
+    validation: Mapping[str, Dataset],
+    preset: str,
+    changes: Mapping[str, Any],
+    seed: int,
+    root_rule: bool = True,
+    simulate_holds: bool = True,
+) -> Document:
+    """Run the search of the paper, and select the individual of its hall of fame with the least error.
+
+    Parameters
+    ----------
+    record : Dataset
+        Estimation data.
+    validation : mapping of Dataset
+        Records on which the selected model is measured. The last one selects it, by the MAPE of its free run.
+    preset : str
+        An entry of `PRESETS`.
+    changes : mapping
+        Settings that differ from the preset.
+    seed : int
+    root_rule : bool
+        See `Evaluator`.
+    simulate_holds : bool
+        Whether Property 1 of the final hall is also checked by simulated holds, which takes longer than the
+        search of a few generations.
+
+    Returns
+    -------
+    dict
+        ``trace`` over the generations, the final ``hall``, and the ``selected`` model (None if every model
+        diverged).
+    """
+    settings = resolve_settings(preset, with_tuples(changes))
+    evaluator = Evaluator(record, settings, root_rule=root_rule)
+    island, _ = first_generation(0, seed, evaluator)
+    trace = [_trace(island, evaluator)]
+    stride = max(1, settings.generations // _TRACED)
+    evaluations = settings.population
+    for generation in range(1, settings.generations + 1):
+        island, info = step(island, evaluator)
+        evaluations += info.evaluations
+        if generation % stride == 0 or generation == settings.generations:
+            trace.append(_trace(island, evaluator))
+    models = [_make_model(entry, record) for entry in island.hall_of_fame.entries]
+    selecting = list(validation)[-1]
+    ranked = []
+    for model in models:
+        error = measure_errors(model, {selecting: validation[selecting]})[selecting]["mape"]
+        if error is not None:
+            ranked.append((error, model.size, plain_text(model), model))
+    best = min(ranked, key=lambda entry: entry[:3], default=None)
+    return {
+        "seed": seed,
+        "generations": settings.generations,
+        "population": settings.population,
+        "evaluations": evaluations,
+        "trace": trace,
+        "hall": {
+            "models": len(models),
+            "diverged": len(models) - len(ranked),
+            "converging": sum(map(has_equilibria, models)),
+            "property_1": sum(check_physics(model, record).property_1 for model in models)
+            if simulate_holds
+            else None,
+        },
+        "selected": best
+        and {
+            **model_document(best[3]),
+            "errors": measure_errors(best[3], {"estimation": record, **validation}),
+            "property_1": check_physics(best[3], record).property_1,
+        },
+    }
+
+
+def has_equilibria(model: Model) -> bool:
+    """Return whether the cluster sums of a model meet Property 1 and its linear output terms converge."""
+    return is_convergent(model) and all(entry.met for entry in cluster_sums(model))
+
+
+def _trace(island: Island, evaluator: Evaluator) -> Document:
+    entries = island.hall_of_fame.entries
+    return {
+        "generation": island.generation,
+        "models": len(entries),
+        "converging": sum(has_equilibria(_make_model(entry, evaluator.record)) for entry in entries),
+        "rmse": min((entry.fitness for entry in entries), default=0.0) ** 0.5,
+    }
+
+
+def _make_model(entry: Individual, record: Dataset) -> Model:
+    return Model(entry.regressors, entry.theta, record.input_names, record.output_name, record.dt)
