@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.figures.downsampling import downsample
-from islands.figures.style import MEASURED_WIDTH, SIMULATED_WIDTH, blank, finish, label
+from islands.figures.style import MEASURED_WIDTH, SIMULATED_WIDTH, STEPS, blank, finish, label
 from islands.figures.themes import Theme, themed_style
 
 
@@ -98,6 +98,7 @@ def _draw_over_time(axes: Axes, shown: Reproduced, colours: Theme) -> None:
     axes.plot(*downsample(record.time, record.u[:, 0]), color=colours.inputs[0], lw=0.8, label="input")
     _draw_pair(axes, record.time, shown, colours)
     axes.margins(x=0.0)
+    axes.xaxis.set_major_locator(MaxNLocator(5, steps=STEPS))
     axes.set(xlabel="time (s)", ylabel=f"{output}, {drive}")
 
 

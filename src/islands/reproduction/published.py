@@ -162,7 +162,8 @@ def explain_error(published: float, document: Document, record: str, metric: str
     if deviation <= _EQUAL:
         sentence = f"Estimated again: equal within {deviation:.2g} %."
     else:
-        sentence = f"Estimated again: {'larger' if estimated > published else 'smaller'} by {deviation:.2g} %"
+        amount = f"{deviation:.2g} %" if deviation < 99.5 else f"a factor of {estimated / published:.2g}"
+        sentence = f"Estimated again: {'larger' if estimated > published else 'smaller'} by {amount}"
         different = count_different(document)
         sentence += f"; {different} printed parameters are not those of least squares." if different else "."
     if metric in document.get("rounding", {}).get(record, {}):
@@ -179,8 +180,13 @@ def explain_parameter(row: Document) -> str:
     """Say why a parameter of Table 2 differs from least squares."""
     difference, error = abs(row["estimated"] - row["printed"]), row["standard_error"]
     if difference <= row["half_digit"] + 1e-12:
-        return "equal to the printed digits" if row["half_digit"] else "fixed by Property 1"
-    ratio = f"{difference / error:.2g} standard errors" if error else f"{difference:.2g}"
+        return "Equal to the printed digits." if row["half_digit"] else "Fixed by Property 1."
+    ratio = f"{_round(difference / error)} standard errors" if error else f"{difference:.2g}"
     if not _differs(row):
-        return f"{ratio} apart: the record does not determine the parameter more precisely"
-    return f"{ratio} apart: the printed value is not that of least squares on this record"
+        return f"{ratio} apart: the record does not determine the parameter more precisely."
+    return f"{ratio} apart: the printed value is not that of least squares on this record."
+
+
+def _round(number: float) -> str:
+    """Write a positive number with two digits, without an exponent if it is large."""
+    return f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
