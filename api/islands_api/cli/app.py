@@ -36,6 +36,8 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "show": "Show or write a model as an equation, a program, a block for a simulator, or JSON.",
         "examples": "Records to try the commands on: list them, copy them.",
         "demo": "Identify the record of the paper's case 1 and compare the models with those of the paper.",
+        "reproduce": "Compute the tables and figures of the paper, and write them next to the published "
+        "numbers.",
         "bench": "Measure evaluations, kernels and whole searches on this machine, which should be otherwise "
         "idle.",
         "trials": "Inject effects into simulated records, diagnose them, and count how often they are found "
@@ -53,7 +55,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
 #: Folders of the commands that are not in the folder of all commands.
 FOLDERS: Mapping[str, str] = MappingProxyType(
     {
-        **dict.fromkeys(("demo", "examples", "systems"), "demonstration"),
+        **dict.fromkeys(("demo", "examples", "reproduce", "systems"), "demonstration"),
         **dict.fromkeys(("monitor", "monitors"), "monitoring"),
     }
 )
