@@ -16,6 +16,7 @@ from islands.data.dataset import Dataset, same_dt
 from islands.errors import RecordError
 from islands.figures.paper import Reproduced, draw_training_data, draw_validation
 from islands.io.records import fingerprint, preview, read_record
+from islands.io.records.reading_options import ReadingOptions
 from islands.reproduction.published import assess_published, explain_error, explain_parameter
 from islands.reproduction.searches import read_document
 from islands.reproduction.section import WHY, ComparisonTable, Section, SectionFigure
@@ -124,20 +125,24 @@ def take_record(data: str, quick: bool) -> Case2Record:
     if not data:
         record = simulate_stand_in(_QUICK_SAMPLES if quick else _SAMPLES)
         return Case2Record(remove_drift(record), "simulated in place of the measured record", simulated=True)
-    columns = len(preview(Path(data)).columns)
-    if columns == len(COLUMNS):
-        return Case2Record(remove_drift(_read(data, COLUMNS)), f"measured: {Path(data).name}")
-    if columns == len(SAME_RIG):
-        record = _read(data, SAME_RIG)
+    name = Path(data).name
+    if (record := _read(data, COLUMNS)) is not None:
+        return Case2Record(remove_drift(record), f"measured: {name}")
+    if (record := _read(data, SAME_RIG)) is not None:
         moving = record[int(np.searchsorted(record.time, _AT_REST, side="right")) :]
-        return Case2Record(remove_drift(moving), f"measured, the same rig in another test: {Path(data).name}")
+        return Case2Record(remove_drift(moving), f"measured, the same rig in another test: {name}")
     raise RecordError(
-        f"{data} has {columns} columns: the owners' file has {len(COLUMNS)} (index, time, output, input), "
-        f"the record at 150 V and 1 Hz has {len(SAME_RIG)} (time, output, input)"
+        f"{data} has other columns: the owners' file has {len(COLUMNS)} (index, time, output, input), the "
+        f"record at 150 V and 1 Hz has {len(SAME_RIG)} (time, output, input)"
     )
 
 
-def _read(data: str, names: tuple[str, ...]) -> Dataset:
+def _read(data: str, names: tuple[str, ...]) -> Dataset | None:
+    """Read a file, with or without a header, whose columns have an order; None if it has another number."""
+    try:
+        preview(data, ReadingOptions(names=names))
+    except RecordError:
+        return None
     return read_record(data, ["u_V"], "y_um", names=names)
 
 

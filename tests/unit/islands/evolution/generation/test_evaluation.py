@@ -273,6 +273,18 @@ def test_structures_that_do_not_converge_at_constant_input_are_infeasible(terms,
     assert evaluate_one(individual(*terms), max_height=16, constraints="none").outcome.verdict is Status.OK
 
 
+def test_without_the_root_rule_a_structure_is_feasible_that_does_not_converge():
+    settings = replace(SETTINGS, max_height=16, constraints="hysteresis")
+    each = individual("y(k-15)", "phi1(u(k-1), u(k-2))")
+    verdicts = []
+    for root_rule in (True, False):
+        evaluator = Evaluator(record(), settings, root_rule=root_rule)
+        verdicts += [evaluator.evaluate([(each, False)])[0][0].outcome.verdict]
+        evaluator.clear_caches()
+        assert evaluator.evaluate([(each, False)])[0][0].outcome.verdict is verdicts[-1]
+    assert verdicts == [Status.INFEASIBLE, Status.OK]
+
+
 MODEL_13 = (
     "y(k-1)",
     "mul(phi1(q5(q5(q1(u(k-1)))), u(k-1)), mul(u(k-1), phi2(q3(u(k-1)), u(k-1))))",
