@@ -123,8 +123,8 @@ def take_record(data: str, quick: bool) -> Case2Record:
         The file cannot be read, or has another number of columns.
     """
     if not data:
-        record = simulate_stand_in(_QUICK_SAMPLES if quick else _SAMPLES)
-        return Case2Record(remove_drift(record), "simulated in place of the measured record", simulated=True)
+        simulated = simulate_stand_in(_QUICK_SAMPLES if quick else _SAMPLES)
+        return Case2Record(remove_drift(simulated), "simulated in place of the measured record", simulated=True)
     name = Path(data).name
     if (record := _read(data, COLUMNS)) is not None:
         return Case2Record(remove_drift(record), f"measured: {name}")
