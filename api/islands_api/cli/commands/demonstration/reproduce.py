@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from islands.discrepancy.interfaces.parallel import ParallelMap
-from islands.errors import lookup
+from islands.errors import SettingsError, lookup
 from islands.evolution.progress import Steps, StoppedError
 from islands.reproduction import case1, case2
 from islands.reproduction.page import write_reproduction
@@ -70,10 +70,12 @@ def reproduce(
 
     Ctrl-C keeps the finished searches; the same command continues.
     """
-    chosen = PARTS if part == ALL else {part: lookup({**PARTS, ALL: None}, part, "part of the paper")}
+    chosen = PARTS if part == ALL else {part: lookup(PARTS, part, "part of the paper")}
+    if data is not None and "case2" not in chosen:
+        raise SettingsError(f"--data is the record of case2, which {part} does not contain")
     check_folder(out, force=True)
     options = ReproductionOptions(seeds, runs, quick, "" if data is None else str(data))
-    planned = {name: each.plan(options) for name, each in chosen.items() if each is not None}
+    planned = {name: each.plan(options) for name, each in chosen.items()}
     tasks = [task for each in planned.values() for task in each]
     compile_kernels()
     results = _run(tasks, out / TASKS)
