@@ -41,7 +41,7 @@ _SAMPLES, _QUICK_SAMPLES = 10_000, 2_000
 
 #: Actuator in place of the measured one: that of case 1 with 8 times the displacement per volt, which gives
 #: the range of model (14), and the loop of case 1 at an eighth of its voltage.
-STAND_IN = BoucWenPiezo(A=7.2, beta=0.064, gamma=0.064, dp=12.8)
+SUBSTITUTE = BoucWenPiezo(A=7.2, beta=0.064, gamma=0.064, dp=12.8)
 
 #: Standard deviation in um of its noise: the resolution of the optical sensors, 10 nm.
 _RESOLUTION = 0.01
@@ -70,7 +70,7 @@ class Case2Record:
     source : str
         Description for the titles of the page.
     simulated : bool
-        Whether it is the stand-in.
+        Whether it is the simulated record.
     """
 
     record: Dataset
@@ -113,7 +113,7 @@ def take_record(data: str, quick: bool) -> Case2Record:
     Parameters
     ----------
     data : str
-        File with the columns of the owners, or of the record at 150 V and 1 Hz; empty for the stand-in.
+        File with the columns of the owners, or of the record at 150 V and 1 Hz; empty for the simulated record.
     quick : bool
         Whether the simulated record is short. A measured record is taken as a whole.
 
@@ -123,8 +123,10 @@ def take_record(data: str, quick: bool) -> Case2Record:
         The file cannot be read, or has another number of columns.
     """
     if not data:
-        simulated = simulate_stand_in(_QUICK_SAMPLES if quick else _SAMPLES)
-        return Case2Record(remove_drift(simulated), "simulated in place of the measured record", simulated=True)
+        simulated = simulate_substitute(_QUICK_SAMPLES if quick else _SAMPLES)
+        return Case2Record(
+            remove_drift(simulated), "simulated in place of the measured record", simulated=True
+        )
     name = Path(data).name
     if (record := _read(data, COLUMNS)) is not None:
         return Case2Record(remove_drift(record), f"measured: {name}")
@@ -159,12 +161,12 @@ def remove_drift(record: Dataset) -> Dataset:
     return replace(record, u=u[:, None], y=record.y - offset - slope * t)
 
 
-def simulate_stand_in(samples: int) -> Dataset:
+def simulate_substitute(samples: int) -> Dataset:
     """Simulate the actuator in place of the measured one, with noise of the resolution of its sensors."""
     rng = np.random.default_rng(0)
     whole = _TRANSIENT + samples
     u = sine(DT, whole * DT, AMPLITUDE, FREQUENCY) + _AMPLIFIER_NOISE * rng.standard_normal(whole)
-    y = simulate(STAND_IN, u, DT) + _RESOLUTION * rng.standard_normal(whole)
+    y = simulate(SUBSTITUTE, u, DT) + _RESOLUTION * rng.standard_normal(whole)
     return Dataset(u, y, DT, ("u_V",), "y_um", ("V",), "um")[_TRANSIENT:]
 
 
@@ -210,13 +212,13 @@ def _introduce(taken: Case2Record, document: Document) -> tuple[str, ...]:
     )
     if not taken.simulated:
         return (record,)
-    stand_in = (
+    substitute = (
         "The measured record of the paper, h50us.csv, is published by its owners and is not part of this "
         "project: download it and repeat the command with --data h50us.csv. Until then, the numbers below "
         "are those of a simulated actuator: the piezo of case 1, scaled to 5 V and to the range of model "
         "(14), at 300 Hz, with noise of 10 nm. They are no reproduction of the measured record."
     )
-    return stand_in, record
+    return substitute, record
 
 
 def _tabulate_errors(document: Document, taken: Case2Record) -> ComparisonTable:
@@ -285,7 +287,7 @@ def _draw_validation(taken: Case2Record, model_terms: Document, theme: str) -> F
             loading=loading,
         )
         if taken.simulated:
-            y = simulate(STAND_IN, u, record.dt)
+            y = simulate(SUBSTITUTE, u, record.dt)
         else:
             # Only the start is known: that of the record where its input is nearest to zero.
             y = np.full(len(u), np.nan)

@@ -1,8 +1,6 @@
 """Themes of figures: the colours of a theme hold in its context only."""
 
-import matplotlib
 import pytest
-from matplotlib.colors import to_rgb
 
 from islands.errors import SettingsError
 from islands.figures.style import blank
@@ -11,6 +9,9 @@ from islands.figures.themes import THEMES, themed_style
 
 @pytest.mark.parametrize("name", THEMES)
 def test_a_figure_has_the_background_of_its_theme(name):
+    import matplotlib
+    from matplotlib.colors import to_rgb
+
     before = dict(matplotlib.rcParams)
     with themed_style(name) as colours:
         figure = blank(1.0)
@@ -21,6 +22,8 @@ def test_a_figure_has_the_background_of_its_theme(name):
 
 @pytest.mark.parametrize("name", THEMES)
 def test_text_and_lines_are_readable_on_the_background(name):
+    from matplotlib.colors import to_rgb
+
     def luminance(colour: str) -> float:
         linear = [
             part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in to_rgb(colour)

@@ -8,7 +8,7 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.reproduction import case2
-from islands.reproduction.case2 import remove_drift, simulate_stand_in, take_record
+from islands.reproduction.case2 import remove_drift, simulate_substitute, take_record
 from islands.reproduction.tasks import ReproductionOptions, run_tasks
 from support.undrawn import undrawn_figures
 
@@ -16,7 +16,7 @@ from support.undrawn import undrawn_figures
 @pytest.fixture(scope="module")
 def rig():
     """Return the record in place of the measured one, with offsets and a drift."""
-    record = simulate_stand_in(1600)
+    record = simulate_substitute(1600)
     return Dataset(record.u + 0.3, record.y + 4.0 + 20.0 * record.time, record.dt, ("u_V",), "y_um")
 
 

@@ -27,7 +27,7 @@ from islands_service.process.process_pool import process_pool
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PaperPart:
     """A part of the paper: the functions that plan its tasks and compare their results with the paper."""
 
     plan: Callable[[ReproductionOptions], list[Task]]
@@ -35,10 +35,10 @@ class Part:
 
 
 #: Parts by name, in the order of the page.
-PARTS: Mapping[str, Part] = MappingProxyType(
+PARTS: Mapping[str, PaperPart] = MappingProxyType(
     {
-        "case1": Part(case1.plan, case1.summarise),
-        "case2": Part(case2.plan, case2.summarise),
+        "case1": PaperPart(case1.plan, case1.summarise),
+        "case2": PaperPart(case2.plan, case2.summarise),
     }
 )
 
