@@ -113,7 +113,7 @@ def take_record(data: str, quick: bool) -> Case2Record:
     Parameters
     ----------
     data : str
-        File with the columns of the owners, or of the record at 150 V and 1 Hz; empty for the simulated record.
+        File with the columns of the owners, or of the record at 150 V and 1 Hz; empty to simulate one.
     quick : bool
         Whether the simulated record is short. A measured record is taken as a whole.
 
