@@ -110,16 +110,22 @@ def run_tasks(
     if len({task.key for task in tasks}) < len(tasks):
         raise SettingsError(f"tasks need different keys, got {', '.join(task.key for task in tasks)}")
     folder.mkdir(parents=True, exist_ok=True)
-    results = {task.key: _read_result(task, folder) for task in tasks}
-    missing = [task for task in tasks if results[task.key] is None]
-    stored = len(tasks) - len(missing)
+    results = read_results(tasks, folder)
+    missing = [task for task in tasks if task.key not in results]
+    stored = len(results)
     report(f"{stored} of {len(tasks)} tasks", 0.0)
     for done, (task, result) in enumerate(
         zip(missing, parallel_map(partial(_run, folder), missing), strict=True), start=1
     ):
         results[task.key] = result
         report(f"{stored + done} of {len(tasks)} tasks", done / len(missing))
-    return {key: result for key, result in results.items() if result is not None}
+    return {task.key: results[task.key] for task in tasks}
+
+
+def read_results(tasks: Sequence[Task], folder: Path) -> dict[str, Document]:
+    """Return the stored results of the tasks by key, without those that have to be computed."""
+    found = {task.key: _read_result(task, folder) for task in tasks}
+    return {key: result for key, result in found.items() if result is not None}
 
 
 def _run(folder: Path, task: Task) -> Document:

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from signal import SIGINT
 from types import MappingProxyType
 from typing import Annotated
 
@@ -18,10 +19,10 @@ from islands.evolution.progress import Steps, StoppedError
 from islands.reproduction import case1, case2
 from islands.reproduction.page import write_reproduction
 from islands.reproduction.section import ComparisonTable, Section
-from islands.reproduction.tasks import Document, ReproductionOptions, Task, run_tasks
+from islands.reproduction.tasks import Document, ReproductionOptions, Task, read_results, run_tasks
 from islands_api.cli.console import compile_kernels, errors, output, progress
 from islands_api.cli.output_folder import check_folder
-from islands_api.cli.stop_requests import INTERRUPTED, stop_requests
+from islands_api.cli.stop_requests import INTERRUPTED, TERMINATED, stop_requests
 from islands_service.engines import has_ray
 from islands_service.process.process_pool import process_pool
 
@@ -54,7 +55,10 @@ def reproduce(
     quick: Annotated[
         bool, typer.Option("--quick", help="Short searches, about a minute; the numbers are not the paper's.")
     ] = False,
-    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Searches of case 1, each switch.")] = 10,
+    seeds: Annotated[
+        int,
+        typer.Option("--seeds", min=1, help="Searches of case 1 for each switch; at most 2 with --quick."),
+    ] = 10,
     runs: Annotated[int, typer.Option("--runs", min=1, help="Monte Carlo runs of Appendix A.")] = 50,
     data: Annotated[
         Path | None,
@@ -74,11 +78,12 @@ def reproduce(
     if data is not None and "case2" not in chosen:
         raise SettingsError(f"--data is the record of case2, which {part} does not contain")
     check_folder(out, force=True)
-    options = ReproductionOptions(seeds, runs, quick, "" if data is None else str(data))
+    # Absolute, because tasks run in other processes, whose folder may be another.
+    options = ReproductionOptions(seeds, runs, quick, "" if data is None else str(data.absolute()))
     planned = {name: each.plan(options) for name, each in chosen.items()}
     tasks = [task for each in planned.values() for task in each]
     compile_kernels()
-    results = _run(tasks, out / TASKS)
+    results = _run(tasks, out.absolute() / TASKS)
     with progress("reproduce") as show:
         show("figures", None)
         sections = [
@@ -102,12 +107,12 @@ def _run(tasks: list[Task], folder: Path) -> dict[str, Document]:
                 return run_tasks(tasks, folder, parallel_map, show)
         except StoppedError:
             pass
-    done = sum((folder / f"{task.key}.json").is_file() for task in tasks)
+    stored = len(read_results(tasks, folder))
     errors.print(
-        f"stopped: {folder} has the results of {done} of {len(tasks)} tasks; repeat the command to continue",
+        f"stopped: {folder} has the results of {stored} of {len(tasks)} tasks; repeat the command to continue",
         markup=False,
     )
-    raise typer.Exit(INTERRUPTED)
+    raise typer.Exit(INTERRUPTED if stop.number == SIGINT else TERMINATED)
 
 
 @contextmanager
