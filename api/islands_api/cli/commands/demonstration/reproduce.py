@@ -109,7 +109,7 @@ def _run(tasks: list[Task], folder: Path) -> dict[str, Document]:
             pass
     stored = len(read_results(tasks, folder))
     errors.print(
-        f"stopped: {folder} has the results of {stored} of {len(tasks)} tasks; repeat the command to continue",
+        f"stopped: {folder} has the results of {stored} of {len(tasks)} tasks; repeat the command",
         markup=False,
     )
     raise typer.Exit(INTERRUPTED if stop.number == SIGINT else TERMINATED)
