@@ -14,17 +14,21 @@ from islands.data.dataset import Dataset
 from islands.data.loops import has_loops
 from islands.data.split import Split
 from islands.estimation.structure_selection.certificate import Certificate
+from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.history import HistoryPoint
 from islands.evolution.progress import Steps
 from islands.model.equations import equation
 from islands.model.model import Model
-from islands.validation.assessment import Assessment
+from islands.validation.assessment import MODES, Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
 from islands.validation.prediction_bands import PredictionBands, calibrate_bands
-from islands.validation.recommendation import Recommendation, recommend
+from islands.validation.recommendation import Recommendation, recommend, recommend_fittest
 
 #: Name of the step that makes the ensemble and the prediction bands.
 _BANDS = "prediction bands"
+
+#: Kind of simulation of each fitness function.
+_FITNESS_MODES = dict(zip(FITNESSES, MODES, strict=True))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,12 +164,13 @@ class SearchResult:
     @property
     def recommendation(self) -> Recommendation:
         """Rank of the recommended model, and the reasons."""
-        return recommend(
-            [entry.model.size for entry in self.models],
-            [entry.assessment for entry in self.models],
-            self.requires_property_1,
-            self.record.output_unit,
-        )
+        assessments = [entry.assessment for entry in self.models]
+        unit = self.record.output_unit
+        if self.settings.get("select") == "fitness":  # a setting of evolution only
+            mode = _FITNESS_MODES[self.settings["fitness"]]
+            return recommend_fittest(assessments, mode, self.requires_property_1, unit)
+        sizes = [entry.model.size for entry in self.models]
+        return recommend(sizes, assessments, self.requires_property_1, unit)
 
     @property
     def recommended(self) -> RankedModel:

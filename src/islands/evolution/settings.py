@@ -33,6 +33,14 @@ OVERLONG: Mapping[str, str] = MappingProxyType(
     {"truncate": "the last genes are left out", "parent": "a parent takes the place of the child"}
 )
 
+#: What recommends a model of the result, by name.
+SELECTIONS: Mapping[str, str] = MappingProxyType(
+    {
+        "validation": "the free-run error on the validation data, and the number of terms",
+        "fitness": "the error of the search on the estimation data",
+    }
+)
+
 T = TypeVar("T")
 
 
@@ -137,6 +145,10 @@ class Settings:
     estimator : str
         An entry of ``ESTIMATORS``, which estimates the parameters of the final models. Empty: least squares
         and, with ``refine``, refinement; the validation data select between the two.
+    select : str
+        An entry of ``SELECTIONS``, which recommends a model. ``validation`` takes the smallest model that is
+        as good as the best on the validation data. ``fitness`` takes the model with the least error of the
+        search on the estimation data, as Appendix A of the paper; its free run may diverge.
     average : int or str
         Samples of a mean that becomes one sample of the data, 1 for none. ``auto`` averages the noise of an
         oversampled record if small models of a library are clearly better on the validation data.
@@ -213,6 +225,11 @@ class Settings:
     estimator: str = _option(
         "", f"{', '.join(ESTIMATORS)}; by default validation selects.", after="constraints"
     )
+    select: str = _option(
+        "validation",
+        "What recommends a model: validation, or fitness, the error on the estimation data.",
+        after="estimator",
+    )
     average: int | str = _option(1, "Samples of a mean that becomes one sample, or auto.")
     feedthrough: str = _option("no", "Whether models read u(k): auto (test the record), yes or no.")
     islands: int = _option(1, "Number of islands that evolve in parallel.")
@@ -260,6 +277,7 @@ class Settings:
         lookup(FITNESSES, self.fitness, "fitness")
         lookup(OVERLONG, self.overlong, "overlong")
         lookup(ERR_TARGETS, self.err_target, "err_target")
+        lookup(SELECTIONS, self.select, "select")
         if self.estimator:
             lookup(ESTIMATORS, self.estimator, "estimator")
         primitive_table(self.primitives)

@@ -24,7 +24,7 @@ from islands.evolution.search_result import RankedModel, rank_models
 from islands.evolution.settings import Settings
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import free_run
+from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.assessment import Assessment, assess
 from islands.validation.ensemble import ValidatedModel
 
@@ -55,13 +55,14 @@ def select_final_models(
 ) -> tuple[RankedModel, ...]:
     """Assess the candidates and return the best model of every size, best first.
 
-    If the parameters are constrained, a model must have Property 1; a size without such a model is left out.
-    Once a stop is requested, the remaining models have no standard errors.
+    The best model is that with the least error on the validation data or, if the settings select by fitness,
+    on the estimation data. If the parameters are constrained, a model must have Property 1; a size without
+    such a model is left out. Once a stop is requested, the remaining models have no standard errors.
     """
     settings = problem.settings
     kept = []
-    for entries in _group_by_size(each for each in candidates if isfinite(each.error)):
-        for candidate in sorted(entries, key=lambda entry: entry.order):
+    for entries in _group_by_size(candidates):
+        for candidate in _order_candidates(entries, settings, split.estimation):
             model = candidate.model
             if model.standard_errors is None and not steps.skip("standard errors"):
                 model = _with_standard_errors(candidate, settings, split.estimation)
@@ -70,6 +71,21 @@ def select_final_models(
                 kept.append(RankedModel(model, assessment))
                 break
     return rank_models(kept)
+
+
+def _order_candidates(
+    candidates: list[ValidatedModel], settings: Settings, record: Dataset
+) -> list[ValidatedModel]:
+    """Return the candidates in the order of the error that selects them, least first."""
+    if settings.select != "fitness":
+        return sorted(candidates, key=lambda entry: entry.order)
+    interval = FITNESSES[settings.fitness](settings.shooting)
+
+    def order(candidate: ValidatedModel) -> tuple[float, tuple[float, tuple[str, ...], tuple[float, ...]]]:
+        run = multiple_shooting(candidate.model, record, interval, settings.maximum_lag)
+        return run.mean_squared_error, candidate.order
+
+    return sorted(candidates, key=order)
 
 
 def _with_standard_errors(candidate: ValidatedModel, settings: Settings, record: Dataset) -> Model:
@@ -103,7 +119,8 @@ def estimate_candidates(
     worse than the seeds. All of them are simulated on the validation data with the parameters of the search.
     The best of every size are estimated again in the units of the record and, if the settings ask for it,
     refined over several shooting intervals. An estimator in the settings replaces both. Once a stop
-    is requested, the best structure of every remaining size is estimated only.
+    is requested, the best structure of every remaining size is estimated only. Models whose free run on the
+    validation data diverges are left out, unless the settings select by fitness.
     """
     settings, validation = problem.settings, subtract_offsets(split.validation, offsets)
     found = []
@@ -111,6 +128,8 @@ def estimate_candidates(
     for done, individuals in enumerate(groups):
         steps.report(f"estimation of the final models of {individuals[0].size} terms", done / len(groups))
         count = (1, 0) if steps.skip("estimation of further structures") else _REFINED
+        if settings.select == "fitness":
+            count = count[::-1]
         kept = screen(individuals, validation, settings.maximum_lag, *count)
         found += _estimate_models(kept, settings, split, offsets, steps)
     return found
@@ -154,14 +173,18 @@ def screen(
         ): each
         for each in by_fitness
     }
-    by_error = [models[each.model] for each in _validate(models, 1, validation, warm_up)]
+    validated = _without_diverged(_validate(models, 1, validation, warm_up))
+    by_error = [models[each.model] for each in validated]
     return list(unique_structures((*by_error[:most_valid], *by_fitness[:fittest])))
 
 
 def _estimate_models(
     individuals: list[Individual], settings: Settings, split: Split, offsets: Offsets, steps: Steps
 ) -> list[ValidatedModel]:
-    """Return models with estimated and with refined parameters in the units of the record."""
+    """Return models with estimated and with refined parameters in the units of the record.
+
+    Models whose free run diverges on the validation data are returned only if the fitness selects.
+    """
     found = (
         estimate_deviations(
             each.regressors,
@@ -178,18 +201,19 @@ def _estimate_models(
         for each in found
         if not isinstance(each, EvaluationOutcome) and each.model.size <= settings.max_terms
     ]
+    keep = list[ValidatedModel] if settings.select == "fitness" else _without_diverged
     if settings.estimator and not steps.skip(f"estimator {settings.estimator}"):
-        return _estimate_with_choice(fitted, settings, split)
+        return keep(_estimate_with_choice(fitted, settings, split))
     estimated = [each.model for each in fitted]
-    validated = _validate(estimated, 1, split.validation, settings.maximum_lag)
+    validated = keep(_validate(estimated, 1, split.validation, settings.maximum_lag))
     if settings.refine and not steps.skip(_REFINEMENT):
         interval = FITNESSES[settings.fitness](settings.shooting)
-        refined = _refine(estimated, interval, settings, split, steps)
+        refined = keep(_refine(estimated, interval, settings, split, steps))
         validated += refined
         best = [each.model for each in refined[:_MOST_PROMISING]]
         lengths = [max(1, round(factor * interval)) for factor in _INTERVALS] if interval else []
         for length in lengths:
-            validated += _refine(best, length, settings, split, steps)
+            validated += keep(_refine(best, length, settings, split, steps))
     return validated
 
 
@@ -245,4 +269,8 @@ def _validate(
         ValidatedModel(model, interval, free_run(model, validation, warm_up).mean_squared_error)
         for model in models
     )
-    return sorted((each for each in validated if isfinite(each.error)), key=lambda entry: entry.order)
+    return sorted(validated, key=lambda entry: entry.order)
+
+
+def _without_diverged(validated: Iterable[ValidatedModel]) -> list[ValidatedModel]:
+    return [each for each in validated if isfinite(each.error)]

@@ -5,11 +5,13 @@ structure are better or worse by chance. The rule is a one-sided form of the one
 Friedman, Olshen & Stone, "Classification and Regression Trees", Wadsworth 1984, section 3.4.3) on paired
 differences. Blocks of the validation data take the correlation of the errors into account. Models with
 different warm-ups are compared over the samples that both predict. Decision 0017 compares rules.
+
+The setting ``select`` can replace this rule by the paper's choice of Appendix A: the least training error.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, isnan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +91,32 @@ def recommend(
             _describe_physics(bool(sound), hysteresis),
         ),
     )
+
+
+def recommend_fittest(
+    assessments: Sequence[Assessment], mode: str, hysteresis: bool, unit: str = ""
+) -> Recommendation:
+    """Choose the model with the least error on the estimation data, as Appendix A of the paper does.
+
+    The validation data have no influence: the free run of the model on them may diverge.
+
+    Parameters
+    ----------
+    assessments : sequence of Assessment
+        Assessments in the order of the ranks.
+    mode : str
+        An entry of ``MODES``: the simulation whose error the search minimised.
+    hysteresis : bool
+        Whether models need Property 1.
+    unit : str
+        Unit of the output, for the reason.
+    """
+    errors = [entry.metrics["estimation"][mode].rmse for entry in assessments]
+    chosen = min(range(len(errors)), key=lambda at: (inf if isnan(errors[at]) else errors[at], at))
+    size = f"{errors[chosen]:.4g} {unit}".rstrip()
+    reason = f"least error of the search on the estimation data ({mode.replace('_', ' ')}), RMSE {size}"
+    sound = is_sound(assessments[chosen].physics, hysteresis)
+    return Recommendation(chosen + 1, (reason, _describe_physics(True, hysteresis)) if sound else (reason,))
 
 
 def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:

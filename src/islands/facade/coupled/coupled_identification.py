@@ -194,6 +194,10 @@ def identify_coupled(
         {name: tuple(value) if isinstance(value, list) else value for name, value in chosen.items()},
     )
     _check_constraints(settings.constraints, chosen)
+    if settings.select != "validation":
+        raise SettingsError(
+            "select is 'validation' with several outputs: equations are chosen by their free run together"
+        )
     chosen.setdefault("average", settings.average)
     find = partial(identify, preset=preset, seed=seed, progress=progress, stop=stop, engine=engine)
     trial = make_trial_library(settings)

@@ -10,7 +10,7 @@ from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 from islands.validation.physics import ClusterSum, ExcursionTest, HoldTest, PhysicsChecks
-from islands.validation.recommendation import compare_blocks, recommend
+from islands.validation.recommendation import compare_blocks, recommend, recommend_fittest
 
 LOST = EvaluationOutcome(Status.DIVERGED, "at sample 3")
 
@@ -24,6 +24,7 @@ class Candidate:
     blocks: np.ndarray
     bounded: bool = True
     property_1: bool = True
+    trained: float = nan
 
     def assessment(self):
         physics = PhysicsChecks(
@@ -35,7 +36,10 @@ class Candidate:
         known = len(self.blocks) > 0
         rmse = sqrt(np.mean(self.blocks)) if known else nan
         return Assessment(
-            {"validation": {"free_run": Metrics(nan, nan, rmse, nan)}},
+            {
+                "estimation": {"one_step_ahead": Metrics(nan, nan, self.trained, nan)},
+                "validation": {"free_run": Metrics(nan, nan, rmse, nan)},
+            },
             {"validation": {"free_run": OK if known else LOST}},
             None,
             None,
@@ -156,3 +160,19 @@ def test_means_are_compared_with_the_samples_of_the_same_part_of_the_data(count)
 
 def test_infinite_errors_are_compared_without_a_warning():
     assert chosen(Candidate(3, np.full(20, np.inf)), Candidate(5, NOISE)) == 5
+
+
+def test_the_fittest_model_is_recommended_although_its_free_run_diverges():
+    entries = [
+        Candidate(3, NOISE, trained=0.4),
+        Candidate(9, [], bounded=False, trained=0.3),
+        Candidate(5, [], trained=nan),
+    ]
+    found = recommend_fittest([entry.assessment() for entry in entries], "one_step_ahead", False, "um")
+    assert found.rank == 2
+    reason = "least error of the search on the estimation data (one step ahead), RMSE 0.3 um"
+    assert found.reasons == (reason,)  # no claim that the model is bounded
+    equal = [Candidate(9, NOISE, trained=0.4), Candidate(3, NOISE, trained=0.4)]
+    found = recommend_fittest([entry.assessment() for entry in equal], "one_step_ahead", False)
+    assert found.rank == 1
+    assert found.reasons[1].startswith("bounded at held inputs")

@@ -40,8 +40,8 @@ def test_command_without_options_receives_the_defaults() -> None:
 
 
 def test_given_options_are_the_only_changes() -> None:
-    found = run("--seed", "7", "--preset", "narx", "--max-terms", "6", "--target-error", "0.5")
-    assert found == SearchOptions("narx", 7, {"max_terms": 6, "target_error": 0.5})
+    found = run("--seed", "7", "--preset", "narx", "--target-error", "0.5", "--select", "fitness")
+    assert found == SearchOptions("narx", 7, {"select": "fitness", "target_error": 0.5})
 
 
 def test_every_switch_of_the_search_is_one_option() -> None:

@@ -136,6 +136,11 @@ def test_settings_for_one_output_are_refused(options, message) -> None:
         fit_coupled(make_coupled_record(PREY), **options)
 
 
+def test_a_choice_by_fitness_is_refused() -> None:
+    with pytest.raises(SettingsError, match="by their free run together"):
+        identify_coupled(make_coupled_record(PREY), select="fitness")
+
+
 def test_a_record_of_one_output_is_refused() -> None:
     record = make_coupled_record(PREY)
     with pytest.raises(SettingsError, match="give a CoupledRecord"):

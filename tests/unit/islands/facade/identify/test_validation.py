@@ -12,6 +12,7 @@ from islands.estimation.estimate import estimate
 from islands.evolution.presets import PRESETS, resolve_settings
 from islands.evolution.problem import make_problem
 from islands.simulation.predictors import free_run
+from islands.systems import appendix
 from islands.validation.metrics import metrics
 from islands.validation.physics import check_physics
 from support.identifications import BUDGET, identify, parameters, record, two_inputs
@@ -190,3 +191,32 @@ def test_initial_sizes_are_limited_by_the_maximum_sizes(changes, expected):
     made = asdict(resolve_settings("paper-case1", changes))
     assert {name: made[name] for name in expected} == expected
     assert {name: made[name] for name in changes} == changes
+
+
+def test_select_fitness_recommends_the_model_of_least_training_error():
+    """The choice of Appendix A of the paper: validation data have no influence, also if a model diverges."""
+    estimation = appendix.soft_record(appendix.S2, seed=1)
+    states = []
+    found = {
+        select: identify(
+            estimation,
+            validation=appendix.white_record(appendix.S2, seed=1),
+            preset="paper-appendix-s2",
+            population=40,
+            generations=4,
+            prune=0.0,
+            select=select,
+            progress=lambda state, _settings: states.append(state),
+        )
+        for select in ("fitness", "validation")
+    }
+    fittest = min(states[-1].archipelago.hall_of_fame.entries, key=lambda entry: entry.fitness)
+    chosen = found["fitness"].best
+    assert chosen.model.size == fittest.size
+    assert set(chosen.model.regressors) == set(fittest.regressors)
+    error = chosen.metrics["estimation"]["one_step_ahead"].rmse
+    assert error**2 == pytest.approx(fittest.fitness, rel=1e-9)
+    assert not chosen.ranked_model.assessment.outcomes["validation"]["free_run"]
+    assert found["fitness"].search_result.settings["select"] == "fitness"
+    assert found["validation"].best.ranked_model.assessment.outcomes["validation"]["free_run"]
+    assert found["validation"].best.metrics["estimation"]["one_step_ahead"].rmse > error
