@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogFormatter, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
 from islands.evolution.search_result import SearchResult
-from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, finish, house_style
+from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, finish, house_style, set_log_scale
 
 #: Entries of a legend column.
 _LEGEND_ROWS = 15
@@ -73,7 +73,7 @@ def draw_front(result: SearchResult) -> Figure:
     chosen = result.recommended
     error = chosen.assessment.metrics["validation"]["free_run"].mape
     axes.plot(chosen.model.size, error, "o", ms=13, mfc="none", color=RESIDUAL, label="recommended")
-    _set_log_scale(axes)
+    set_log_scale(axes)
     axes.set_xlabel("terms")
     axes.set_ylabel("free-run MAPE (% of the range)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
@@ -108,7 +108,7 @@ def draw_fronts(
         axes.plot(sizes, errors, marker=marker, color=colour, label=name)
         axes.plot(*marked[name], "o", ms=13, mfc="none", color=RESIDUAL)
     axes.plot([], [], "o", ms=9, mfc="none", color=RESIDUAL, label="recommended")
-    _set_log_scale(axes)
+    set_log_scale(axes)
     axes.set_xlabel("terms")
     axes.set_ylabel("free-run RMSE")
     axes.set_title(data, fontsize=8.0)
@@ -118,22 +118,7 @@ def draw_fronts(
 
 
 def _set_generation_axes(axes: Axes) -> None:
-    _set_log_scale(axes)
+    set_log_scale(axes)
     axes.set_xlabel("generation")
     axes.set_ylabel("RMSE of multiple shooting")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
-
-
-def _set_log_scale(axes: Axes) -> None:
-    """Set a logarithmic error axis with plain numbers."""
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
-    # A range within one decade may contain no power of ten, so label minor ticks, too.
-    axes.yaxis.set_minor_formatter(_PlainLogFormatter(minor_thresholds=(1.0, 0.5)))
-
-
-class _PlainLogFormatter(LogFormatter):
-    """Labels the same ticks as `LogFormatter`, with plain numbers."""
-
-    def __call__(self, x: float, pos: int | None = None) -> str:
-        return f"{x:g}" if super().__call__(x, pos) else ""

@@ -14,7 +14,9 @@ from textwrap import fill
 from typing import IO, Any
 
 import matplotlib
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogFormatter
 
 #: Width of figures in inches (text column of an article). Font sizes below are points at this width.
 WIDTH = 7.0
@@ -152,3 +154,18 @@ def save(figure: Figure, path: str | Path | IO[bytes]) -> None:
     """
     with house_style():
         figure.savefig(path, format="svg", metadata={"Date": None, "Creator": "islands"})
+
+
+def set_log_scale(axes: Axes) -> None:
+    """Set a logarithmic axis of errors, upwards, with plain numbers."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+    # A range within one decade may contain no power of ten, so label minor ticks, too.
+    axes.yaxis.set_minor_formatter(_PlainLogFormatter(minor_thresholds=(1.0, 0.5)))
+
+
+class _PlainLogFormatter(LogFormatter):
+    """Labels the same ticks as `LogFormatter`, with plain numbers."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g}" if super().__call__(x, pos) else ""

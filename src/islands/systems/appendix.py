@@ -27,8 +27,11 @@ from islands.errors import RecordError, lookup
 #: Length of a training or validation record in samples.
 SAMPLES = 500
 
-#: Variance of the white noise that is filtered into the soft input, and of the rescaled soft input.
-SOFT_VARIANCE = 0.20
+#: Variance of the white noise that is filtered into the soft input.
+NOISE_VARIANCE = 0.20
+
+#: Variance of the rescaled soft input.
+SOFT_VARIANCE = 0.04
 
 #: Poles of the low-pass filter of the soft input.
 POLES = (0.95, 0.9)
@@ -50,16 +53,16 @@ _WHITE_NOISE = 3
 Signal = NDArray[np.float64]
 
 
-def _scale_to_variance(filtered: Signal) -> Signal:
-    return filtered * float(np.sqrt(SOFT_VARIANCE) / filtered.std())
+def _scale_to_variance(filtered: Signal, variance: float) -> Signal:
+    return filtered * float(np.sqrt(variance) / filtered.std())
 
 
-def _scale_to_unit_gain(filtered: Signal) -> Signal:
+def _scale_to_unit_gain(filtered: Signal, _variance: float) -> Signal:
     return filtered * float(np.prod(1.0 - np.array(POLES)))
 
 
-#: Scalings of the filtered noise by name; the first is the default.
-SCALINGS: dict[str, Callable[[Signal], Signal]] = {
+#: Scalings of the filtered noise by name, given the variance of the soft input; the first is the default.
+SCALINGS: dict[str, Callable[[Signal, float], Signal]] = {
     "rescaled": _scale_to_variance,
     "unit-gain": _scale_to_unit_gain,
 }
@@ -114,7 +117,9 @@ S1 = OutputErrorSystem("s1", simulate_s1, lambda _: 0.02)
 S2 = OutputErrorSystem("s2", simulate_s2, lambda y: float(np.sqrt(0.04) * y.std()))
 
 
-def soft_input(seed: int, scaling: str = "rescaled", samples: int = SAMPLES) -> Signal:
+def soft_input(
+    seed: int, scaling: str = "rescaled", samples: int = SAMPLES, variance: float = SOFT_VARIANCE
+) -> Signal:
     """Filter white Gaussian noise of variance 0.20 by a low-pass with poles 0.95 and 0.9, from rest.
 
     Parameters
@@ -125,6 +130,8 @@ def soft_input(seed: int, scaling: str = "rescaled", samples: int = SAMPLES) -> 
         Name of the scaling in `SCALINGS`.
     samples : int
         Length in samples.
+    variance : float
+        Variance of the input, if it is rescaled.
 
     Raises
     ------
@@ -132,9 +139,9 @@ def soft_input(seed: int, scaling: str = "rescaled", samples: int = SAMPLES) -> 
         The scaling is unknown.
     """
     scale = lookup(SCALINGS, scaling, "scaling")
-    noise = np.sqrt(SOFT_VARIANCE) * _draw(seed, _SOFT_INPUT, samples)
+    noise = np.sqrt(NOISE_VARIANCE) * _draw(seed, _SOFT_INPUT, samples)
     filtered: Signal = scipy.signal.lfilter([1.0], np.poly(POLES), noise)
-    return scale(filtered)
+    return scale(filtered, variance)
 
 
 def white_input(seed: int, samples: int = SAMPLES) -> Signal:
@@ -143,7 +150,11 @@ def white_input(seed: int, samples: int = SAMPLES) -> Signal:
 
 
 def soft_record(
-    system: OutputErrorSystem, seed: int = 0, scaling: str = "rescaled", samples: int = SAMPLES
+    system: OutputErrorSystem,
+    seed: int = 0,
+    scaling: str = "rescaled",
+    samples: int = SAMPLES,
+    variance: float = SOFT_VARIANCE,
 ) -> Dataset:
     """Make training data: the system's noisy output under the soft input.
 
@@ -154,7 +165,7 @@ def soft_record(
     SettingsError
         The scaling is unknown.
     """
-    return _measure(system, soft_input(seed, scaling, samples), _draw(seed, _SOFT_NOISE, samples))
+    return _measure(system, soft_input(seed, scaling, samples, variance), _draw(seed, _SOFT_NOISE, samples))
 
 
 def white_record(system: OutputErrorSystem, seed: int = 0, samples: int = SAMPLES) -> Dataset:
