@@ -30,7 +30,8 @@ class MonteCarloGroup:
     label : str
         Value of the factor.
     prediction, simulation : sequence of float
-        Errors of the one-step-ahead prediction and of the free run; those that are not finite are left out.
+        MAPE of the one-step-ahead prediction and of the free run in per cent; those that are not finite are
+        left out.
     sizes : sequence of int
         Numbers of terms.
     unstable : float
@@ -93,7 +94,7 @@ def draw_groups(panels: Sequence[tuple[str, Sequence[MonteCarloGroup]]], factor:
             _draw_boxes(sizes, [each.sizes for each in groups], 0.0, colours.inputs[1 + place % 2], colours)
             sizes.set_xticks(range(len(groups)), [each.label for each in groups])
             sizes.set_xlabel(factor)
-        for axes, name in zip(rows[:, 0], ("mean squared error", "unstable", "terms"), strict=True):
+        for axes, name in zip(rows[:, 0], ("MAPE (%)", "unstable", "terms"), strict=True):
             axes.set_ylabel(name)
         return finish(figure)
 
