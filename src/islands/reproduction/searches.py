@@ -1,6 +1,6 @@
 """Searches of one island as the paper describes them, and the statistics that the comparison needs."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from islands.data.dataset import Dataset
@@ -61,6 +61,7 @@ def search_island(
     seed: int,
     root_rule: bool = True,
     simulate_holds: bool = True,
+    report: Callable[[float], None] = lambda _fraction: None,
 ) -> Document:
     """Run the search of the paper, and select the individual of its hall of fame with the least error.
 
@@ -80,6 +81,8 @@ def search_island(
     simulate_holds : bool
         Whether Property 1 of the final hall is also checked by simulated holds, which takes longer than the
         search of a few generations.
+    report : callable
+        Receives the completed fraction after every generation. An exception of it ends the search.
 
     Returns
     -------
@@ -96,6 +99,7 @@ def search_island(
     for generation in range(1, settings.generations + 1):
         island, info = step(island, evaluator)
         evaluations += info.evaluations
+        report(generation / settings.generations)
         if generation % stride == 0 or generation == settings.generations:
             trace.append(_trace(island, evaluator))
     models = [_make_model(entry, record) for entry in island.hall_of_fame.entries]
