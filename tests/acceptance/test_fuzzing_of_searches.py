@@ -28,6 +28,13 @@ def test_every_search_of_a_short_or_extreme_record_ends_in_a_result_or_in_words(
             assert f"{function}: {ending} " in printed, printed
 
 
+@pytest.mark.ci
+@pytest.mark.parametrize("case", [4302], ids=["responses below the smallest normal number"])
+def test_a_case_that_was_a_defect_ends_in_a_result(case: int) -> None:
+    ending = run_case(draw_case(50, case))
+    assert ending.outcome == "result", ending.reason
+
+
 def test_a_case_is_the_same_at_every_run() -> None:
     described = [draw_case(SEED, number).description for number in range(60)]
     assert described == [draw_case(SEED, number).description for number in range(60)]

@@ -194,6 +194,8 @@ class StartFinder:
         responses = [projection(change) for change in changes]
         if effect.is_free and responses:
             weights = np.linalg.lstsq(np.column_stack(responses), projection.residual, rcond=DEPENDENCE)[0]
+            if not np.isfinite(weights).all():  # the responses are smaller than any normal number
+                return []
             combined = points[:1].copy()
             combined[0, part] = weights @ points[:, part]
             points, responses = combined, [projection(simulation.simulate(combined[0]) - base.output)]
