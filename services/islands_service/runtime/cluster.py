@@ -9,7 +9,7 @@ import socket
 import stat
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from math import inf
 from pathlib import Path
 from threading import current_thread, main_thread
@@ -28,6 +28,7 @@ from ray.exceptions import (
 
 from islands.available_cpus import count_cpus
 from islands.distribution import read_version
+from islands.evolution.progress import StoppedError
 from islands_service.runtime.errors import ClusterError
 
 #: Bytes of shared memory of a local Ray: it holds the record and the migrants.
@@ -85,6 +86,8 @@ def cluster(address: str | None = None, cpus: int | None = None, jobs: int = 1) 
     ------
     ClusterError
         The address does not answer, Ray does not start here, or this process is already connected to Ray.
+    StoppedError
+        SIGTERM has arrived during the start, and its handler has not raised an exception.
     """
     if ray.is_initialized():
         raise ClusterError(
@@ -92,8 +95,20 @@ def cluster(address: str | None = None, cpus: int | None = None, jobs: int = 1) 
         )
     logging.getLogger("ray").setLevel(logging.CRITICAL)
     handler = signal.getsignal(signal.SIGTERM)
-    with _local_ray(cpus or count_cpus(), jobs) if address is None else _remote_cluster(address):
-        if callable(handler) and current_thread() is main_thread():
+    handled = callable(handler) and current_thread() is main_thread()
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(
+                _local_ray(cpus or count_cpus(), jobs) if address is None else _remote_cluster(address)
+            )
+        except SystemExit:
+            # Ray's own handler of SIGTERM, which it sets while it starts.
+            if not handled:
+                raise
+            signal.signal(signal.SIGTERM, handler)
+            signal.raise_signal(signal.SIGTERM)
+            raise StoppedError("start of Ray") from None
+        if handled:
             signal.signal(signal.SIGTERM, handler)  # Ray has replaced it by its own
         yield
 

@@ -1,6 +1,11 @@
 """Connection to Ray."""
 
+import signal
+import sys
+
 import pytest
+
+from islands.evolution.progress import StoppedError
 
 
 @pytest.mark.parametrize(
@@ -30,3 +35,33 @@ def test_start_of_ray_that_times_out_is_reported_as_a_cluster_error(monkeypatch)
     monkeypatch.setattr(ray, "init", time_out)
     with pytest.raises(ClusterError, match="does not start on this machine"), cluster(None):
         pass
+
+
+def end_by_rays_handler(**_options):
+    """Receive SIGTERM as `ray.init` does, whose handler ends the process with the number of the signal."""
+    signal.signal(signal.SIGTERM, lambda number, _frame: sys.exit(number))
+    signal.raise_signal(signal.SIGTERM)
+
+
+@pytest.mark.parametrize("raises", [False, True])
+def test_sigterm_during_the_start_of_ray_reaches_the_handler_of_the_caller(monkeypatch, raises):
+    import ray
+
+    from islands_service.runtime import cluster
+
+    received = []
+
+    def receive(number, _frame):
+        received.append(number)
+        if raises:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(ray, "init", end_by_rays_handler)
+    before = signal.signal(signal.SIGTERM, receive)
+    try:
+        with pytest.raises(KeyboardInterrupt if raises else StoppedError), cluster.cluster(cpus=1):
+            pass
+        assert received == [signal.SIGTERM]
+        assert signal.getsignal(signal.SIGTERM) is receive
+    finally:
+        signal.signal(signal.SIGTERM, before)
