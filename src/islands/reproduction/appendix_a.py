@@ -122,8 +122,8 @@ EVENTS = MappingProxyType(
         "unstable": lambda run: run.unstable,
         "10 terms": lambda run: run.size == 10,
         "5 to 8 terms": lambda run: 5 <= run.size <= 8,
-        "at most 6 terms": lambda run: run.size <= 6,
-        "at least 6 terms": lambda run: run.size >= 6,
+        "6 terms or fewer": lambda run: run.size <= 6,
+        "6 terms or more": lambda run: run.size >= 6,
     }
 )
 
@@ -135,8 +135,8 @@ PUBLISHED = (
     PublishedCount("s1", 0.0, "10 terms", 50, 50),
     PublishedCount("s1", 0.25, "10 terms", 50, 50),
     PublishedCount("s1", 1.0, "5 to 8 terms", 50, 50),
-    PublishedCount("s1", 1.0, "at most 6 terms", 25, 50),
-    PublishedCount("s1", 1.0, "at least 6 terms", 25, 50),
+    PublishedCount("s1", 1.0, "6 terms or fewer", 25, 50),
+    PublishedCount("s1", 1.0, "6 terms or more", 25, 50),
 )
 
 #: Table A.3: difference of the mean PE of S2 between two probabilities, and whether the test rejects equal
@@ -565,7 +565,7 @@ def _tabulate_runs(shown: Mapping[str, Mapping[float, Sequence[Run]]]) -> Compar
     for system, groups in shown.items():
         for prune, runs in groups.items():
             stated = [
-                f"{_write_published(each)} {each.event}"
+                f"{_write_published(each)}: {each.event}"
                 for each in PUBLISHED
                 if (each.system, each.prune) == (system, prune)
             ]
