@@ -67,5 +67,5 @@ def test_interrupted_short_form_continues_with_the_same_bytes(tmp_path: Path) ->
     ]
     assert [path.read_bytes() for path in files[0]] == [path.read_bytes() for path in files[1]]
     page = (tmp_path / "whole" / "reproduction.html").read_text()
-    for published in ("0.31189", "0.25250", "1.01111", "short form"):
+    for published in ("0.31189", "0.25250", "1.01111", "20 of 50", "short form"):
         assert published in page

@@ -453,7 +453,7 @@ def _introduce(
     paragraphs = [data, variance]
     if options.quick:
         paragraphs.append(
-            "This is the quick form: S1 only, few runs, two pruning probabilities, no scan. Its intervals "
+            "This is the short form: S1 only, few runs, two pruning probabilities, no scan. Its intervals "
             "are wide, so that it shows directions only."
         )
     if scan:
@@ -564,27 +564,24 @@ def _tabulate_runs(shown: Mapping[str, Mapping[float, Sequence[Run]]]) -> Compar
     rows = []
     for system, groups in shown.items():
         for prune, runs in groups.items():
-            stated = [
-                f"{_write_published(each)}: {each.event}"
-                for each in PUBLISHED
-                if (each.system, each.prune) == (system, prune)
-            ]
+            stated = any((each.system, each.prune) == (system, prune) for each in PUBLISHED)
             sizes = [run.size for run in runs]
             rows.append(
                 (
                     f"{system.upper()}, {prune:g}",
-                    "; ".join(stated) or "in Figure A.7 only",
                     f"{_count_unstable(runs)} of {len(runs)}",
                     f"{min(sizes)} to {max(sizes)}, median {np.median(sizes):g}",
                     _write_quartiles([run.prediction for run in runs]),
                     _write_quartiles([run.simulation for run in runs if not run.unstable]),
-                    "" if stated else "the text of the paper has no number",
+                    "the published numbers are in the first table"
+                    if stated
+                    else "published in Figure A.7 only",
                 )
             )
     return ComparisonTable(
         "All runs: unstable models, terms, and quartiles of PE and of SE of the stable models in per cent",
         tuple(rows),
-        ("system, PRPB", "published", "unstable", "terms", "PE", "SE", WHY),
+        ("system, PRPB", "unstable", "terms", "PE", "SE", WHY),
     )
 
 

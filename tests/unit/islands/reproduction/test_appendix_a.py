@@ -229,7 +229,7 @@ def test_figures_are_drawn_in_both_themes(quick):
     options = ReproductionOptions(runs=3, quick=quick)
     section = summarise(make_results(options, lambda _system, prune: 1 if prune == 0 else 0), options)
     assert [figure.name for figure in section.figures] == ["figure-a7", "appendix-a-scan"][: 2 - quick]
-    assert ("quick form" in " ".join(section.introduction)) is quick
+    assert ("short form" in " ".join(section.introduction)) is quick
     for figure in section.figures:
         backgrounds = {figure.draw(theme).get_facecolor() for theme in THEMES}
         assert len(backgrounds) == len(THEMES)

@@ -16,7 +16,7 @@ from rich.text import Text
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.errors import SettingsError, lookup
 from islands.evolution.progress import Steps, StoppedError
-from islands.reproduction import case1, case2
+from islands.reproduction import appendix_a, case1, case2
 from islands.reproduction.page import write_reproduction
 from islands.reproduction.section import ComparisonTable, Section
 from islands.reproduction.tasks import Document, ReproductionOptions, Task, read_results, run_tasks
@@ -40,6 +40,7 @@ PARTS: Mapping[str, PaperPart] = MappingProxyType(
     {
         "case1": PaperPart(case1.plan, case1.summarise),
         "case2": PaperPart(case2.plan, case2.summarise),
+        "appendix-a": PaperPart(appendix_a.plan, appendix_a.summarise),
     }
 )
 
