@@ -11,6 +11,7 @@ from functools import partial
 from itertools import combinations
 from math import inf, isfinite, log
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -262,6 +263,10 @@ def read_runs(results: Mapping[str, Document], options: ReproductionOptions) -> 
     }
 
 
+def _count(published: PublishedCount, runs: Sequence[Run]) -> int:
+    return sum(map(EVENTS[published.event], runs))
+
+
 def _count_unstable(runs: Sequence[Run]) -> int:
     return sum(run.unstable for run in runs)
 
@@ -270,6 +275,20 @@ def interval(count: int, runs: int) -> tuple[float, float]:
     """Return the exact binomial interval (Clopper and Pearson) of a proportion, with a confidence of 95 %."""
     found = stats.binomtest(count, runs).proportion_ci(_CONFIDENCE, method="exact")
     return float(found.low), float(found.high)
+
+
+def expected_counts(count: int, runs: int) -> tuple[int, int]:
+    """Return the central 95 % range of the count among 50 runs, given a count among the runs here.
+
+    Published counts are random, too, so that they are not compared with the interval of the proportion.
+    """
+    low, high = _predict_counts(count, runs).ppf((0.5 - _CONFIDENCE / 2.0, 0.5 + _CONFIDENCE / 2.0))
+    return int(low), int(high)
+
+
+def _predict_counts(count: int, runs: int) -> Any:
+    """Return the distribution of the count among 50 runs; the proportion has Jeffreys' prior."""
+    return stats.betabinom(PUBLISHED_RUNS, count + 0.5, runs - count + 0.5)
 
 
 def log_likelihood(runs: Mapping[tuple[str, float], Sequence[Run]]) -> float:
@@ -288,8 +307,7 @@ def log_likelihood(runs: Mapping[tuple[str, float], Sequence[Run]]) -> float:
     for published in PUBLISHED:
         seen = runs.get((published.system, published.prune))
         if seen:
-            count = sum(map(EVENTS[published.event], seen))
-            distribution = stats.betabinom(PUBLISHED_RUNS, count + 0.5, len(seen) - count + 0.5)
+            distribution = _predict_counts(_count(published, seen), len(seen))
             total += log(distribution.pmf(np.arange(published.least, published.most + 1)).sum())
     return total
 
@@ -483,8 +501,8 @@ def _judge_scan(scan: Sequence[ScanPoint]) -> str:
         else "No variance meets all of them together."
     )
     return (
-        f"The scan has its largest likelihood at the variance {best.variance:g}. Published counts lie within "
-        f"the 95 % intervals of the runs here at these variances. {parts}. {verdict}"
+        f"The scan has its largest likelihood at the variance {best.variance:g}. The published counts agree "
+        f"with the runs here, at a confidence of 95 %, at these variances. {parts}. {verdict}"
     )
 
 
@@ -522,9 +540,9 @@ def _name(published: PublishedCount) -> str:
 
 
 def _is_met(published: PublishedCount, runs: Sequence[Run]) -> bool:
-    """Return whether a published count is possible within the 95 % interval of the runs."""
-    low, high = interval(sum(map(EVENTS[published.event], runs)), len(runs))
-    return low <= published.most / PUBLISHED_RUNS and published.least / PUBLISHED_RUNS <= high
+    """Return whether a published count lies in the range that the runs here make likely."""
+    low, high = expected_counts(_count(published, runs), len(runs))
+    return low <= published.most and published.least <= high
 
 
 def _write_published(published: PublishedCount) -> str:
@@ -541,7 +559,7 @@ def _tabulate_counts(
         runs = shown.get(published.system, {}).get(published.prune)
         if not runs:
             continue
-        count = sum(map(EVENTS[published.event], runs))
+        count = _count(published, runs)
         low, high = interval(count, len(runs))
         here = f"{count} of {len(runs)} (95 %: {100 * low:.0f} to {100 * high:.0f} %)"
         rows.append((_name(published), _write_published(published), here, _explain(published, runs, scan)))
@@ -549,15 +567,17 @@ def _tabulate_counts(
 
 
 def _explain(published: PublishedCount, runs: Sequence[Run], scan: Sequence[ScanPoint]) -> str:
+    low, high = expected_counts(_count(published, runs), len(runs))
+    found = f"{PUBLISHED_RUNS} runs like those here have {low} to {high} (95 %)"
     if _is_met(published, runs):
-        return "the published count lies within the interval"
+        return f"agrees: {found}"
     elsewhere = [
         point.variance
         for point in scan
         if (seen := point.runs.get((published.system, published.prune))) and _is_met(published, seen)
     ]
-    where = f"; in the scan it does at the variance {_list_values(elsewhere)}" if elsewhere else ""
-    return f"the published count lies outside the interval{where}"
+    where = f"; in the scan it agrees at the variance {_list_values(elsewhere)}" if elsewhere else ""
+    return f"differs: {found}{where}"
 
 
 def _tabulate_runs(shown: Mapping[str, Mapping[float, Sequence[Run]]]) -> ComparisonTable:
