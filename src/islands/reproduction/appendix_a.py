@@ -47,7 +47,7 @@ VARIANCES = (0.003, 0.01, 0.02, 0.025, 0.03, 0.04, 0.06, 0.1, 0.2)
 STATED_VARIANCE = 0.2
 
 #: System and pruning probability of the runs at every variance, and their number, at most.
-SCANNED = MappingProxyType({("s1", 0.0): 20, ("s1", 1.0): 20, ("s2", 0.0): 10})
+SCANNED = MappingProxyType({("s1", 0.0): 50, ("s1", 1.0): 50, ("s2", 0.0): 10})
 
 #: Runs of the quick form for each pruning probability: S1 only, without pruning and with it.
 QUICK_RUNS = 3
@@ -69,7 +69,7 @@ _CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class AppendixRun:
     """Model of least training error of one search.
 
     Attributes
@@ -246,11 +246,13 @@ def _batch(cell: Cell, runs: int) -> list[Task]:
     ]
 
 
-def read_runs(results: Mapping[str, Document], options: ReproductionOptions) -> dict[Cell, tuple[Run, ...]]:
+def read_runs(
+    results: Mapping[str, Document], options: ReproductionOptions
+) -> dict[Cell, tuple[AppendixRun, ...]]:
     """Return the runs of every cell from the results of the tasks of `plan`."""
     return {
         cell: tuple(
-            Run(
+            AppendixRun(
                 each["seed"],
                 each["size"],
                 each["training"],
@@ -263,11 +265,11 @@ def read_runs(results: Mapping[str, Document], options: ReproductionOptions) -> 
     }
 
 
-def _count(published: PublishedCount, runs: Sequence[Run]) -> int:
+def _count(published: PublishedCount, runs: Sequence[AppendixRun]) -> int:
     return sum(map(EVENTS[published.event], runs))
 
 
-def _count_unstable(runs: Sequence[Run]) -> int:
+def _count_unstable(runs: Sequence[AppendixRun]) -> int:
     return sum(run.unstable for run in runs)
 
 
@@ -291,7 +293,7 @@ def _predict_counts(count: int, runs: int) -> Any:
     return stats.betabinom(PUBLISHED_RUNS, count + 0.5, runs - count + 0.5)
 
 
-def log_likelihood(runs: Mapping[tuple[str, float], Sequence[Run]]) -> float:
+def log_likelihood(runs: Mapping[tuple[str, float], Sequence[AppendixRun]]) -> float:
     """Return the logarithm of the probability of the published counts, given runs here.
 
     An event that occurs in ``k`` of ``n`` runs has a proportion with the posterior of Jeffreys' prior, and a
@@ -419,11 +421,11 @@ class ScanPoint:
     """
 
     variance: float
-    runs: Mapping[tuple[str, float], Sequence[Run]]
+    runs: Mapping[tuple[str, float], Sequence[AppendixRun]]
     likelihood: float
 
 
-def _summarise_scan(cells: Mapping[Cell, Sequence[Run]]) -> list[ScanPoint]:
+def _summarise_scan(cells: Mapping[Cell, Sequence[AppendixRun]]) -> list[ScanPoint]:
     """Return the points of the scan; none if a cell of it has no runs, as in the quick form."""
     points = []
     for variance in VARIANCES:
@@ -437,7 +439,7 @@ def _summarise_scan(cells: Mapping[Cell, Sequence[Run]]) -> list[ScanPoint]:
     return points
 
 
-def _get_errors(cells: Mapping[Cell, Sequence[Run]], variance: float) -> dict[float, list[float]]:
+def _get_errors(cells: Mapping[Cell, Sequence[AppendixRun]], variance: float) -> dict[float, list[float]]:
     """Return the finite PE of S2 by pruning probability, of those with at least two."""
     found = {
         prune: [run.prediction for run in cells.get(("s2", variance, prune), ()) if isfinite(run.prediction)]
@@ -448,7 +450,7 @@ def _get_errors(cells: Mapping[Cell, Sequence[Run]], variance: float) -> dict[fl
 
 def _introduce(
     options: ReproductionOptions,
-    shown: Mapping[str, Mapping[float, Sequence[Run]]],
+    shown: Mapping[str, Mapping[float, Sequence[AppendixRun]]],
     scan: Sequence[ScanPoint],
     tests: Mapping[float, Tukey],
 ) -> tuple[str, ...]:
@@ -539,7 +541,7 @@ def _name(published: PublishedCount) -> str:
     return f"{published.system.upper()}, PRPB {published.prune:g}, {published.event}"
 
 
-def _is_met(published: PublishedCount, runs: Sequence[Run]) -> bool:
+def _is_met(published: PublishedCount, runs: Sequence[AppendixRun]) -> bool:
     """Return whether a published count lies in the range that the runs here make likely."""
     low, high = expected_counts(_count(published, runs), len(runs))
     return low <= published.most and published.least <= high
@@ -552,7 +554,7 @@ def _write_published(published: PublishedCount) -> str:
 
 
 def _tabulate_counts(
-    shown: Mapping[str, Mapping[float, Sequence[Run]]], scan: Sequence[ScanPoint]
+    shown: Mapping[str, Mapping[float, Sequence[AppendixRun]]], scan: Sequence[ScanPoint]
 ) -> ComparisonTable:
     rows = []
     for published in PUBLISHED:
@@ -566,7 +568,7 @@ def _tabulate_counts(
     return ComparisonTable("Counts and sizes in the text of Appendix A", tuple(rows))
 
 
-def _explain(published: PublishedCount, runs: Sequence[Run], scan: Sequence[ScanPoint]) -> str:
+def _explain(published: PublishedCount, runs: Sequence[AppendixRun], scan: Sequence[ScanPoint]) -> str:
     low, high = expected_counts(_count(published, runs), len(runs))
     found = f"{PUBLISHED_RUNS} runs like those here have {low} to {high} (95 %)"
     if _is_met(published, runs):
@@ -580,7 +582,7 @@ def _explain(published: PublishedCount, runs: Sequence[Run], scan: Sequence[Scan
     return f"differs: {found}{where}"
 
 
-def _tabulate_runs(shown: Mapping[str, Mapping[float, Sequence[Run]]]) -> ComparisonTable:
+def _tabulate_runs(shown: Mapping[str, Mapping[float, Sequence[AppendixRun]]]) -> ComparisonTable:
     rows = []
     for system, groups in shown.items():
         for prune, runs in groups.items():
@@ -610,7 +612,7 @@ def _write_quartiles(values: Iterable[float]) -> str:
     return " / ".join(f"{value:.3g}" for value in np.quantile(finite, (0.25, 0.5, 0.75))) if finite else "-"
 
 
-def _tabulate_trends(shown: Mapping[str, Mapping[float, Sequence[Run]]]) -> ComparisonTable:
+def _tabulate_trends(shown: Mapping[str, Mapping[float, Sequence[AppendixRun]]]) -> ComparisonTable:
     """Compare the directions that the text of the paper states."""
     rows = []
     for system, groups in shown.items():
@@ -687,7 +689,7 @@ def _tabulate_scan(scan: Sequence[ScanPoint]) -> ComparisonTable:
     )
 
 
-def _draw_figure_a7(shown: Mapping[str, Mapping[float, Sequence[Run]]], theme: str) -> Figure:
+def _draw_figure_a7(shown: Mapping[str, Mapping[float, Sequence[AppendixRun]]], theme: str) -> Figure:
     stated = {
         (each.system, each.prune): each.least / PUBLISHED_RUNS
         for each in PUBLISHED
@@ -741,7 +743,7 @@ def _draw_scan_figure(scan: Sequence[ScanPoint], theme: str) -> Figure:
 
 
 def _describe(
-    cells: Mapping[Cell, Sequence[Run]],
+    cells: Mapping[Cell, Sequence[AppendixRun]],
     scan: Sequence[ScanPoint],
     tests: Mapping[float, Tukey],
 ) -> Document:

@@ -18,7 +18,7 @@ from islands.reproduction.appendix_a import (
     STATED_VARIANCE,
     TABLE_A3,
     VARIANCES,
-    Run,
+    AppendixRun,
     compare_means,
     expected_counts,
     interval,
@@ -35,7 +35,7 @@ from islands.systems.appendix import SOFT_VARIANCE
 
 def make_runs(count, unstable=0, size=10, prediction=1.0):
     return [
-        Run(seed, size, 0.1, prediction + 0.01 * seed, inf if seed < unstable else 2.0)
+        AppendixRun(seed, size, 0.1, prediction + 0.01 * seed, inf if seed < unstable else 2.0)
         for seed in range(count)
     ]
 
