@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import inf
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from islands.figures.style import blank, finish, set_log_scale
 from islands.figures.themes import Theme, themed_style
@@ -91,7 +92,10 @@ def draw_groups(panels: Sequence[tuple[str, Sequence[MonteCarloGroup]]], factor:
             errors.set_title(title)
             _draw_errors(errors, groups, colours)
             _draw_counts(counts, groups, colours)
-            _draw_boxes(sizes, [each.sizes for each in groups], 0.0, colours.inputs[1 + place % 2], colours)
+            terms = [each.sizes for each in groups]
+            _draw_boxes(
+                sizes, terms, list(map(_compute_notch, terms)), 0.0, colours.inputs[1 + place % 2], colours
+            )
             sizes.set_xticks(range(len(groups)), [each.label for each in groups])
             sizes.set_xlabel(factor)
         for axes, name in zip(rows[:, 0], ("MAPE (%)", "unstable", "terms"), strict=True):
@@ -105,23 +109,40 @@ def _draw_errors(axes: Axes, groups: Sequence[MonteCarloGroup], colours: Theme) 
         ("SE, free run", [each.simulation for each in groups], 1, colours.mark),
     )
     for name, values, side, colour in kinds:
-        finite = [[value for value in group if isfinite(value)] for group in values]
-        _draw_boxes(axes, finite, side * 0.6 * _BOX, colour, colours)
+        finite = [[value for value in group if 0.0 < value < inf] for group in values]
+        notches = [np.exp(_compute_notch(np.log(group))) for group in finite if group]
+        _draw_boxes(axes, finite, notches, side * 0.6 * _BOX, colour, colours)
         axes.plot([], [], "s", color=colour, label=name)
     set_log_scale(axes)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderpad=0.0, columnspacing=1.0)
 
 
+def _compute_notch(values: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the interval of the median: 1.57 interquartile ranges over the root of the number, either way.
+
+    Intervals of errors are those of their logarithms: on a logarithmic axis they must not reach zero.
+    """
+    lower, median, upper = np.quantile(values, (0.25, 0.5, 0.75))
+    half = 1.57 * (upper - lower) / np.sqrt(np.size(values))
+    return np.array([median - half, median + half])
+
+
 def _draw_boxes(
-    axes: Axes, values: Sequence[Sequence[float]], shift: float, colour: str, colours: Theme
+    axes: Axes,
+    values: Sequence[Sequence[float]],
+    notches: Sequence[NDArray[np.float64]],
+    shift: float,
+    colour: str,
+    colours: Theme,
 ) -> None:
-    """Draw boxes with notches, whose half-width is 1.57 interquartile ranges over the root of the number."""
+    """Draw a box with a notch for every group that is not empty; ``notches`` has those of these groups."""
     places = [place for place, group in enumerate(values) if len(group)]
     axes.boxplot(
         [values[place] for place in places],
         positions=[place + shift for place in places],
         widths=_BOX,
         notch=True,
+        conf_intervals=np.reshape(notches, (-1, 2)),
         patch_artist=True,
         manage_ticks=False,
         boxprops={"facecolor": colour, "edgecolor": colours.text, "linewidth": 0.6, "alpha": 0.85},

@@ -9,7 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
-from math import inf, isfinite, log
+from math import exp, inf, isfinite, log
 from types import MappingProxyType
 from typing import Any
 
@@ -495,13 +495,15 @@ def _judge_scan(scan: Sequence[ScanPoint]) -> str:
         for published in PUBLISHED
         if (published.system, published.prune) in SCANNED
     }
-    common = [point.variance for point in scan if all(point.variance in values for values in met.values())]
+    common = [point for point in scan if all(point.variance in values for values in met.values())]
     parts = "; ".join(f"{_name(published)}: {_list_values(values)}" for published, values in met.items())
-    verdict = (
-        f"All of them are met at {_list_values(common)}."
-        if common
-        else "No variance meets all of them together."
-    )
+    verdict = "No variance meets all of them."
+    if common:
+        chances = ", ".join(f"{exp(point.likelihood - best.likelihood):.2g}" for point in common)
+        verdict = (
+            f"Each alone agrees at {_list_values([point.variance for point in common])}, where all together "
+            f"are {chances} times as likely as at {best.variance:g}."
+        )
     return (
         f"The scan has its largest likelihood at the variance {best.variance:g}. The published counts agree "
         f"with the runs here, at a confidence of 95 %, at these variances. {parts}. {verdict}"
