@@ -43,13 +43,14 @@ def test_short_form_of_case_2_prints_and_writes_its_tables(
 
 
 @pytest.mark.nightly
+@pytest.mark.timeout(900)
 def test_interrupted_short_form_continues_with_the_same_bytes(tmp_path: Path) -> None:
     command = [ISLANDS, "reproduce", "all", "--quick", "--seeds", "1", "--runs", "1", "--out"]
     environment = {**os.environ, "COLUMNS": "200"}
     with subprocess.Popen(
         [*command, tmp_path / "stopped"], env=environment, stderr=subprocess.PIPE
     ) as stopped:
-        deadline = time.monotonic() + 240
+        deadline = time.monotonic() + 300
         while not results(tmp_path / "stopped") and time.monotonic() < deadline:
             time.sleep(0.2)
         stopped.send_signal(signal.SIGINT)
