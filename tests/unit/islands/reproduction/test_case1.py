@@ -11,6 +11,9 @@ from islands.reproduction.section import WHY
 from islands.reproduction.tasks import ReproductionOptions
 from support.undrawn import undrawn_figures
 
+#: The published models are assessed on the authors' record, which takes a second.
+pytestmark = pytest.mark.ci
+
 OPTIONS = ReproductionOptions(seeds=3, quick=False)
 
 

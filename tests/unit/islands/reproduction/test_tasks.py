@@ -69,6 +69,7 @@ def test_a_result_is_stored_although_a_later_task_fails(tmp_path, planned):
     assert calls(tmp_path) == ["0"]
 
 
+@pytest.mark.ci
 def test_results_of_other_processes_are_the_same(tmp_path, planned):
     with process_pool(2, start_after=0.0) as parallel_map:
         parallel = run_tasks(planned, tmp_path / "parallel", parallel_map)
