@@ -107,7 +107,10 @@ def test_presets_run_with_a_small_budget(data, preset):
     assert found.search_result.settings["preset"] == preset
     search = found.search_result.search
     assert search.evaluations == 24 * PRESETS[preset].islands
-    assert search.feasible_share == sum(search.outcomes.get(name, 0) for name in ("ok", "abandoned")) / search.evaluations
+    assert (
+        search.feasible_share
+        == sum(search.outcomes.get(name, 0) for name in ("ok", "abandoned")) / search.evaluations
+    )
     assert all(fitted.model.size <= 4 for fitted in found.models)
 
 
