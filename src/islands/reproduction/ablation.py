@@ -14,6 +14,9 @@ from islands.reproduction.tasks import Document
 #: Probability below which a difference between two sets of searches is called significant.
 _SIGNIFICANT = 0.05
 
+#: Seeds with which a sign test can be significant.
+_FEWEST = 6
+
 
 @dataclass(frozen=True, slots=True)
 class Switch:
@@ -79,6 +82,13 @@ def median(values: Sequence[float]) -> float:
     return low if low == high else (low + high) / 2
 
 
+def describe_range(sizes: Sequence[int]) -> str:
+    """Return the smallest and the largest of several numbers as text; ``-`` if there is none."""
+    if not sizes:
+        return "-"
+    return f"{min(sizes)} to {max(sizes)}" if min(sizes) < max(sizes) else str(min(sizes))
+
+
 def tabulate_ablation(found: Mapping[str, Sequence[Document]], short: str) -> ComparisonTable:
     """Return the table of the ablation.
 
@@ -103,7 +113,7 @@ def tabulate_ablation(found: Mapping[str, Sequence[Document]], short: str) -> Co
                 SWITCHES[name].text,
                 f"{median(errors):.3f}",
                 f"{max(errors):.3f}",
-                f"{min(sizes)} to {max(sizes)}" if sizes else "-",
+                describe_range(sizes),
                 f"{100 * converging / max(models, 1):.0f} %",
                 why,
             )
@@ -120,6 +130,8 @@ def compare_errors(errors: Sequence[float], literal: Sequence[float]) -> str:
     counted = f"smaller error with {better}, larger with {worse} of {len(errors)} seeds"
     if better + worse == 0:
         return f"{counted}: no effect on these seeds"
+    if better + worse < _FEWEST:
+        return f"{counted}: too few seeds for a sign test"
     probability = float(scipy.stats.binomtest(better, better + worse).pvalue)
     verdict = "a significant" if probability < _SIGNIFICANT else "no significant"
     return f"{counted}: {verdict} difference (sign test, p = {probability:.2g})"

@@ -17,7 +17,14 @@ from islands.figures.paper import (
     draw_validation,
 )
 from islands.model.model import Model
-from islands.reproduction.ablation import LITERAL, SWITCHES, median, selected_error, tabulate_ablation
+from islands.reproduction.ablation import (
+    LITERAL,
+    SWITCHES,
+    describe_range,
+    median,
+    selected_error,
+    tabulate_ablation,
+)
 from islands.reproduction.published import assess_published, explain_error, explain_parameter
 from islands.reproduction.searches import measure_errors, model_document, read_document, search_island
 from islands.reproduction.section import COMPARED, WHY, ComparisonTable, Section, SectionFigure
@@ -316,7 +323,7 @@ def _tabulate_goals(literal: Sequence[Document], short: str) -> ComparisonTable:
         (
             "terms",
             str(entry.model.size),
-            f"{min(sizes)} to {max(sizes)}" if sizes else "-",
+            describe_range(sizes),
             (
                 f"{sum(size == entry.model.size for size in sizes)} of {len(literal)} seeds have "
                 f"{entry.model.size} terms: the validation selects among all sizes"
