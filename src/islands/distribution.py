@@ -7,7 +7,7 @@ import re
 NAME = "islands-sysid"
 
 #: A requirement of the distribution: the name of a package, and the extra that needs it.
-_REQUIREMENT = re.compile(r"([\w.-]+)[^;]*(?:;\s*extra\s*==\s*['\"]([\w-]+)['\"]\s*)?")
+_REQUIREMENT = re.compile(r"([\w.-]+)(?:[^\w.;-][^;]*)?(?:;\s*extra\s*==\s*['\"]([\w-]+)['\"]\s*)?")
 
 
 def read_version() -> str:

