@@ -38,6 +38,9 @@ _INTERVALS = (0.3, 3.0)
 #: Structures of every size that are refined over all intervals.
 _MOST_PROMISING = 3
 
+#: Samples of all models that are still assessed once a stop is requested, at most; at least one model is.
+_STOPPED_SAMPLES = 500_000
+
 #: Name of the step that refines parameters.
 _REFINEMENT = "refinement of parameters"
 
@@ -57,11 +60,16 @@ def select_final_models(
 
     The best model is that with the least error on the validation data or, if the settings select by fitness,
     on the estimation data. If the parameters are constrained, a model must have Property 1; a size without
-    such a model is left out. Once a stop is requested, the remaining models have no standard errors.
+    such a model is left out. Once a stop is requested, the remaining models have no standard errors, and of a
+    long record only the sizes with the least errors on the validation data are assessed.
     """
     settings = problem.settings
-    kept = []
-    for entries in _group_by_size(candidates):
+    most = max(1, _STOPPED_SAMPLES // (split.estimation.samples + split.validation.samples))
+    kept: list[RankedModel] = []
+    groups = _group_by_size(candidates)
+    for entries in sorted(groups, key=lambda group: min(entry.order for entry in group)):
+        if len(kept) >= most and steps.skip("assessment of further models"):
+            break
         for candidate in _order_candidates(entries, settings, split.estimation):
             model = candidate.model
             if model.standard_errors is None and not steps.skip("standard errors"):
