@@ -25,7 +25,12 @@ from islands.reproduction.ablation import (
     selected_error,
     tabulate_ablation,
 )
-from islands.reproduction.published import assess_published, explain_error, explain_parameter
+from islands.reproduction.published import (
+    assess_published,
+    explain_error,
+    explain_parameter,
+    format_error,
+)
 from islands.reproduction.searches import measure_errors, model_document, read_document, search_island
 from islands.reproduction.section import COMPARED, WHY, ComparisonTable, Section, SectionFigure
 from islands.reproduction.tasks import Document, ReproductionOptions, Task
@@ -257,7 +262,7 @@ def _tabulate_errors(published: Document) -> ComparisonTable:
                     (
                         f"({number}), {unit}, {text}",
                         f"{value:.5f}",
-                        *(_number(document[kind][record][metric]) for kind in ("printed", "estimated")),
+                        *(format_error(document[kind][record][metric]) for kind in ("printed", "estimated")),
                         explain_error(value, document, record, metric)
                         + _compare_lengths(document, record, metric, value),
                     )
@@ -359,7 +364,7 @@ def _tabulate_seeds(literal: Sequence[Document], short: str) -> ComparisonTable:
             (
                 f"seed {each['seed']}",
                 str(selected["size"]),
-                *(_number(errors[record]["mape"], 4) for record in _RECORDS),
+                *(format_error(errors[record]["mape"], 4) for record in _RECORDS),
                 share,
                 f"another random sequence: {ratio:.2f} times the published error with {abs(terms)} "
                 f"{'more' if terms > 0 else 'fewer'} terms"
@@ -392,7 +397,7 @@ def _tabulate_preset(preset: Document, quick: bool) -> ComparisonTable:
                 (
                     f"at most {most} terms: {text}",
                     "-" if value is None else f"{value:.5f}",
-                    _number(error, 4),
+                    format_error(error, 4),
                     _compare(error, compared, name, found["size"]),
                 )
             )
@@ -408,10 +413,6 @@ def _compare(error: float | None, reference: float | None, name: str, size: int)
         f"{error / reference:.2f} times the error of {name} ({reference:.4f}), with {size} terms: seeded by "
         "forward selection, refined by the shooting error"
     )
-
-
-def _number(value: float | None, digits: int = 5) -> str:
-    return "diverges" if value is None else f"{value:.{digits}f}"
 
 
 def _shares(searches: Sequence[Document]) -> list[tuple[list[int], list[float]]]:

@@ -17,7 +17,12 @@ from islands.errors import RecordError
 from islands.figures.paper import Reproduced, draw_training_data, draw_validation
 from islands.io.records import fingerprint, preview, read_record
 from islands.io.records.reading_options import ReadingOptions
-from islands.reproduction.published import assess_published, explain_error, explain_parameter
+from islands.reproduction.published import (
+    assess_published,
+    explain_error,
+    explain_parameter,
+    format_error,
+)
 from islands.reproduction.searches import read_document
 from islands.reproduction.section import WHY, ComparisonTable, Section, SectionFigure
 from islands.reproduction.tasks import Document, ReproductionOptions, Task
@@ -232,8 +237,8 @@ def _tabulate_errors(document: Document, taken: Case2Record) -> ComparisonTable:
                 (
                     f"(14), {name}, {record}",
                     f"{value:.5f}",
-                    _number(computed) if "printed" in document else "-",
-                    _number(estimated),
+                    format_error(computed) if "printed" in document else "-",
+                    format_error(estimated),
                     _name_difference(document, taken) + explain_error(value, document, record, metric),
                 )
             )
@@ -261,10 +266,6 @@ def _tabulate_parameters(document: Document, taken: Case2Record) -> ComparisonTa
         for position, row in enumerate(document["parameters"], start=1)
     ]
     return ComparisonTable(f"Table 2, model (14), by constrained least squares; {taken.source}", tuple(rows))
-
-
-def _number(value: float | None) -> str:
-    return "diverges" if value is None else f"{value:.5f}"
 
 
 def _draw_data(taken: Case2Record, theme: str) -> Figure:

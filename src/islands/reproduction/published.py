@@ -176,6 +176,11 @@ def explain_error(published: float, document: Document, record: str, metric: str
     return sentence
 
 
+def format_error(error: float | None, digits: int = 5) -> str:
+    """Write an error of a free run; None if it diverged."""
+    return "diverges" if error is None else f"{error:.{digits}f}"
+
+
 def explain_parameter(row: Document) -> str:
     """Say why a parameter of Table 2 differs from least squares."""
     difference, error = abs(row["estimated"] - row["printed"]), row["standard_error"]
