@@ -38,8 +38,9 @@ _INTERVALS = (0.3, 3.0)
 #: Structures of every size that are refined over all intervals.
 _MOST_PROMISING = 3
 
-#: Samples of all models that are still assessed once a stop is requested, at most; at least one model is.
-_STOPPED_SAMPLES = 500_000
+#: Once a stop is requested: samples of all models that are still assessed, and of all models of one size
+#: that are still simulated on the validation data, at most; one model always is. Each takes half a second.
+_ASSESSED_SAMPLES, _SCREENED_SAMPLES = 250_000, 1_500_000
 
 #: Name of the step that refines parameters.
 _REFINEMENT = "refinement of parameters"
@@ -64,7 +65,7 @@ def select_final_models(
     long record only the sizes with the least errors on the validation data are assessed.
     """
     settings = problem.settings
-    most = max(1, _STOPPED_SAMPLES // (split.estimation.samples + split.validation.samples))
+    most = max(1, _ASSESSED_SAMPLES // (split.estimation.samples + split.validation.samples))
     kept: list[RankedModel] = []
     groups = _group_by_size(candidates)
     for entries in sorted(groups, key=lambda group: min(entry.order for entry in group)):
@@ -127,18 +128,22 @@ def estimate_candidates(
     worse than the seeds. All of them are simulated on the validation data with the parameters of the search.
     The best of every size are estimated again in the units of the record and, if the settings ask for it,
     refined over several shooting intervals. An estimator in the settings replaces both. Once a stop
-    is requested, the best structure of every remaining size is estimated only. Models whose free run on the
-    validation data diverges are left out, unless the settings select by fitness.
+    is requested, the best structure of every remaining size is estimated only; of a long record, the fittest
+    structures alone are compared. Models whose free run on the validation data diverges are left out, unless
+    the settings select by fitness.
     """
     settings, validation = problem.settings, subtract_offsets(split.validation, offsets)
     found = []
     groups = _group_by_size(_evaluate_structures(hall_of_fame, problem))
-    for done, individuals in enumerate(groups):
-        steps.report(f"estimation of the final models of {individuals[0].size} terms", done / len(groups))
-        count = (1, 0) if steps.skip("estimation of further structures") else _REFINED
+    for done, group in enumerate(groups):
+        steps.report(f"estimation of the final models of {group[0].size} terms", done / len(groups))
+        compared, count = group, _REFINED
+        if steps.skip("estimation of further structures"):
+            compared = _take_fittest(group, max(1, _SCREENED_SAMPLES // validation.samples))
+            count = (1, 0)
         if settings.select == "fitness":
             count = count[::-1]
-        kept = screen(individuals, validation, settings.maximum_lag, *count)
+        kept = screen(compared, validation, settings.maximum_lag, *count)
         found += _estimate_models(kept, settings, split, offsets, steps)
     return found
 
@@ -174,7 +179,7 @@ def screen(
     most_valid, fittest : int
         Number of individuals of each kind.
     """
-    by_fitness = sorted(individuals, key=lambda each: (each.fitness, each.key))
+    by_fitness = _take_fittest(individuals, len(individuals))
     models = {
         Model(
             each.regressors, each.theta, validation.input_names, validation.output_name, validation.dt
@@ -184,6 +189,11 @@ def screen(
     validated = _without_diverged(_validate(models, 1, validation, warm_up))
     by_error = [models[each.model] for each in validated]
     return list(unique_structures((*by_error[:most_valid], *by_fitness[:fittest])))
+
+
+def _take_fittest(individuals: Sequence[Individual], most: int) -> list[Individual]:
+    """Return at most so many individuals, fittest first."""
+    return sorted(individuals, key=lambda each: (each.fitness, each.key))[:most]
 
 
 def _estimate_models(
