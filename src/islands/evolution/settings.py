@@ -91,8 +91,8 @@ class Settings:
     tolerance : float
         Smallest error reduction ratio of a term that pruning keeps.
     err_target : str
-        An entry of ``ERR_TARGETS``: what the error reduction ratio refers to, ``output`` as in the paper or
-        ``increment``.
+        An entry of ``ERR_TARGETS``: what the error reduction ratio refers to, ``output`` as in the paper,
+        ``increment``, or ``output-single``, which does not orthogonalise.
     max_terms, max_height : int
         Largest number of genes of an individual; largest number of edges from the root of a gene to a leaf,
         including back-shifts.

@@ -16,23 +16,20 @@ from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
-from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.certificate import certify
-from islands.evolution.gp.gene_index import GeneIndex
+from islands.evolution.generation.evaluation import Evaluator, Limits
 from islands.evolution.presets import resolve_settings
 from islands.facade.fit import fit
 from islands.facade.identify import identify
 from islands.facade.setting_changes import SettingChanges
 from islands.kernels.jit_cache import cache_folder, ready
-from islands.kernels.pair_table import complete_pairs, pair_table
+from islands.kernels.pair_table import complete_pairs
 from islands.kernels.population import PopulationContext, empty_results, evaluate_individuals
 from islands.model.expression import Lagged
 from islands.model.model import make_model
-from islands.program.regressor_matrix import select_rows
 from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.coupled_model import CoupledModel
-from islands.simulation.layout import layout
-from islands.simulation.predictors import divergence_bound, free_run
+from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED
 
@@ -130,12 +127,7 @@ def _second_process() -> Iterator[None]:
 
 def _make_context(record: Dataset) -> PopulationContext:
     """Return the context of a population of a search on the record."""
-    settings = resolve_settings("hysteresis", SMALL)
-    index = GeneIndex(constraint(settings.constraints), (Lagged(0, 0), Lagged(0, 1)))
-    warm_up, bound = settings.maximum_lag, divergence_bound(record)
-    intervals = layout(record, warm_up, settings.shooting)
-    rows = select_rows(record, warm_up)
-    return PopulationContext(0, 1, 0.0, index.nodes, index.groups, pair_table(0), rows, intervals, bound)
+    return Evaluator(record, resolve_settings("hysteresis", SMALL), Limits(pairs=0)).context
 
 
 def _evaluate_individual(context: PopulationContext) -> None:

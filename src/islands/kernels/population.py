@@ -33,7 +33,7 @@ from islands.kernels.parameter_reduction import (
     reduce,
 )
 from islands.kernels.regressor_columns import Rows
-from islands.kernels.selection.err_selection import prune, prune_increments
+from islands.kernels.selection.err_selection import INCREMENT, OUTPUT, prune, prune_increments, prune_single
 from islands.kernels.simulation.simulate import Layout, simulate
 from islands.kernels.summation import total
 
@@ -78,7 +78,9 @@ class PopulationContext(NamedTuple):
     target : int
         The term that is y(k).
     previous : int
-        The term that is y(k-1), if pruning applies to the increments of the output; -1 if to the output.
+        The term that is y(k-1).
+    err_target : int
+        What the error reduction ratio of pruning refers to: `OUTPUT`, `INCREMENT` or `OUTPUT_SINGLE`.
     tolerance : float
         Smallest error reduction ratio that survives pruning.
     nodes : NodeArrays
@@ -96,6 +98,7 @@ class PopulationContext(NamedTuple):
 
     target: int
     previous: int
+    err_target: int
     tolerance: float
     nodes: NodeArrays
     groups: Groups
@@ -207,10 +210,12 @@ def _select_terms(terms, size, pruned, context, matrix, positions):
         positions[position] = position
     if not read_gram(terms[:size], context.target, context.pairs, matrix):
         return size, OVERFLOW
-    if pruned and context.previous < 0:
+    if pruned and context.err_target == OUTPUT:
         size = prune(matrix, size, context.tolerance, positions)
-    elif pruned:
+    elif pruned and context.err_target == INCREMENT:
         size = _prune_increments(terms[:size], context, matrix, positions)
+    elif pruned:
+        size = prune_single(matrix, size, context.tolerance, positions)
     if context.groups.sums.size > 0:
         size = drop_single_members(terms, positions, size, context.groups)
     if context.groups.targets.size > 0:

@@ -151,6 +151,22 @@ class Evaluator:
         return GeneIndex(self._constraint, (Lagged(0, 0), Lagged(0, 1)), self._root_rule)
 
     @property
+    def context(self) -> kernel.PopulationContext:
+        """Arguments of the kernel that all individuals share; valid until the next evaluation."""
+        return kernel.PopulationContext(
+            _TARGET,
+            _PREVIOUS,
+            ERR_TARGETS[self.settings.err_target],
+            self.settings.tolerance,
+            self._gene_index.nodes,
+            self._gene_index.groups,
+            self._pairs,
+            self._rows,
+            self._layout,
+            self._bound,
+        )
+
+    @property
     def memory(self) -> dict[str, tuple[int, int]]:
         """Bytes in use and byte limit of each cache, by name."""
         return {
@@ -265,24 +281,13 @@ class Evaluator:
         numbers = np.zeros((count, largest), np.int64)
         for row, structure in zip(numbers, structures, strict=True):
             row[: len(structure)] = structure
-        context = kernel.PopulationContext(
-            _TARGET,
-            _PREVIOUS if ERR_TARGETS[self.settings.err_target] else -1,
-            self.settings.tolerance,
-            self._gene_index.nodes,
-            self._gene_index.groups,
-            self._pairs,
-            self._rows,
-            self._layout,
-            self._bound,
-        )
         results = kernel.empty_results(count, largest)
         kernel.evaluate(
             numbers,
             np.array([len(structure) for structure in structures], np.int64),
             np.array(pruned, np.bool_),
             allowed * self._predicted,
-            context,
+            self.context,
             results,
         )
         evaluations = []

@@ -17,6 +17,9 @@ DEPENDENT = 1e-10
 #: Error reduction ratios with a smaller relative difference are equal: rounding must not decide between them.
 TIE = 1e-9
 
+#: What the error reduction ratio refers to: rules of `prune`, `prune_increments` and `prune_single`.
+OUTPUT, INCREMENT, OUTPUT_SINGLE = 0, 1, 2
+
 
 @kernel
 def select(
@@ -85,6 +88,22 @@ def prune(gram, terms, tolerance, kept):
     kept_terms = np.zeros(terms, np.bool_)
     for rank in range(selected):
         kept_terms[order[rank]] = err[rank] > tolerance
+    return find_true(kept_terms, kept)
+
+
+@kernel
+def prune_single(gram, terms, tolerance, kept):
+    """Find the terms whose error reduction ratio exceeds the tolerance, each alone; return their number.
+
+    ``kept``, out, int64 [term], are their positions, ascending. The ratio is the squared correlation of a
+    term with the target: no term is orthogonalised against the others.
+    """
+    kept_terms = np.zeros(terms, np.bool_)
+    energy = gram[terms, terms]
+    for position in range(terms):
+        product = gram[position, terms]
+        # A column that is zero has the product zero, so it is removed.
+        kept_terms[position] = product * product > tolerance * gram[position, position] * energy
     return find_true(kept_terms, kept)
 
 

@@ -21,6 +21,7 @@ from islands.kernels.interpreter import Program
 from islands.kernels.pair_table import clear, pair_table
 from islands.kernels.population import PopulationContext, empty_results, evaluate
 from islands.kernels.regressor_columns import Rows
+from islands.kernels.selection.err_selection import OUTPUT
 from islands.kernels.simulation.simulate import COMPLETE, Layout, simulate
 from islands.model.expression import Lagged
 from islands.performance.benchmark.clock import milliseconds
@@ -118,7 +119,7 @@ def _evaluation(state: Prepared, candidate: WorkloadModel, pruned: bool, cached:
     sizes, decided, allowed = np.array([size]), np.array([pruned]), np.full(size + 1, inf)
     pairs, program, theta = pair_table(_TABLE_BYTES), link(candidate.regressors), np.array(candidate.theta)
     context = PopulationContext(
-        0, -1, 0.0, index.nodes, index.groups, pairs, state.rows, state.step, state.bound
+        0, -1, OUTPUT, 0.0, index.nodes, index.groups, pairs, state.rows, state.step, state.bound
     )
     results = empty_results(1, size)
 

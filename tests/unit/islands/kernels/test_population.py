@@ -25,6 +25,7 @@ from islands.kernels.population import (
     empty_results,
     evaluate,
 )
+from islands.kernels.selection.err_selection import OUTPUT
 from islands.model.clusters import OUTPUT_AT_REST, clusters, steady_state
 from islands.model.expression import Lagged
 from islands.model.model import Model
@@ -102,6 +103,7 @@ def evaluated(
     context = PopulationContext(
         0,
         -1,
+        OUTPUT,
         TOLERANCE,
         store.nodes,
         make_groups(terms, constrained),

@@ -26,6 +26,7 @@ from islands.estimation.structure_selection.froe import froe
 from islands.estimation.least_squares import factorise
 from islands.kernels.simulation import simulate as kernel
 from islands.kernels.population import Groups, PopulationContext, empty_results, evaluate
+from islands.kernels.selection.err_selection import OUTPUT
 from islands.model.expression import Lagged
 from islands.model.model import Model
 from islands.model.parsing import parse
@@ -68,7 +69,7 @@ for name, groups in (("clusters", clusters), ("free", free)):
         results = empty_results(4, count)
         for array in results:
             array.fill(0)
-        context = PopulationContext(0, -1, 1e-4, store.nodes, groups, pair_table(1 << 16),
+        context = PopulationContext(0, -1, OUTPUT, 1e-4, store.nodes, groups, pair_table(1 << 16),
                                     select_rows(record, 4), cut, divergence_bound(record))
         pruned = np.array([True, False, False, False])
         evaluate(structures, sizes, pruned, np.full(count + 1, np.inf), context, results)

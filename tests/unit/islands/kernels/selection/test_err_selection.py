@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.kernels.parameter_reduction import reduce
-from islands.kernels.selection.err_selection import DEPENDENT, prune, prune_increments, select
+from islands.kernels.selection.err_selection import DEPENDENT, prune, prune_increments, prune_single, select
 
 
 def problem(seed, terms=6, rows=150):
@@ -62,6 +62,17 @@ def pruned(gram, terms, tolerance):
     count = prune(gram, terms, tolerance, kept)
     assert (kept[count:] == -7).all()
     return kept[:count].tolist()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.floats(0.0, 0.5))
+def test_pruning_of_single_terms_keeps_those_with_a_large_correlation(seed, terms, tolerance):
+    psi, y = problem(seed, terms)
+    psi[seed % terms] *= seed % 2  # a column that is zero has no correlation
+    kept = np.full(terms, -7)
+    count = prune_single(gram_of(psi, y), terms, tolerance, kept)
+    shares = (psi @ y) ** 2 / np.where(norms := (psi**2).sum(axis=1), norms, 1.0) / (y @ y)
+    assert kept[:count].tolist() == np.flatnonzero(shares > tolerance).tolist()
+    assert (kept[count:] == -7).all()
 
 
 def same(found, expected):
