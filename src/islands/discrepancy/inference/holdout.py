@@ -1,6 +1,7 @@
 """Hold-out validation: errors of a simulation with and without effects on samples that were not fitted."""
 
 from dataclasses import dataclass, replace
+from math import frexp
 
 import numpy as np
 
@@ -90,7 +91,7 @@ def measure_gain(
         ErrorMetrics(rmse[0], mape[0]),
         ErrorMetrics(rmse[1], mape[1]),
         noise_floor,
-        100 * (1 - rmse[1] / rmse[0]),
+        float(_compute_reduction(*(np.mean(each, keepdims=True) for each in _square(*errors)))[0]),
         (low, high),
     )
 
@@ -107,14 +108,27 @@ def bound_reduction(before: Signal, after: Signal, rng: np.random.Generator) -> 
     Parameters
     ----------
     before, after : ndarray, shape (samples,)
-        Errors.
+        Errors. Where both are zero, there is no reduction.
     """
     blocks = min(BLOCKS, before.size)
-    squares = [sum_by_block(each**2, blocks) for each in (before, after)]
+    squares = [sum_by_block(each, blocks) for each in _square(before, after)]
     drawn = rng.integers(0, blocks, (BOOTSTRAP_SAMPLES, blocks))
-    reductions = 100 * (1 - np.sqrt(squares[1][drawn].sum(axis=1) / squares[0][drawn].sum(axis=1)))
+    reductions = _compute_reduction(*(each[drawn].sum(axis=1) for each in squares))
     low, high = np.quantile(reductions, [0.025, 0.975])
     return float(low), float(high)
+
+
+def _square(before: Signal, after: Signal) -> list[Signal]:
+    """Return the squares of errors divided by a power of two: squares of tiny errors are zero."""
+    _, exponent = frexp(max(float(np.abs(each).max()) for each in (before, after)))
+    return [np.ldexp(each, -exponent) ** 2 for each in (before, after)]
+
+
+def _compute_reduction(before: Signal, after: Signal) -> Signal:
+    """Return the reductions of RMS errors in percent from their scaled squares."""
+    smallest = 1e-300  # of squares whose largest one is about 1: the ratio remains finite
+    reductions: Signal = 100 * (1 - np.sqrt(np.maximum(after, smallest) / np.maximum(before, smallest)))
+    return reductions
 
 
 def bound_gain(
