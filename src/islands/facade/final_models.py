@@ -192,7 +192,7 @@ def screen(
 
 
 def _take_fittest(individuals: Sequence[Individual], most: int) -> list[Individual]:
-    """Return at most so many individuals, fittest first."""
+    """Return the fittest individuals, the best one first."""
     return sorted(individuals, key=lambda each: (each.fitness, each.key))[:most]
 
 
