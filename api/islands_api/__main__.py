@@ -16,7 +16,7 @@ from islands_service.process.process_settings import freeze_garbage_collector, r
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.store.backends.cached_blobs import open_blobs
-from islands_service.store.database import StoreError
+from islands_service.store.database import DatabaseDamagedError, StoreError
 
 log = structlog.get_logger()
 
@@ -40,9 +40,9 @@ def main() -> int:
         listener = open_listener(settings.host, settings.port)
     except IslandsError as error:
         print(f"islands: {error}", file=sys.stderr)
-        if isinstance(error, StoreError):
-            return UNAVAILABLE
-        return MISCONFIGURED if isinstance(error, SettingsError) else FAILED
+        if isinstance(error, SettingsError | DatabaseDamagedError):
+            return MISCONFIGURED
+        return UNAVAILABLE if isinstance(error, StoreError) else FAILED
     server = HTTPServer(make_server_config(create_app(settings, store), settings))
     # The throughput is 50 % higher, and the slowest requests take a third of the time.
     freeze_garbage_collector()

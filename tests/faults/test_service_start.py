@@ -11,7 +11,7 @@ import trustme
 
 from islands_api.__main__ import main
 from islands_api.server.listener import open_listener
-from islands_service.liveness import FAILED, MISCONFIGURED
+from islands_service.liveness import MISCONFIGURED
 from support.command_line import succeed
 from support.processes import eventually, kill
 from support.service_processes import free_port, serving, started
@@ -49,17 +49,11 @@ def test_second_service_on_the_same_folder_is_refused(tmp_path: Path) -> None:
         service.ready()
 
 
-def test_database_that_cannot_be_read_ends_the_service(tmp_path: Path) -> None:
-    """The API ends with this error at every start."""
+@pytest.mark.parametrize("coordinators", ["0", "1"])
+def test_a_file_that_is_no_database_is_refused(tmp_path: Path, coordinators: str) -> None:
     (tmp_path / "islands.db").write_bytes(b"not a database" * 1000)
-    status, said = ended("--data-dir", tmp_path, "--port", free_port())
-    assert status == FAILED
-    assert "file is not a database" in said
-    assert said.count("api ended (1): it is started again") == 4
-    assert said.endswith(
-        "api has ended 5 times at its start (1): correct the error that it has printed above, and start the "
-        "service again"
-    )
+    said = refused("--data-dir", tmp_path, "--port", free_port(), ISLANDS_COORDINATORS=coordinators)
+    assert "the database cannot be used (file is not a database): restore a backup" in said
 
 
 def test_service_waits_for_a_database_that_does_not_answer_yet(tmp_path: Path) -> None:

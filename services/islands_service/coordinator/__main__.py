@@ -13,6 +13,7 @@ from islands_service.coordinator.coordinator_metrics import CoordinatorMetrics
 from islands_service.coordinator.process_restart import restart_process
 from islands_service.liveness import (
     FAILED,
+    MISCONFIGURED,
     UNAVAILABLE,
     StopRequest,
     stop_on_signals,
@@ -23,7 +24,7 @@ from islands_service.process.process_metrics import serve_metrics
 from islands_service.process.process_settings import limit_threads
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import service_settings
-from islands_service.store.database import StoreError
+from islands_service.store.database import DatabaseDamagedError, StoreError
 
 
 def main() -> int:
@@ -50,6 +51,8 @@ def main() -> int:
             Coordinator(settings, arguments.name, stopping, abandon, metrics).run()
     except IslandsError as error:
         print(f"coordinator: {error}", file=sys.stderr)
+        if isinstance(error, DatabaseDamagedError):
+            return MISCONFIGURED
         # The store and Ray are other processes, which may come back.
         return UNAVAILABLE if isinstance(error, StoreError | ClusterError) else FAILED
     return 0

@@ -47,6 +47,9 @@ _UNAVAILABLE_STATES = ("08", "57P", "25006")
 #: SQLSTATEs of PostgreSQL for a serialisation failure and a deadlock.
 _COLLISION_STATES = ("40001", "40P01")
 
+#: Names of the errors of SQLite for a file that is no database, and for one with damaged pages.
+_DAMAGED_NAMES = ("SQLITE_NOTADB", "SQLITE_CORRUPT")
+
 
 class StoreError(IslandsError):
     """The store cannot perform the operation."""
@@ -54,6 +57,10 @@ class StoreError(IslandsError):
 
 class StoreUnavailableError(StoreError):
     """The database does not answer. Nothing was written; try again."""
+
+
+class DatabaseDamagedError(StoreUnavailableError):
+    """The database is damaged or incomplete: stop the service and restore a backup."""
 
 
 class StoreCollisionError(StoreUnavailableError):
@@ -276,6 +283,10 @@ def _translate(error: DBAPIError) -> StoreError | None:
     text = str(cause)
     if state in _FULL_STATES or (isinstance(cause, sqlite3.Error) and _is_full(cause)):
         return StorageFullError(f"the disk of the database is full ({text}): nothing was written; make room")
+    if getattr(cause, "sqlite_errorname", "") in _DAMAGED_NAMES:
+        return DatabaseDamagedError(
+            f"the database cannot be used ({text}): restore a backup, or give another folder or database"
+        )
     if state in _COLLISION_STATES:
         return StoreCollisionError(
             f"a concurrent transaction conflicts ({text}): nothing was written; try again"

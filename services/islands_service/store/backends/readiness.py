@@ -11,7 +11,7 @@ import structlog
 from sqlalchemy import delete, false, inspect, make_url
 from sqlalchemy.exc import SQLAlchemyError
 
-from islands_service.store.database import Database, StoreError, StoreUnavailableError
+from islands_service.store.database import Database, DatabaseDamagedError, StoreError
 from islands_service.store.tables import metadata, retired_keys
 
 log = structlog.get_logger()
@@ -21,10 +21,6 @@ _MAX_SMALL_FILE = 2_000_000
 
 #: Least ratio of the pause between two complete checks to the duration of one.
 _PAUSE_RATIO = 50.0
-
-
-class DatabaseDamagedError(StoreUnavailableError):
-    """The database is damaged or incomplete: stop the service and restore a backup."""
 
 
 class Readiness:

@@ -16,6 +16,7 @@ from islands_service.store.backends import connections
 from islands_service.store.database import (
     CommitUnknownError,
     Database,
+    DatabaseDamagedError,
     StorageFullError,
     StoreCollisionError,
     StoreError,
@@ -163,7 +164,7 @@ def test_a_file_that_is_no_database_is_not_written(tmp_path):
     path = tmp_path / "islands.db"
     path.write_bytes(b"a record, perhaps" * 100)
     database = Database(f"sqlite:///{path}")
-    with pytest.raises(DBAPIError, match="not a database"), database.read():
+    with pytest.raises(DatabaseDamagedError, match=r"not a database.*restore a backup"), database.read():
         pass
     database.close()
     assert path.read_bytes() == b"a record, perhaps" * 100

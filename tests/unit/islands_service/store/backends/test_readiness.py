@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import Connection
 
 from islands_service.store import Store
-from islands_service.store.backends.readiness import DatabaseDamagedError
+from islands_service.store.database import DatabaseDamagedError
 from support.processes import eventually
 
 #: Size in bytes of the file of `large`.
