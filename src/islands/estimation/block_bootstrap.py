@@ -17,9 +17,9 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.estimation.constrained_least_squares import null_space
+from islands.estimation.damped_least_squares import compute_jacobian, find_directions, inner_products
 from islands.estimation.parameter_constraints import constraint
-from islands.estimation.shooting_residual import ShootingResidual, inner_products
+from islands.estimation.shooting_residual import ShootingResidual
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
 
@@ -61,18 +61,16 @@ def draw_parameters(
     theta = np.array(model.parameters)
     repeated = np.tile(theta, (draws, 1))
     constrained = constraint(constraints).constrain(model.regressors)
-    unit = np.where(theta == 0.0, 1.0, np.abs(theta))
     if isinstance(constrained, EvaluationOutcome) or constrained.regressors != model.regressors:
         return repeated
-    found = null_space(constrained.S * unit, constrained.c)
-    if isinstance(found, EvaluationOutcome) or not found[1].shape[1]:
+    directions = find_directions(theta, constrained)
+    if isinstance(directions, EvaluationOutcome) or not directions.shape[1]:
         return repeated
-    directions = unit[:, None] * found[1]
     residual = ShootingResidual(model, record, interval, warm_up)
     error = residual(theta)
     if error is None or not np.isfinite(error).all():
         return repeated
-    normal, gradient = _block_sums(residual.jacobian(theta, directions), error)
+    normal, gradient = _block_sums(compute_jacobian(residual, theta, error.size, directions), error)
     # The parameters are a minimum up to the tolerance of the refinement: replicates scatter about them.
     gradient -= np.add.reduce(gradient) / len(gradient)
     for index in range(draws):

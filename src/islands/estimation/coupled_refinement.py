@@ -1,8 +1,8 @@
 """Joint refinement of all equations of a coupled model on the error of their common simulation.
 
 Each equation is estimated with the measured values of the other outputs. Their noise biases the parameters,
-and the coupled simulation feeds errors from one equation to the other. Damped Gauss-Newton steps
-(Levenberg 1944, Marquardt 1963) minimise the error of the simulation that the model is used for.
+and the coupled simulation feeds errors from one equation to the other. The refinement minimises the error of
+the simulation that the model is used for.
 """
 
 from collections.abc import Callable
@@ -11,19 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.coupled_record import CoupledRecord
-from islands.estimation.constrained_least_squares import null_space
+from islands.estimation.damped_least_squares import Minimum, find_directions, minimise
 from islands.estimation.parameter_constraints import constraint
-from islands.estimation.shooting_residual import inner_products
-from islands.kernels.summation import dot
 from islands.simulation.coupled_free_run import CoupledSimulator
 from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.outcome import EvaluationOutcome
-
-#: Step of a central difference in units of the magnitudes of the parameters.
-_DIFFERENCE_STEP = 1e-5
-
-#: Initial damping, its factors after a failed and a successful step, and its largest value.
-_DAMPING, _INCREASE, _DECREASE, _MAX_DAMPING = 1e-3, 10.0, 0.2, 1e9
 
 #: Refinement ends when a step reduces the squared error by a smaller relative amount.
 _MIN_GAIN = 1e-6
@@ -71,21 +63,10 @@ def refine_coupled(
     error = residual(theta)
     if directions is None or error is None:
         return None
-    damping, steps = _DAMPING, 0
-    normal, gradient = residual.normal_equations(theta, error, directions)
-    while steps < max_steps and damping < _MAX_DAMPING and not stop():
-        damped = normal + damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
-        candidate = theta - directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
-        trial = residual(candidate)
-        if trial is None or not _square(trial) < _square(error):
-            damping *= _INCREASE
-            continue
-        gain = 1.0 - _square(trial) / _square(error)
-        theta, error, damping, steps = candidate, trial, damping * _DECREASE, steps + 1
-        if gain < _MIN_GAIN:
-            break
-        normal, gradient = residual.normal_equations(theta, error, directions)
-    return model.with_parameters(theta.tolist()) if steps else None
+    found = minimise(
+        *(residual, Minimum(theta, error, 0), directions), max_steps=max_steps, min_gain=_MIN_GAIN, stop=stop
+    )
+    return model.with_parameters(found.theta.tolist()) if found.steps else None
 
 
 class _CoupledResidual:
@@ -105,21 +86,6 @@ class _CoupledResidual:
         known = ~np.isnan(simulated.y[:, 0])
         return np.ascontiguousarray(((simulated.y - self._y)[known] / self._scale).T).reshape(-1)
 
-    def normal_equations(
-        self, theta: NDArray[np.float64], error: NDArray[np.float64], directions: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return J'J and J'r for steps along the directions; a direction that diverges contributes zeros."""
-        jacobian = np.zeros((directions.shape[1], error.size))
-        for row, direction in zip(jacobian, directions.T, strict=True):
-            ahead, behind = (self(theta + sign * _DIFFERENCE_STEP * direction) for sign in (1.0, -1.0))
-            if ahead is not None and behind is not None:
-                row[:] = (ahead - behind) / (2.0 * _DIFFERENCE_STEP)
-        return inner_products(jacobian, error, 0, error.size)
-
-
-def _square(error: NDArray[np.float64]) -> float:
-    return float(dot(error, 0, error, 0, error.size))
-
 
 def _find_directions(model: CoupledModel, constraints: str) -> NDArray[np.float64] | None:
     """Return the free directions of all parameters, shape (terms, free); None if a term is forced to zero."""
@@ -129,13 +95,11 @@ def _find_directions(model: CoupledModel, constraints: str) -> NDArray[np.float6
         constrained = constraint(constraints).constrain(single.regressors)
         if isinstance(constrained, EvaluationOutcome) or constrained.regressors != single.regressors:
             return None
-        theta = np.array(single.parameters)
-        unit = np.where(theta == 0.0, 1.0, np.abs(theta))
-        found = null_space(constrained.S * unit, constrained.c)
-        if isinstance(found, EvaluationOutcome):
+        free = find_directions(np.array(single.parameters), constrained)
+        if isinstance(free, EvaluationOutcome):
             return None
-        block = np.zeros((model.size, found[1].shape[1]))
-        block[begin : begin + single.size] = unit[:, None] * found[1]
+        block = np.zeros((model.size, free.shape[1]))
+        block[begin : begin + single.size] = free
         directions = np.hstack([directions, block])
         begin += single.size
     return directions

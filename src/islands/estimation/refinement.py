@@ -1,8 +1,7 @@
 """Refinement of parameters on the simulation error, within the null space of the constraints.
 
-Least squares minimises the one-step-ahead error. Refinement minimises the multiple-shooting error by damped
-Gauss-Newton steps (Levenberg 1944, Marquardt 1963). The constraints remain satisfied because the steps are
-restricted to their null space.
+Least squares minimises the one-step-ahead error. Refinement minimises the multiple-shooting error. The
+constraints remain satisfied because the steps are restricted to their null space.
 """
 
 from collections.abc import Callable
@@ -13,25 +12,19 @@ import numpy as np
 from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
-from islands.estimation.constrained_least_squares import null_space
 from islands.estimation.covariance import sandwich_of_jacobian
+from islands.estimation.damped_least_squares import (
+    Minimum,
+    compute_jacobian,
+    find_directions,
+    mean_square,
+    minimise,
+)
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.shooting_residual import ShootingResidual
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting
-
-#: Initial damping.
-_INITIAL_DAMPING = 1e-3
-
-#: Factor of the damping after a failed step.
-_DAMPING_INCREASE = 10.0
-
-#: Factor of the damping after a successful step.
-_DAMPING_DECREASE = 0.2
-
-#: Refinement ends when the damping reaches this value.
-_MAX_DAMPING = 1e9
 
 #: Refinement ends when a step reduces the squared error by a smaller relative amount.
 _MIN_GAIN = 1e-8
@@ -109,33 +102,24 @@ def refine(
     if np.isnan(started.mean_squared_error):
         raise RecordError(f"{record.output_name} has missing samples: refinement needs every sample")
     theta = np.array(model.parameters)
-    # Scale each parameter by its magnitude: the magnitudes differ by many orders.
-    unit = np.where(theta == 0.0, 1.0, np.abs(theta))
-    found = null_space(constrained.S * unit, constrained.c)
-    if isinstance(found, EvaluationOutcome):
-        return found
-    directions = unit[:, None] * found[1]
+    directions = find_directions(theta, constrained)
+    if isinstance(directions, EvaluationOutcome):
+        return directions
     residual = ShootingResidual(model, record, interval, warm_up)
     error = residual(theta)
     assert error is not None, "the initial simulation did not diverge"
-    before = residual.mean_square(error)
-    damping, steps = _INITIAL_DAMPING, 0
-    normal, gradient = residual.normal_equations(theta, error, directions)
-    while steps < max_steps and damping < _MAX_DAMPING and not stop():
-        damped = normal + damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
-        candidate = theta - directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
-        trial = residual(candidate) if constrained.has_signs(candidate) else None
-        if trial is None or not residual.mean_square(trial) < residual.mean_square(error):
-            damping *= _DAMPING_INCREASE
-            continue
-        gain = 1.0 - residual.mean_square(trial) / residual.mean_square(error)
-        theta, error, damping, steps = candidate, trial, damping * _DAMPING_DECREASE, steps + 1
-        normal, gradient = residual.normal_equations(theta, error, directions)
-        if gain < _MIN_GAIN:
-            break
-    after = residual.mean_square(error)
-    if not standard_errors:
-        return RefinedModel(model.with_parameters(theta.tolist()), before, after, steps)
-    covariance = sandwich_of_jacobian(residual.jacobian(theta, directions), error, residual.intervals)
-    errors = np.sqrt(np.maximum(np.einsum("ti,ij,tj->t", directions, covariance, directions), 0.0))
-    return RefinedModel(model.with_parameters(theta.tolist(), errors.tolist()), before, after, steps)
+    found = minimise(
+        *(residual, Minimum(theta, error, 0), directions),
+        max_steps=max_steps,
+        min_gain=_MIN_GAIN,
+        is_allowed=constrained.has_signs,
+        stop=stop,
+    )
+    errors = None
+    if standard_errors:
+        jacobian = compute_jacobian(residual, found.theta, found.error.size, directions)
+        covariance = sandwich_of_jacobian(jacobian, found.error, residual.intervals)
+        squares = np.einsum("ti,ij,tj->t", directions, covariance, directions)
+        errors = np.sqrt(np.maximum(squares, 0.0)).tolist()
+    refined = model.with_parameters(found.theta.tolist(), errors)
+    return RefinedModel(refined, mean_square(error), mean_square(found.error), found.steps)

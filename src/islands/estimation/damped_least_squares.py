@@ -1,0 +1,146 @@
+"""Minimisation of a sum of squares by damped Gauss-Newton steps (Levenberg 1944, Marquardt 1963).
+
+The steps are restricted to directions along which the constraints on the parameters remain satisfied. Inner
+products are summed in a written order, so that a result has the same bits on every number of threads.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.estimation.constrained_least_squares import null_space
+from islands.estimation.constraints.constraint import Constrained
+from islands.kernels.summation import dot
+from islands.simulation.outcome import EvaluationOutcome
+
+#: Step of a central difference in units of the parameters' magnitudes, a compromise between truncation and
+#: rounding errors.
+_DIFFERENCE_STEP = 1e-5
+
+#: Initial damping, its factors after a failed and a successful step, and the value at which the steps end.
+_DAMPING, _INCREASE, _DECREASE, _MAX_DAMPING = 1e-3, 10.0, 0.2, 1e9
+
+
+class Residual(Protocol):
+    """Error of a simulation as a function of its parameters."""
+
+    def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return simulation minus measurement, shape (samples,); None after a divergence."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Minimum:
+    """Parameters, their residual, and the number of accepted steps."""
+
+    theta: NDArray[np.float64]
+    error: NDArray[np.float64]
+    steps: int
+
+
+def minimise(
+    residual: Residual,
+    start: Minimum,
+    directions: NDArray[np.float64],
+    *,
+    max_steps: int,
+    min_gain: float,
+    is_allowed: Callable[[NDArray[np.float64]], bool] = lambda _theta: True,
+    stop: Callable[[], bool] = lambda: False,
+) -> Minimum:
+    """Minimise the mean square of a residual.
+
+    Parameters
+    ----------
+    residual : Residual
+    start : Minimum
+        Parameters at which the residual does not diverge.
+    directions : ndarray, shape (terms, free)
+        Directions of the steps. Its columns have the magnitudes of the parameters.
+    max_steps : int
+        Maximum number of accepted steps.
+    min_gain : float
+        The minimisation ends when a step reduces the mean square by a smaller relative amount.
+    is_allowed : callable
+        Whether a step to these parameters may be accepted.
+    stop : callable
+        Called before each step. Once it returns true, the minimisation ends with the parameters so far.
+    """
+    theta, error, steps = start.theta, start.error, start.steps
+    damping = _DAMPING
+    normal, gradient = normal_equations(residual, theta, error, directions)
+    while steps < max_steps and damping < _MAX_DAMPING and not stop():
+        damped = normal + damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
+        candidate = theta - directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
+        trial = residual(candidate) if is_allowed(candidate) else None
+        if trial is None or not mean_square(trial) < mean_square(error):
+            damping *= _INCREASE
+            continue
+        gain = 1.0 - mean_square(trial) / mean_square(error)
+        theta, error, damping, steps = candidate, trial, damping * _DECREASE, steps + 1
+        if gain < min_gain:
+            break
+        normal, gradient = normal_equations(residual, theta, error, directions)
+    return Minimum(theta, error, steps)
+
+
+def find_directions(
+    theta: NDArray[np.float64], constrained: Constrained
+) -> NDArray[np.float64] | EvaluationOutcome:
+    """Return the directions along which the constraints hold, shape (terms, free); INFEASIBLE without any.
+
+    Each parameter is scaled by its magnitude: the magnitudes differ by many orders.
+    """
+    unit = np.where(theta == 0.0, 1.0, np.abs(theta))
+    found = null_space(constrained.S * unit, constrained.c)
+    return found if isinstance(found, EvaluationOutcome) else unit[:, None] * found[1]
+
+
+def compute_jacobian(
+    residual: Residual, theta: NDArray[np.float64], samples: int, directions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the derivatives of a residual along directions, by central differences.
+
+    Returns
+    -------
+    ndarray, shape (free, samples)
+        A row is zero if the simulation diverges next to theta.
+    """
+    jacobian: NDArray[np.float64] = np.zeros((directions.shape[1], samples))
+    for row, direction in zip(jacobian, directions.T, strict=True):
+        forward, backward = (residual(theta + sign * _DIFFERENCE_STEP * direction) for sign in (1.0, -1.0))
+        if forward is not None and backward is not None:
+            row[:] = (forward - backward) / (2.0 * _DIFFERENCE_STEP)
+    return jacobian
+
+
+def normal_equations(
+    residual: Residual,
+    theta: NDArray[np.float64],
+    error: NDArray[np.float64],
+    directions: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return J'J and J'r for steps along the directions; a direction that diverges contributes zeros."""
+    return inner_products(compute_jacobian(residual, theta, error.size, directions), error, 0, error.size)
+
+
+def inner_products(
+    jacobian: NDArray[np.float64], error: NDArray[np.float64], first: int, last: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return J'J and J'r over the samples ``first`` to ``last - 1``; J is given transposed."""
+    free, samples = jacobian.shape
+    normal: NDArray[np.float64] = np.empty((free, free))
+    gradient: NDArray[np.float64] = np.empty(free)
+    flat, rows = jacobian.reshape(-1), last - first
+    for i in range(free):
+        gradient[i] = dot(flat, i * samples + first, error, first, rows)
+        for j in range(i + 1):
+            normal[i, j] = normal[j, i] = dot(flat, i * samples + first, flat, j * samples + first, rows)
+    return normal, gradient
+
+
+def mean_square(error: NDArray[np.float64]) -> float:
+    """Return the mean square of a residual."""
+    return float(dot(error, 0, error, 0, error.size)) / error.size
