@@ -6,7 +6,7 @@ import sys
 import structlog
 
 from islands.errors import IslandsError, SettingsError
-from islands_api.server.http_server import HTTPServer, make_server_config
+from islands_api.server.asgi import HTTPServer, make_server_config
 from islands_api.server.listener import open_listener
 from islands_api.web.app import create_app
 from islands_api.web.auth import make_verifier

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import islands
-from islands.figures.matrices.separability import draw_separability
+from islands.figures.separability import draw_separability
 from islands.figures.style import save
 from islands.systems.signals import sine
 

@@ -9,7 +9,7 @@ import pytest
 
 from support.repository import ROOT
 
-READER = "services/islands_service/settings/service_settings.py"
+READER = "services/islands_service/settings.py"
 
 #: Names in `os` that read the environment.
 NAMES = {"environ", "environb", "getenv", "getenvb"}

@@ -7,7 +7,7 @@ from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.constraints.constraint import Constraint
-from islands.estimation.constraints.constraint_parts import ClusterSums
+from islands.estimation.constraints.parts import ClusterSums
 from islands.estimation.least_squares import least_squares
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.model.clusters import OUTPUT_AT_REST, steady_state

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from islands.data.dataset import Dataset
 from islands.estimation.least_squares import least_squares
 from islands.estimation.structure_selection.froe import froe
-from islands.kernels.selection import err_selection
+from islands.kernels import err_selection
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor

@@ -22,7 +22,7 @@ from fastapi import FastAPI
 from sqlalchemy import Connection
 
 from islands.io.records import write_record
-from islands_api.server.http_server import HTTPServer, make_server_config
+from islands_api.server.asgi import HTTPServer, make_server_config
 from islands_api.server.listener import open_listener
 from islands_api.web.app import create_app
 from islands_api.web.auth import LOCAL_OWNER

@@ -1,1 +1,1 @@
-"""HTTP server: listening socket, HTTP protocol and uvicorn's configuration. Read `http_server` first."""
+"""HTTP server: listening socket, HTTP protocol and uvicorn's configuration. Read `asgi` first."""

@@ -22,12 +22,12 @@ from islands_api.web.dependencies import (
 from islands_api.web.event_hub import JobEventHub
 from islands_api.web.limits.owner_counts import OwnerCounts
 from islands_api.web.limits.owner_slots import OwnerSlots
-from islands_api.web.limits.rate_limit import RateLimiter
+from islands_api.web.limits.rate import RateLimiter
 from islands_api.web.middleware import BodyLimit, HeadRequests, RequestLogging, RootPath, SameOrigin
 from islands_api.web.problems import ProblemDocument
 from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.routes import ROUTERS
-from islands_api.web.uploads.upload_admission import UploadAdmission
+from islands_api.web.uploads.admission import UploadAdmission
 from islands_service.liveness import EVERY, send_heartbeat
 from islands_service.outbound.checked_client import make_checked_client
 from islands_service.outbound.delivery_sender import DeliverySender

@@ -10,10 +10,10 @@ from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.event_hub import JobEventHub
 from islands_api.web.limits.owner_counts import OwnerCounts
 from islands_api.web.limits.owner_slots import OwnerSlots
-from islands_api.web.limits.rate_limit import RateLimiter
+from islands_api.web.limits.rate import RateLimiter
 from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.responses import QueuePlaces
-from islands_api.web.uploads.upload_admission import UploadAdmission
+from islands_api.web.uploads.admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
 from islands_service.outbound.checked_client import CheckedClient
 from islands_service.settings import ServiceSettings

@@ -24,7 +24,7 @@ from islands_api.web.auth import Principal, authenticate, check_scope
 from islands_api.web.middleware import FORM_OVERHEAD_BYTES
 from islands_api.web.problems import MalformedBodyError, PayloadTooLargeError, UnsupportedMediaTypeError
 from islands_api.web.uploads.body_reader import BodyReader
-from islands_api.web.uploads.upload_request import UploadRequest
+from islands_api.web.uploads.request import UploadRequest
 
 #: Maximum number of digits of an integer: parsing takes time proportional to the square of the digits.
 _MAX_INTEGER_DIGITS = 400

@@ -11,8 +11,8 @@ from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.finding import Finding, Value
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.surrogates import STRENGTHS
-from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
-from islands.figures.diagnosis.form_values import draw_effect_shape, draw_free_forms, list_free_forms
+from islands.figures.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.form_values import draw_effect_shape, draw_free_forms, list_free_forms
 from islands.figures.style import save
 from islands_service.reports.identification_report import TEMPLATES
 

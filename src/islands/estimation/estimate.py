@@ -7,8 +7,8 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
+from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.constraints.constraint import Constrained
-from islands.estimation.constraints.constraint_checks import check_constraints
 from islands.estimation.parameter_constraints import constraint
 from islands.model.expression import Lagged
 from islands.model.model import Model, canonical_order

@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 from islands.errors import SettingsError
 from islands.estimation.constraints.constraint import Constraint
-from islands.estimation.constraints.constraint_parser import parse_statements
-from islands.estimation.constraints.constraint_parts import ClusterSums, StaticGain, Symmetry
+from islands.estimation.constraints.parser import parse_statements
+from islands.estimation.constraints.parts import ClusterSums, StaticGain, Symmetry
 from islands.model.clusters import OUTPUT_AT_REST, steady_state
 from islands.model.expression import Expression
 from islands.model.regressor import Regressor

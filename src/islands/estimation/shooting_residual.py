@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.kernels.simulation.simulate import DIVERGED, Layout, simulate
+from islands.kernels.simulate import DIVERGED, Layout, simulate
 from islands.model.model import Model
 from islands.program.term_pool import link
 from islands.simulation.layout import layout

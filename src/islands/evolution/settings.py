@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from islands.data.averaging import check_average
 from islands.data.input_lead import check_feedthrough
 from islands.errors import SettingsError, check_at_least, check_probabilities, lookup
-from islands.estimation.constraints.constraint_parser import FORMS
+from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.estimation.structure_selection.input_delays import check_delays

@@ -43,8 +43,8 @@ from islands.facade.final_models import estimate_candidates, select_final_models
 from islands.facade.results.result import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.feedthrough_selection import select_feedthrough
+from islands.facade.trials.library import make_trial_library
 from islands.facade.trials.rate_selection import select_rate
-from islands.facade.trials.trial_library import make_trial_library
 from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set

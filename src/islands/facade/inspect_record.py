@@ -12,15 +12,15 @@ from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.inspection.channel import channels
-from islands.inspection.columns.column_roles import ColumnChoice, choose_columns
-from islands.inspection.columns.record_inspection import (
+from islands.inspection.column_roles import ColumnChoice, choose_columns
+from islands.inspection.record_facts import RecordFacts, measure_facts
+from islands.inspection.record_inspection import (
     MOST_ROWS,
     InspectedColumn,
     InspectedSampling,
     RecordInspection,
 )
-from islands.inspection.columns.stamp_regularity import NO_BREAKS, TimeStamps, describe_stamps
-from islands.inspection.record_facts import RecordFacts, measure_facts
+from islands.inspection.stamp_regularity import NO_BREAKS, TimeStamps, describe_stamps
 from islands.io.records.column_names import find_column, split_structures
 from islands.io.records.preview import ColumnPreview, Preview, preview_table
 from islands.io.records.reader import open_record

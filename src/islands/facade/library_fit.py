@@ -42,8 +42,8 @@ from islands.evolution.search_result import (
 from islands.evolution.settings import Settings
 from islands.facade.final_models import screen
 from islands.facade.trials.feedthrough_selection import select_feedthrough
+from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.rate_selection import select_rate
-from islands.facade.trials.trial_library import TrialLibrary
 from islands.model.candidate_library import full_set
 from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome

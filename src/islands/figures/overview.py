@@ -11,8 +11,8 @@ from islands.figures.style import REMARK, STEPS, blank, finish, label
 from islands.figures.themes import Theme, themed_style
 from islands.inspection.channel import Channel, channels
 from islands.inspection.excitation import estimate_spectrum
+from islands.inspection.impulse_response import estimate_impulse_response
 from islands.inspection.record_facts import RecordFacts
-from islands.inspection.response.impulse_response import estimate_impulse_response
 
 #: Inputs that are drawn, at most.
 _MOST_INPUTS = 3

@@ -16,7 +16,7 @@ from islands.figures.convergence import draw_convergence, draw_front, draw_islan
 from islands.figures.free_run import draw_free_run, draw_free_run_panel
 from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop, draw_loop_panel
-from islands.figures.over_time.record import draw_record
+from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
 from islands.model.model import Model
 from islands.simulation.predictors import free_run

@@ -1,7 +1,7 @@
 """Dead time between an input and the output, with its confidence.
 
 The dead time is searched at the rate of the record. If it is long, means of several samples locate it first.
-See `islands.inspection.response.lag_comparison`.
+See `islands.inspection.lag_comparison`.
 """
 
 from math import ceil, floor
@@ -11,7 +11,7 @@ import numpy as np
 from islands.data.averaging import average_samples
 from islands.data.dataset import Dataset
 from islands.inspection.fact import Fact
-from islands.inspection.response.lag_comparison import FRACTIONS, LARGEST, Onset, compare_lags
+from islands.inspection.lag_comparison import FRACTIONS, LARGEST, Onset, compare_lags
 
 #: Means of this many samples search for dead times that are longer than `LARGEST`.
 _COARSE = (4, 16)

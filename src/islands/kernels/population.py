@@ -20,6 +20,7 @@ from islands.kernels.constrained_lstsq import (
     from_columns,
     from_gram,
 )
+from islands.kernels.err_selection import INCREMENT, OUTPUT, prune, prune_increments, prune_single
 from islands.kernels.jit_cache import kernel
 from islands.kernels.pair_table import Pairs, complete_pairs, read_gram
 from islands.kernels.parameter_reduction import (
@@ -33,8 +34,7 @@ from islands.kernels.parameter_reduction import (
     reduce,
 )
 from islands.kernels.regressor_columns import Rows
-from islands.kernels.selection.err_selection import INCREMENT, OUTPUT, prune, prune_increments, prune_single
-from islands.kernels.simulation.simulate import Layout, simulate
+from islands.kernels.simulate import Layout, simulate
 from islands.kernels.summation import total
 
 # The first three codes are the status codes of `simulate`.

@@ -11,7 +11,7 @@ from islands.data.coupled_record import CoupledRecord
 from islands.data.signal_map import map_signals, match_rate
 from islands.errors import RecordError, SettingsError
 from islands.kernels.interpreter import Program
-from islands.kernels.simulation.simulate_coupled import LANES, simulate_coupled
+from islands.kernels.simulate_coupled import LANES, simulate_coupled
 from islands.kernels.summation import dot
 from islands.program.term_pool import link
 from islands.simulation.coupled_model import CoupledModel

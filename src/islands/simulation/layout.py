@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.kernels.simd import padded_size
-from islands.kernels.simulation.simulate import WIDTHS, Layout
+from islands.kernels.simulate import WIDTHS, Layout
 
 #: Fixed cost of an instruction, in units of its cost per lane.
 _OVERHEAD_LANES = 24

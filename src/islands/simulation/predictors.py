@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.data.signal_map import map_signals
 from islands.errors import SettingsError
-from islands.kernels.simulation.simulate import Layout, simulate
+from islands.kernels.simulate import Layout, simulate
 from islands.kernels.summation import total
 from islands.model.model import Model
 from islands.program.term_pool import link

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import RecordError
-from islands.estimation.constraints.constraint_checks import ConstraintCheck, check_constraints
+from islands.estimation.constraints.checks import ConstraintCheck, check_constraints
 from islands.estimation.parameter_constraints import count_free_parameters
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome

@@ -27,7 +27,7 @@ def test_arguments_precede_the_environment_and_that_precedes_defaults(monkeypatc
 
 @pytest.mark.parametrize(("cores", "coordinators"), [(1, 1), (2, 2), (64, 4)])
 def test_one_coordinator_for_each_core_is_the_default_up_to_four(monkeypatch, cores, coordinators):
-    module = importlib.import_module("islands_service.settings.service_settings")
+    module = importlib.import_module("islands_service.settings")
     monkeypatch.setattr(module, "count_cpus", lambda: cores)
     assert service_settings().coordinators == coordinators
     assert service_settings(coordinators=0).coordinators == 0

@@ -11,7 +11,7 @@ import islands
 from islands.data.averaging import AUTO
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError
-from islands.estimation.constraints.constraint_parser import FORMS
+from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.progress import Steps

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from islands.errors import SettingsError, lookup
 from islands.evolution.progress import Steps, StoppedError
-from islands.figures.matrices.confusion import draw_confusion
+from islands.figures.confusion import draw_confusion
 from islands.figures.style import save
 from islands.performance.trials.cases import CASES, SimulatedCase
 from islands.performance.trials.injection.noise import NOISES

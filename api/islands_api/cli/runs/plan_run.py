@@ -13,7 +13,7 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.planning.experiment_plan import DecisiveLimits, ExperimentPlan
 from islands.discrepancy.planning.planned_input import InputForm, InputLimits, PlannedInput
 from islands.errors import SettingsError, lookup
-from islands.figures.matrices.separability import draw_separability
+from islands.figures.separability import draw_separability
 from islands.figures.style import save
 from islands.io.diagnosis_json import as_json
 from islands.io.plan_json import plan_document

@@ -6,7 +6,7 @@ The import takes a second, since it loads the analysis and the figures.
 from collections.abc import Iterator
 from pathlib import Path
 
-from islands.figures.over_time.monitored_states import draw_monitored_states
+from islands.figures.monitored_states import draw_monitored_states
 from islands.figures.style import save
 from islands.io.checkpoints.monitor_document import monitor_json
 from islands.io.checkpoints.monitor_state import monitor_from_json

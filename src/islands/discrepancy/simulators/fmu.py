@@ -16,9 +16,9 @@ from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.record_channels import find_channel, make_nominal_context
 from islands.errors import RecordError
 from islands.systems.fmu.fmi_description import FmiInterface
-from islands.systems.fmu.fmu_instance import FmuRun, load_fmu
-from islands.systems.fmu.fmu_model import FmuInitialValue, FmuModel
-from islands.systems.fmu.fmu_simulation import simulate_fmu
+from islands.systems.fmu.instance import FmuRun, load_fmu
+from islands.systems.fmu.model import FmuInitialValue, FmuModel
+from islands.systems.fmu.simulation import simulate_fmu
 from islands.systems.ode.lane_values import LaneInput
 from islands.systems.ode.ode_expression import FMU, OdeExpression, Operation, Symbol
 from islands.systems.ode.ode_program import OdeProgram, generate_program

@@ -1,4 +1,4 @@
 """Constraints that a user can state: their parts, their text and their verification.
 
-Read `constraint_parts` first.
+Read `parts` first.
 """

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import SettingsError
-from islands.estimation.constraints.constraint_parts import (
+from islands.estimation.constraints.elimination import eliminate
+from islands.estimation.constraints.parts import (
     ClusterSums,
     Equality,
     FixedPoint,
@@ -18,7 +19,6 @@ from islands.estimation.constraints.constraint_parts import (
     StaticGain,
     Symmetry,
 )
-from islands.estimation.constraints.elimination import eliminate
 from islands.model.clusters import clusters
 from islands.model.expression import Apply, Constant, Expression, Lagged
 from islands.model.primitives import ADD, MUL

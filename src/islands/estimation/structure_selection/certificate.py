@@ -16,7 +16,7 @@ from scipy.spatial.distance import squareform
 
 from islands.estimation.forward_selection import SelectionProblem, Structure
 from islands.estimation.structure_selection.froe import froe
-from islands.kernels.selection.subset_search import Tree, exchange, search
+from islands.kernels.subset_search import Tree, exchange, search
 
 #: Largest number of candidates; the time of a node grows with its cube.
 MOST_CANDIDATES = 300

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.kernels.selection.err_selection import select
+from islands.kernels.err_selection import select
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from islands.kernels.selection.err_selection import INCREMENT, OUTPUT, OUTPUT_SINGLE
+from islands.kernels.err_selection import INCREMENT, OUTPUT, OUTPUT_SINGLE
 
 #: Targets by name. The paper refers the ERR to y(k). On an oversampled record y(k-1) explains nearly all of
 #: y(k), so that pruning with the paper's tolerance leaves one or two terms of any model. ``increment`` refers

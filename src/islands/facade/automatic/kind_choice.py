@@ -16,7 +16,7 @@ from islands.estimation.parameter_constraints import constraint
 from islands.evolution.progress import Steps, StoppedError
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.facade.automatic.kind_trials import NO_DEAD_TIME, ROUNDING, KindTrials, percent, try_kinds
-from islands.facade.trials.trial_library import TrialLibrary
+from islands.facade.trials.library import TrialLibrary
 from islands.inspection.rest import check_rest
 from islands.validation.recommendation import recommend
 

@@ -14,7 +14,7 @@ from islands.evolution.progress import ProgressCallback, Steps, Stop, ignore_pro
 from islands.evolution.search_result import SearchResult
 from islands.facade.automatic.kind_choice import Choice, choose_kind
 from islands.facade.library_fit import FitSettings, fit_library
-from islands.facade.trials.trial_library import make_trial_library, take_library
+from islands.facade.trials.library import make_trial_library, take_library
 
 
 def choose_preset(

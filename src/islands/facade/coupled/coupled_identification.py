@@ -29,8 +29,8 @@ from islands.facade.fit import fit
 from islands.facade.identify import SearchCallback, identify
 from islands.facade.results.result import Result
 from islands.facade.setting_changes import SettingChanges
+from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.rate_selection import select_rate
-from islands.facade.trials.trial_library import TrialLibrary, make_trial_library, take_library
 from islands.io.data_frames import as_record
 from islands.simulation.coupled_model import CoupledModel
 

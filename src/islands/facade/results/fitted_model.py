@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, lookup
-from islands.estimation.constraints.constraint_checks import ConstraintCheck
+from islands.estimation.constraints.checks import ConstraintCheck
 from islands.estimation.estimators import least_squares_bias
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.facade.results.assessed_model import AssessedModel

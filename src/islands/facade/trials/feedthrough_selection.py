@@ -7,8 +7,8 @@ from islands.data.input_lead import advance_inputs, check_feedthrough
 from islands.data.split import Split
 from islands.errors import RecordError
 from islands.estimation.structure_selection.direct_feedthrough import find_direct_inputs
+from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.rate_selection import compute_errors
-from islands.facade.trials.trial_library import TrialLibrary
 
 #: Largest error on the validation data relative to that of models without feedthrough.
 LARGEST_RATIO = 0.98

@@ -23,7 +23,7 @@ from islands.estimation.structure_selection.deviations import (
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.swap_search import swap_search
 from islands.evolution.progress import Steps, StoppedError
-from islands.facade.trials.trial_library import TrialLibrary
+from islands.facade.trials.library import TrialLibrary
 from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run

@@ -26,7 +26,7 @@ from islands.estimation.structure_selection.deviations import (
     subtract_offsets,
 )
 from islands.evolution.progress import Steps
-from islands.facade.trials.trial_library import TrialLibrary
+from islands.facade.trials.library import TrialLibrary
 from islands.inspection.oversampling import COUNTS, is_noisy, keeps_bandwidth
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome

@@ -10,13 +10,13 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.io.records.formats.excel import read_workbook
 from islands.io.records.formats.hdf5 import read_hdf5
-from islands.io.records.formats.mat.mat_file import read_matlab
+from islands.io.records.formats.mat.file import read_matlab
 from islands.io.records.formats.mdf import read_mdf
 from islands.io.records.formats.npz import read_archive
 from islands.io.records.formats.packed import PACKED, open_packed
 from islands.io.records.formats.parquet import read_parquet
 from islands.io.records.formats.tdms import read_tdms
-from islands.io.records.formats.text.text_table import read_delimited
+from islands.io.records.formats.text.table import read_delimited
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.table import Table
 from islands.io.records.table_reading import read_table

@@ -5,7 +5,7 @@ from math import floor, isfinite
 
 import numpy as np
 
-from islands.estimation.constraints.constraint_checks import ConstraintCheck
+from islands.estimation.constraints.checks import ConstraintCheck
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.model.equations import (
     named_equation,

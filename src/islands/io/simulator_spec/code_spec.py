@@ -16,8 +16,8 @@ from islands.errors import SettingsError
 from islands.io.simulator_spec.ode_spec import OdeForceSpec, OdeParameterSpec
 from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
 from islands.systems.fmu.fmi_description import read_description
-from islands.systems.fmu.fmu_model import FmuModel, FmuParameterChoice, choose_variables
-from islands.systems.fmu.fmu_system import make_fmu_system, render_extension
+from islands.systems.fmu.model import FmuModel, FmuParameterChoice, choose_variables
+from islands.systems.fmu.system import make_fmu_system, render_extension
 from islands.systems.ode.equation_parser import MAX_CHARACTERS
 from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.system_document import MAX_PARAMETERS, describe_system, make_force, make_parameter

@@ -16,13 +16,13 @@ from islands.errors import ModelError
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.gp.gene_index import GeneIndex
+from islands.kernels.err_selection import OUTPUT
 from islands.kernels.gram import gram
 from islands.kernels.interpreter import Program
 from islands.kernels.pair_table import clear, pair_table
 from islands.kernels.population import PopulationContext, empty_results, evaluate
 from islands.kernels.regressor_columns import Rows
-from islands.kernels.selection.err_selection import OUTPUT
-from islands.kernels.simulation.simulate import COMPLETE, Layout, simulate
+from islands.kernels.simulate import COMPLETE, Layout, simulate
 from islands.model.expression import Lagged
 from islands.performance.benchmark.clock import milliseconds
 from islands.performance.benchmark.workload import INTERVAL, WARM_UP, WorkloadModel

@@ -1,1 +1,1 @@
-"""Functional Mock-up Units (FMUs) of FMI 2.0 and 3.0. Read `fmi_description` first, then `fmu_model`."""
+"""Functional Mock-up Units (FMUs) of FMI 2.0 and 3.0. Read `fmi_description` first, then `model`."""

@@ -9,7 +9,7 @@ from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.context import SimulationContext
-from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.discrepancy import DISCREPANCY_FIGURES
 from islands.io.simulator_spec.document import extended_document
 from support.simulated_records import recorded
 

@@ -14,7 +14,7 @@ from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.noise_floor import noise_variance_from_periods
 from islands.discrepancy.interfaces.segments import count_runs, fill_gaps, find_runs, split_at_gaps
 from islands.facade.explain_residual import explain_residual
-from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.discrepancy import DISCREPANCY_FIGURES
 from support.simulated_records import recorded, wave
 
 RNG = np.random.default_rng(3)

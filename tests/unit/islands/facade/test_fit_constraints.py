@@ -8,7 +8,7 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
-from islands.estimation.constraints.constraint_checks import check_constraints
+from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.estimate import estimate
 from islands.estimation.estimators import estimate_with
 from islands.estimation.refinement import refine

@@ -11,7 +11,7 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
-from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.discrepancy import DISCREPANCY_FIGURES
 from islands.figures.free_run import draw_free_run
 from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop

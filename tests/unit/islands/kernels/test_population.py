@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.structure_selection.froe import froe
+from islands.kernels.err_selection import OUTPUT
 from islands.kernels.pair_table import FREE, Pairs
 from islands.kernels.population import (
     ABANDONED,
@@ -25,7 +26,6 @@ from islands.kernels.population import (
     empty_results,
     evaluate,
 )
-from islands.kernels.selection.err_selection import OUTPUT
 from islands.model.clusters import OUTPUT_AT_REST, clusters, steady_state
 from islands.model.expression import Lagged
 from islands.model.model import Model

@@ -24,9 +24,9 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.estimation.structure_selection.froe import froe
 from islands.estimation.least_squares import factorise
-from islands.kernels.simulation import simulate as kernel
+from islands.kernels import simulate as kernel
 from islands.kernels.population import Groups, PopulationContext, empty_results, evaluate
-from islands.kernels.selection.err_selection import OUTPUT
+from islands.kernels.err_selection import OUTPUT
 from islands.model.expression import Lagged
 from islands.model.model import Model
 from islands.model.parsing import parse

@@ -5,7 +5,7 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands.kernels.simulation.simulate import WIDTHS
+from islands.kernels.simulate import WIDTHS
 from islands.simulation.layout import layout
 
 SEGMENTS = (230, 4, 5, 120, 6)

@@ -19,7 +19,7 @@ from islands.facade.record_monitor import (
     parse_monitored,
     reject_record,
 )
-from islands.figures.over_time.monitored_states import draw_monitored_states
+from islands.figures.monitored_states import draw_monitored_states
 from islands.figures.style import save
 from islands.io.checkpoints.monitor_document import monitor_json
 from islands.io.checkpoints.monitor_state import (

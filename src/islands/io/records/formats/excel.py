@@ -12,8 +12,8 @@ from typing import Any
 
 from islands.distribution import describe_missing_extra
 from islands.errors import RecordError, suggest
+from islands.io.records.formats.text.table import DelimitedText, split_table
 from islands.io.records.formats.text.table_start import has_samples
-from islands.io.records.formats.text.text_table import DelimitedText, split_table
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.size_limits import (
     MOST_CELLS,

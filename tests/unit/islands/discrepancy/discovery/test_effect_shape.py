@@ -6,7 +6,7 @@ import pytest
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.effects import CATALOGUE
-from islands.figures.diagnosis.form_values import draw_effect_shape
+from islands.figures.form_values import draw_effect_shape
 from islands.performance.trials.cases import CASES
 from islands.performance.trials.injection.measurement import inject
 

@@ -12,7 +12,7 @@ from islands.discrepancy.effects.free_forms import FREE_FORMS
 from islands.discrepancy.interfaces.context import SimulationContext
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
-from islands.figures.diagnosis.form_values import draw_free_forms
+from islands.figures.form_values import draw_free_forms
 from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import simulate_spec
 from islands.performance.trials.trial import Trial, run_trial

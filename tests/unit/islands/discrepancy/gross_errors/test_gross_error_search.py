@@ -12,7 +12,7 @@ from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError
-from islands.figures.diagnosis.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.discrepancy import DISCREPANCY_FIGURES
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.ode_spec import OdeSpec

@@ -13,7 +13,7 @@ from islands.discrepancy.planning import decisive_experiment
 from islands.discrepancy.planning.channel_noise import NoiseOrigin
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError, SettingsError
-from islands.figures.matrices.separability import draw_separability
+from islands.figures.separability import draw_separability
 from islands.io.diagnosis_json import as_json
 from islands.io.plan_json import plan_document
 from islands.io.result_text.plan_text import plan_text

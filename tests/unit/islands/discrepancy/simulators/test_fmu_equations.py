@@ -27,8 +27,8 @@ from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.systems.fmu.fmi_description import FmiVariable, read_description
-from islands.systems.fmu.fmu_model import choose_variables
-from islands.systems.fmu.fmu_system import make_fmu_system
+from islands.systems.fmu.model import choose_variables
+from islands.systems.fmu.system import make_fmu_system
 from support.oscillator_fmus import write_oscillator
 from support.simulated_records import FMUS, recorded, wave
 

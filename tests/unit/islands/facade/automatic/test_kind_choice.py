@@ -15,7 +15,7 @@ from islands.facade.automatic.kind_choice import choice_from_document
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
 from islands.facade.library_fit import FitSettings
 from islands.facade.trials.held_out_error import hold_out, measure_library
-from islands.facade.trials.trial_library import take_library
+from islands.facade.trials.library import take_library
 from support.portfolio_records import KINDS as RECORDS
 
 #: Smallest search, for the settings of its result.

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from islands.io.records import read_columns, read_record
-from islands.io.records.formats.mat.mat_file import read_matlab
+from islands.io.records.formats.mat.file import read_matlab
 from islands.io.records.formats.mat.v73 import read_variables
 from islands.io.records.formats.mat.workspace import ADVICE
 

@@ -1,0 +1,312 @@
+"""Settings of the service, read from environment variables. Each field is ``ISLANDS_`` and its name."""
+
+import os
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from platformdirs import user_data_path
+from pydantic import Field, ValidationError, model_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from islands.available_cpus import count_cpus
+from islands.errors import SettingsError
+from islands_service.setting_checks import (
+    DEFAULT_ROLES,
+    BlobStore,
+    Buckets,
+    Count,
+    Hosts,
+    Networks,
+    Positive,
+    check_separate,
+    read_secret,
+)
+
+#: Addresses that only this machine can reach.
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
+
+
+#: Largest default number of coordinators, since each of them takes half a gigabyte.
+DEFAULT_COORDINATORS = 4
+
+
+class ServiceSettings(BaseSettings):
+    """Settings of all roles. Sizes are in bytes, times in seconds.
+
+    Attributes
+    ----------
+    data_dir
+        Folder of uploads and results, and of the database unless ``database`` is given.
+    database
+        ``postgresql+psycopg://USER:PASSWORD@HOST/NAME``; by default SQLite in the data folder.
+    database_file
+        File that contains the ``database`` instead, for example a mounted secret.
+    blob_store
+        ``s3://BUCKET/PREFIX`` of an S3-compatible store for uploads, checkpoints, reports and figures, which
+        all machines share; by default the data folder. Needs the extra ``s3``. Endpoint and credentials are
+        those of AWS' environment variables and files, for example ``AWS_ENDPOINT_URL`` and
+        ``AWS_SHARED_CREDENTIALS_FILE``. No other service may use the prefix: what no row of the database
+        names is deleted.
+    blob_cache
+        Size of the local copies of what is in the ``blob_store``.
+    dataset_hosts
+        Hosts from which clients may let the service download data sets over HTTPS, separated by commas, each
+        with an optional port: ``data.example.org``. None by default. A host with a private address also has
+        to be one of ``private_hosts``.
+    dataset_buckets
+        Buckets, with optional prefixes, from which clients may do the same: ``s3://measurements/lab``. None
+        by default. The service reads them with its own credentials: every owner can read what is listed.
+    dataset_seconds
+        Longest time of such a download.
+    host, port
+        Address that the service listens on.
+    trusted_proxies
+        Addresses and networks of reverse proxies, separated by commas, whose headers ``X-Forwarded-For`` and
+        ``X-Forwarded-Proto`` are believed: ``127.0.0.1, 10.0.0.0/8``. None by default.
+    root_path
+        Path under which a proxy offers the service, for example ``/islands``; it precedes the path of every
+        ``Location``.
+    ray_address
+        ``HOST:PORT`` of a Ray cluster; by default a Ray head is started on this machine.
+    autoscaling
+        Whether the cluster starts machines for islands that wait for a CPU, such as one of KubeRay with an
+        autoscaler. A job then requests a CPU for each island, even if the cluster has fewer.
+    coordinators
+        Number of jobs that run at the same time: by default one for each core, at most four. They share the
+        cores of this machine, so that a long job does not keep the others waiting.
+    lease
+        Duration of a lease without a heartbeat, after which another coordinator may claim the job; at least
+        one second.
+    checkpoint_every
+        Least time between two checkpoints: about the work that a crash can lose.
+    max_upload, max_unpacked
+        Largest upload, and largest size that it may unpack to.
+    max_uploads, max_uploads_per_owner
+        Uploads in progress, of all owners and of one. The data folder needs room for ``max_uploads`` files of
+        ``max_upload`` bytes and two of ``max_unpacked`` bytes.
+    body_timeout, body_rate
+        Longest time without a byte of a request's body, and least bytes per second after that time; a rate of
+        0 disables the latter.
+    inspection_memory, inspection_seconds
+        Memory and time budget of the process that reads an uploaded file.
+    max_stored
+        Largest total size of the data sets of one owner.
+    max_active
+        Queued and running jobs of one owner.
+    max_running, max_running_islands
+        Running jobs of one owner, and the sum of their islands, which is unlimited by default. Further jobs
+        stay in the queue.
+    max_run_seconds
+        Run time of one job, without its time in the queue. A search then ends with its best models so far, a
+        diagnosis fails.
+    max_streams
+        Open event streams of one owner, of each API process.
+    max_drawings
+        Requests of one owner whose figures are being drawn or wait for it, of each API process.
+    max_evaluations
+        Individuals that one job may evaluate.
+    max_islands
+        Islands of one job.
+    max_job_memory
+        Estimated memory of the individuals of one job: 11.4 kB for each. 0 means half of the memory of
+        the machine of the API; set it if the islands run on other machines.
+    retention
+        Time after which a finished job is deleted; 0 keeps it for ever. An idempotency key is valid as long.
+    dataset_retention
+        Time after which a data set that no job names is deleted; 0 keeps it for ever.
+    audit_retention
+        Time after which an entry of the audit trail is deleted; 0 keeps it for ever.
+    rate, burst
+        Requests per second of one key, and requests that it may send at once; a rate of 0 disables the limit.
+    admin_key_file
+        File with a key of at least 32 characters that has the scope ``admin``, for example a mounted secret.
+        With it the first keys can be created over REST. Without it that key is revoked.
+    oidc_issuer
+        URL of an OpenID Connect provider whose tokens are accepted in addition to keys. Then every request
+        needs a key or a token.
+    oidc_audience
+        Value that the claim ``aud`` of a token contains. Required with an issuer.
+    oidc_owner_claim
+        Claim that names the owner. It must be unique, and users must not be able to choose it.
+    oidc_role_claim
+        Claim with the roles: a list, or text with spaces. A path such as ``realm_access.roles`` is possible.
+    oidc_roles
+        Roles by the values of that claim, ``VALUE=ROLE``, separated by commas. The roles are ``reader``,
+        ``submitter``, ``monitor`` and ``administrator``.
+    oidc_algorithms
+        Accepted algorithms of signatures, separated by commas. All are asymmetric.
+    oidc_leeway
+        Tolerated difference of the clocks of the issuer and of this machine.
+    tls_certificate, tls_key
+        PEM files for HTTPS.
+    max_webhooks, max_monitors
+        Webhooks and monitors of one owner. 0 disables them.
+    private_hosts
+        Hosts to which the service may send requests for its clients though their addresses are private,
+        separated by commas, each with an optional port: ``hooks.lan:8443, 10.0.0.7``. None by default.
+    http_hosts
+        Hosts to which such requests may be sent without TLS, in the same form. None by default.
+    metrics_host, metrics_port
+        Address at which a coordinator serves its metrics to Prometheus, without a key; no metrics with
+        port 0. The coordinators of ``islands serve`` use this port and the following ones.
+    log_format
+        Format of log messages: ``text`` or ``json``.
+    telemetry
+        OTLP endpoint over HTTP for traces: ``http://collector:4318/v1/traces``. Needs the extra
+        ``telemetry``.
+    lifeline
+        File descriptor of the heartbeat pipe to ``islands serve``, set for its children.
+    require_keys
+        Require a key on a loopback address too, for example behind a proxy.
+    """
+
+    model_config = SettingsConfigDict(env_prefix="ISLANDS_", frozen=True, extra="ignore")
+
+    data_dir: Path = Field(default_factory=lambda: user_data_path("islands"))
+    database: str = ""
+    database_file: Path | None = None
+    blob_store: BlobStore = ""
+    blob_cache: Count = 10_000_000_000
+    dataset_hosts: Hosts = ""
+    dataset_buckets: Buckets = ""
+    dataset_seconds: Positive = 300.0
+    host: str = "127.0.0.1"
+    port: Annotated[int, Field(ge=0, le=65535)] = 8000
+    trusted_proxies: Networks = ""
+    root_path: Annotated[str, Field(pattern=r"^(/[A-Za-z0-9._~-]+)*$")] = ""
+    ray_address: str | None = None
+    autoscaling: bool = False
+    coordinators: Annotated[int, Field(ge=0, le=64)] = Field(
+        default_factory=lambda: min(count_cpus(), DEFAULT_COORDINATORS)
+    )
+    lease: Annotated[float, Field(ge=1.0)] = 5.0
+    checkpoint_every: Positive = 5.0
+    max_upload: Count = 256_000_000
+    max_unpacked: Count = 1_000_000_000
+    max_uploads: Count = 32
+    max_uploads_per_owner: Count = 4
+    body_timeout: Positive = 30.0
+    body_rate: Annotated[float, Field(ge=0.0)] = 20_000.0
+    inspection_memory: Count = 6_000_000_000
+    inspection_seconds: Positive = 120.0
+    max_stored: Count = 5_000_000_000
+    max_active: Count = 10_000
+    max_running: Count = 1000
+    max_running_islands: Count | None = None
+    max_run_seconds: Count = 3600
+    max_streams: Count = 1000
+    max_drawings: Count = 100
+    max_evaluations: Count = 10_000_000_000
+    max_islands: Count = 256
+    max_job_memory: Annotated[int, Field(ge=0)] = 0
+    retention: Annotated[float, Field(ge=0.0)] = 90 * 86_400.0
+    dataset_retention: Annotated[int, Field(ge=0)] = 0
+    audit_retention: Annotated[float, Field(ge=0.0)] = 365 * 86_400.0
+    rate: Annotated[float, Field(ge=0.0)] = 50.0
+    burst: Count = 200
+    require_keys: bool = False
+    admin_key_file: Path | None = None
+    oidc_issuer: str = ""
+    oidc_audience: str = ""
+    oidc_owner_claim: Annotated[str, Field(min_length=1)] = "sub"
+    oidc_role_claim: Annotated[str, Field(min_length=1)] = "roles"
+    oidc_roles: str = DEFAULT_ROLES
+    oidc_algorithms: str = "RS256,PS256,ES256,Ed25519"
+    oidc_leeway: Annotated[float, Field(ge=0.0, le=300.0)] = 30.0
+    tls_certificate: Path | None = None
+    tls_key: Path | None = None
+    max_webhooks: Annotated[int, Field(ge=0)] = 10
+    max_monitors: Annotated[int, Field(ge=0)] = 100
+    private_hosts: Hosts = ""
+    http_hosts: Hosts = ""
+    metrics_host: str = "127.0.0.1"
+    metrics_port: Annotated[int, Field(ge=0, le=65535)] = 0
+    log_format: Literal["text", "json"] = "text"
+    telemetry: str = ""
+    lifeline: int | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_database_file(cls, values: dict[str, Any]) -> dict[str, Any]:
+        if not (path := values.get("database_file")):
+            return values
+        if values.get("database"):
+            raise ValueError("give either ISLANDS_DATABASE or ISLANDS_DATABASE_FILE")
+        return {**values, "database": read_secret(Path(path), "ISLANDS_DATABASE_FILE")}
+
+    @model_validator(mode="after")
+    def _check_separate_buckets(self) -> Self:
+        check_separate(self.dataset_buckets, self.blob_store)
+        return self
+
+    @property
+    def url(self) -> str:
+        """URL of the database."""
+        return self.database or f"sqlite:///{(self.data_dir / 'islands.db').absolute()}"
+
+    @property
+    def blobs(self) -> Path:
+        """Folder of the blobs, or of the local copies of those in an object store."""
+        return self.data_dir / ("blob-cache" if self.blob_store else "blobs")
+
+    @property
+    def ray_address_file(self) -> Path:
+        """File in which the Ray head on this machine stores its address."""
+        return self.data_dir / "ray-address"
+
+    @property
+    def on_loopback(self) -> bool:
+        """Whether only this machine can reach the service."""
+        return self.host in LOOPBACK
+
+    @property
+    def keys_needed(self) -> bool:
+        """Whether every request needs a key or a token."""
+        return self.require_keys or bool(self.oidc_issuer) or not self.on_loopback
+
+    def read_admin_key(self) -> str | None:
+        """Return the key of the operator; None without a file.
+
+        Raises
+        ------
+        SettingsError
+            The file cannot be read.
+        """
+        if self.admin_key_file is None:
+            return None
+        try:
+            return read_secret(self.admin_key_file, "ISLANDS_ADMIN_KEY_FILE")
+        except ValueError as error:
+            raise SettingsError(str(error)) from error
+
+    def environment(self) -> dict[str, str]:
+        """Return environment variables that give a child process the same settings.
+
+        Arguments would be visible to all users of the machine.
+        """
+        hidden = {"lifeline"} if self.database_file is None else {"lifeline", "database"}
+        settings = {
+            f"ISLANDS_{name.upper()}": str(value)
+            for name, value in self.model_dump(mode="json", exclude=hidden).items()
+            if value is not None
+        }
+        return {**os.environ, **settings}
+
+
+def service_settings(**given: object) -> ServiceSettings:
+    """Read the settings: arguments precede environment variables, and those precede defaults.
+
+    Raises
+    ------
+    SettingsError
+        A value is out of range. The message names the setting.
+    """
+    try:
+        return ServiceSettings(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
+    except ValidationError as error:
+        problem = error.errors(include_url=False)[0]
+        name = ".".join(map(str, problem["loc"]))
+        message = problem["msg"].removeprefix("Value error, ")
+        raise SettingsError(
+            f"setting {name} (ISLANDS_{name.upper()}): {message}" if name else message
+        ) from error

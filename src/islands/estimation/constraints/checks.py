@@ -1,0 +1,102 @@
+"""Verification of constraints on a model with parameters."""
+
+from dataclasses import dataclass
+from math import fsum, nan
+
+from islands.estimation.constraints.parts import (
+    ClusterSums,
+    Equality,
+    ParameterSign,
+    Part,
+    StaticGain,
+    Symmetry,
+)
+from islands.estimation.parameter_constraints import constraint
+from islands.model.clusters import clusters
+from islands.model.model import Model
+
+#: Tolerance of an equality, relative to its largest term and to its target.
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class ConstraintCheck:
+    """A constraint, and whether a model meets it.
+
+    Attributes
+    ----------
+    text : str
+    target : float
+        Value that the constraint prescribes, or the bound of a parameter with a sign.
+    value : float
+        Value of the model: the static gain, the next output at the fixed point, the weighted sum or the
+        parameter. For cluster sums, the largest deviation from a target. For a symmetry, the number of terms
+        without it. NaN if it is not defined.
+    met : bool
+    """
+
+    text: str
+    target: float
+    value: float
+    met: bool
+
+
+def check_constraints(model: Model, constraints: str) -> tuple[ConstraintCheck, ...]:
+    """Check every part of a constraint on a model.
+
+    Parameters
+    ----------
+    model : Model
+    constraints : str
+        Statements that are separated by semicolons.
+
+    Raises
+    ------
+    ModelError
+        The model has no parameters.
+    SettingsError
+        A statement cannot be read.
+    """
+    return tuple(_check(part, model) for part in constraint(constraints).parts)
+
+
+def _check(part: Part, model: Model) -> ConstraintCheck:
+    match part:
+        case ClusterSums():
+            return _check_sums(part, model)
+        case Symmetry():
+            others = sum(not part.admits(item) for item in model.regressors)
+            return ConstraintCheck(part.text, 0.0, float(others), not others)
+        case ParameterSign():
+            parameters = dict(zip(model.regressors, model.parameters, strict=True))
+            theta = parameters.get(part.regressor, 0.0)
+            return ConstraintCheck(part.text, 0.0, theta, part.sign * theta >= 0.0)
+    return _check_equality(part, model)
+
+
+def _check_sums(part: ClusterSums, model: Model) -> ConstraintCheck:
+    groups = clusters(model.regressors, part.group)
+    complete = part.sums.keys() <= {group.steady_state for group in groups}
+    deviations = [group.total(model.parameters) - part.sums.get(group.steady_state, 0.0) for group in groups]
+    largest = max(map(abs, deviations), default=0.0)
+    return ConstraintCheck(part.text, 0.0, largest if complete else nan, complete and largest <= TOLERANCE)
+
+
+def _check_equality(part: Equality, model: Model) -> ConstraintCheck:
+    terms = [part.weigh(item) * theta for item, theta in zip(model.regressors, model.parameters, strict=True)]
+    total = fsum(terms)
+    met = abs(total - part.target) <= TOLERANCE * max(map(abs, (part.target, *terms)))
+    if not isinstance(part, StaticGain):
+        return ConstraintCheck(part.text, part.target, total, met)
+    numerator, feedback = (
+        [
+            theta * part.slope(item, channel)
+            for item, theta in zip(model.regressors, model.parameters, strict=True)
+        ]
+        for channel in (part.channel, 0)
+    )
+    remainder = 1.0 - fsum(feedback)
+    # An integrator, y(k) = y(k-1), satisfies the equality without having a gain.
+    defined = abs(remainder) > TOLERANCE * max(map(abs, (1.0, *feedback)))
+    gain = fsum(numerator) / remainder if defined else nan
+    return ConstraintCheck(part.text, part.target, gain, met and defined)

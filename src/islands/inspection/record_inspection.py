@@ -1,0 +1,136 @@
+"""What an inspection finds in a file: its columns, its sampling, the chosen record and its facts."""
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from islands.data.dataset import Dataset
+from islands.inspection.column_roles import ColumnChoice
+from islands.inspection.fact import Fact
+from islands.inspection.record_facts import RecordFacts
+
+#: Schema of the document.
+SCHEMA = "islands.inspection/1"
+
+#: Rows that a document lists of one kind.
+MOST_ROWS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class InspectedColumn:
+    """A column of a file.
+
+    Attributes
+    ----------
+    name, unit : str
+    role : str
+        ``time``, ``input``, ``output`` or empty.
+    minimum, maximum : float or None
+        Range of the values that are not missing; None if there is none.
+    missing : int
+        Number of missing values.
+    problem : str
+        Why the column cannot be used as it is; empty if it can.
+    """
+
+    name: str
+    unit: str
+    role: str
+    minimum: float | None
+    maximum: float | None
+    missing: int
+    problem: str
+
+
+@dataclass(frozen=True, slots=True)
+class InspectedSampling:
+    """Sampling of a file.
+
+    Attributes
+    ----------
+    time : str or None
+        Name of the time column.
+    samples : int
+    dt : float or None
+        Sampling time in seconds; None if it is unknown.
+    jitter : float or None
+        Root mean square deviation of the steps, relative to ``dt``; None without a time column.
+    gaps, repeated, backward : tuple of str
+        Rows before which samples are missing, that repeat a time stamp, and whose time stamp is earlier than
+        the one before: ``line 14``. The first ``MOST_ROWS`` of each.
+    counts : dict
+        Number of all rows of each kind, and of missing samples.
+    problem : str
+        Why the sampling is not uniform, with a remedy; empty if it is.
+    """
+
+    time: str | None
+    samples: int
+    dt: float | None
+    jitter: float | None
+    gaps: tuple[str, ...]
+    repeated: tuple[str, ...]
+    backward: tuple[str, ...]
+    counts: dict[str, int]
+    problem: str
+
+
+@dataclass(frozen=True, slots=True)
+class RecordInspection:
+    """What an inspection found in a file.
+
+    Attributes
+    ----------
+    file : str
+        Path of the file as given.
+    columns : tuple of InspectedColumn
+        In the file's order.
+    sampling : InspectedSampling
+    choice : ColumnChoice
+        Inputs and output that the facts describe.
+    facts : RecordFacts
+        Empty if inputs, output or sampling time are unknown.
+    warnings : tuple of str
+        Problems of the record, with remedies, and remarks on what was inferred.
+    command : str
+        Next command; empty if inputs and output are unknown.
+    record : Dataset or None
+        The record that the facts describe, cut where samples are missing.
+    """
+
+    file: str
+    columns: tuple[InspectedColumn, ...]
+    sampling: InspectedSampling
+    choice: ColumnChoice
+    facts: RecordFacts
+    warnings: tuple[str, ...]
+    command: str
+    record: Dataset | None = field(default=None, repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        chosen = (
+            f"{', '.join(self.choice.inputs)} to {self.choice.output}" if self.choice.output else "no record"
+        )
+        return f"<RecordInspection of {self.file}: {chosen}, {len(self.facts.facts)} facts>"
+
+    def find(self, name: str, signal: str | None = None) -> Fact:
+        """Return the fact of a name, such as ``dead-time``, about a signal if several have it.
+
+        Raises
+        ------
+        KeyError
+            There is no such fact.
+        """
+        return self.facts.find(name, signal)
+
+    def as_document(self) -> dict[str, Any]:
+        """Return everything but the samples as a JSON document."""
+        return {
+            "schema": SCHEMA,
+            "file": self.file,
+            "columns": [asdict(column) for column in self.columns],
+            "sampling": asdict(self.sampling),
+            "choice": asdict(self.choice),
+            "facts": [fact.as_document() for fact in self.facts.facts],
+            "warnings": list(self.warnings),
+            "command": self.command,
+        }

@@ -1,1 +1,0 @@
-"""Response of the output to an input: its first lag and its impulse response."""

@@ -1,1 +1,0 @@
-"""Selection of columns from inner products: one after the other, and of the best subset."""

@@ -1,0 +1,184 @@
+"""Selection and pruning by error reduction ratio; the oracle is Gram-Schmidt in extended precision.
+
+The tests of `froe` check properties of the selection; this file checks the contract of the kernels.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from islands.kernels.err_selection import DEPENDENT, prune, prune_increments, prune_single, select
+from islands.kernels.parameter_reduction import reduce
+
+
+def problem(seed, terms=6, rows=150):
+    """Draw correlated columns (terms, rows) and a target."""
+    generator = np.random.default_rng(seed)
+    psi = generator.normal(size=(terms, terms)) @ generator.normal(size=(terms, rows))
+    return psi, generator.normal(size=terms) @ psi + 3.0 * generator.normal(size=rows)
+
+
+def gram_of(psi, y, spare=0):
+    """Return all inner products of the columns and, last, the target, in a larger matrix."""
+    rows = np.vstack([psi, y])
+    gram = np.full((len(rows) + spare,) * 2, np.nan)
+    gram[: len(rows), : len(rows)] = rows @ rows.T
+    return gram
+
+
+def gram_schmidt(psi, y):
+    """Select forward on the columns in extended precision; stop if no independent column is left."""
+    left = dict(enumerate(psi.astype(np.longdouble)))
+    norms = {position: column @ column for position, column in left.items()}
+    target, chosen = y.astype(np.longdouble), []
+    while left:
+        err = {
+            position: float((column @ target) ** 2 / (column @ column) / (target @ target))
+            for position, column in left.items()
+            if column @ column > DEPENDENT * norms[position]
+        }
+        if not err:
+            break
+        best = max(err, key=err.get)
+        chosen.append((best, err[best]))
+        pivot = left.pop(best)
+        for position, column in left.items():
+            left[position] = column - (pivot @ column) / (pivot @ pivot) * pivot
+    return chosen
+
+
+def selected(gram, candidates, tolerance=0.0, limit=None):
+    limit = candidates if limit is None else limit
+    order, err = np.full(limit, -7), np.full(limit, -7.0)
+    count = select(gram, candidates, tolerance, limit, order, err)
+    assert (order[count:] == -7).all()
+    assert (err[count:] == -7.0).all()
+    return list(zip(order[:count].tolist(), err[:count].tolist(), strict=True))
+
+
+def pruned(gram, terms, tolerance):
+    kept = np.full(terms, -7)
+    count = prune(gram, terms, tolerance, kept)
+    assert (kept[count:] == -7).all()
+    return kept[:count].tolist()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.floats(0.0, 0.5))
+def test_pruning_of_single_terms_keeps_those_with_a_large_correlation(seed, terms, tolerance):
+    psi, y = problem(seed, terms)
+    psi[seed % terms] *= seed % 2  # a column that is zero has no correlation
+    kept = np.full(terms, -7)
+    count = prune_single(gram_of(psi, y), terms, tolerance, kept)
+    shares = (psi @ y) ** 2 / np.where(norms := (psi**2).sum(axis=1), norms, 1.0) / (y @ y)
+    assert kept[:count].tolist() == np.flatnonzero(shares > tolerance).tolist()
+    assert (kept[count:] == -7).all()
+
+
+def same(found, expected):
+    assert [position for position, _ in found] == [position for position, _ in expected]
+    assert [err for _, err in found] == pytest.approx([err for _, err in expected], rel=1e-8, abs=1e-13)
+
+
+@given(
+    st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(0, 3), st.floats(0.0, 0.3), st.integers(0, 9)
+)
+def test_selection_equals_gram_schmidt_on_the_columns(seed, terms, spare, tolerance, limit):
+    psi, y = problem(seed, terms)
+    expected = gram_schmidt(psi, y)
+    end = next((rank for rank, (_, err) in enumerate(expected) if err <= tolerance), terms)
+    limit = min(limit, terms)
+    same(selected(gram_of(psi, y, spare), terms, tolerance, limit), expected[: min(end, limit)])
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(0, 3), st.floats(0.0, 0.3))
+def test_pruning_keeps_the_terms_of_gram_schmidt_in_their_order(seed, terms, spare, tolerance):
+    psi, y = problem(seed, terms)
+    expected = sorted(position for position, err in gram_schmidt(psi, y) if err > tolerance)
+    assert pruned(gram_of(psi, y, spare), terms, tolerance) == expected
+
+
+@pytest.mark.parametrize(("share", "count"), [(3e-5, 2), (3e-6, 1), (0.0, 1)])
+def test_dependent_candidate_is_not_selected(share, count):
+    """A candidate must keep 1e-5 of its norm, 1e-10 of its squared norm."""
+    one, other, noise = np.linalg.qr(np.random.default_rng(1).normal(size=(200, 3)))[0].T
+    psi = np.array([one, one + share * other])
+    gram = gram_of(psi, one + 0.1 * other + 0.5 * noise)
+    assert len(selected(gram, 2)) == count
+    assert len(pruned(gram, 2, 0.0)) == count
+
+
+def test_similar_candidates_keep_their_order_and_six_digits():
+    """After the first selection a thousandth of each norm is left, a millionth of its square."""
+    for seed in range(20):
+        generator = np.random.default_rng(seed)
+        psi = generator.normal(size=(5, 150))
+        psi[1:] = psi[0] + 1e-3 * psi[1:]
+        y = 1e3 * generator.normal(size=5) @ psi + generator.normal(size=150)
+        found, expected = selected(gram_of(psi, y), 5), gram_schmidt(psi, y)
+        assert [position for position, _ in found] == [position for position, _ in expected]
+        assert [err for _, err in found] == pytest.approx([err for _, err in expected], rel=1e-6, abs=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1), st.permutations(range(6)))
+def test_order_of_the_candidates_changes_only_their_indices(seed, order):
+    psi, y = problem(seed)
+    here = selected(gram_of(psi, y), 6)
+    there = selected(gram_of(psi[list(order)], y), 6)
+    same([(order[position], err) for position, err in there], here)
+
+
+def test_selection_does_not_change_the_gram_matrix():
+    gram = gram_of(*problem(2))
+    before = gram.copy()
+    selected(gram, 6)
+    pruned(gram, 6, 0.01)
+    assert np.array_equal(gram, before)
+
+
+def test_selection_is_empty_without_candidates_or_limit():
+    gram = gram_of(*problem(3))
+    assert selected(gram, 6, limit=0) == []
+    assert selected(np.array([[4.0]]), 0) == []
+    assert pruned(np.array([[4.0]]), 0, 0.0) == []
+
+
+def test_pruning_with_tolerance_one_leaves_nothing():
+    assert pruned(gram_of(*problem(4)), 6, 1.0) == []
+
+
+def null_space_columns(psi, y, group, sums, previous):
+    """Return free positions, their columns and the target without the part that the constraints fix."""
+    terms = len(psi)
+    pivots = {}
+    for position in range(terms):
+        if group[position] >= 0:
+            members = [other for other in range(terms) if group[other] == group[position]]
+            pivots[position] = min(members, key=lambda each: np.linalg.norm(psi[each]))
+    target = y.copy()
+    for pivot in set(pivots.values()):
+        target -= sums[pivot] * psi[pivot]
+    if not pivots and previous >= 0:
+        target -= psi[previous]
+    free = [position for position in range(terms) if pivots.get(position) != position]
+    columns = [psi[each] - (psi[pivots[each]] if each in pivots else 0.0) for each in free]
+    return free, np.array(columns), target, pivots
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("constrained", [False, True])
+def test_pruning_of_increments_equals_gram_schmidt_in_the_null_space(seed, constrained):
+    psi, y = problem(seed)
+    group = np.array([0, 0, -1, 1, 1, -1]) if constrained else np.full(6, -1)
+    sums = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    gram = gram_of(psi, y)
+    reduction = reduce(gram, 6, group, np.ones(6), sums)
+    free, columns, target, pivots = null_space_columns(psi, y, group, sums, 2)
+    err = {free[position]: ratio for position, ratio in gram_schmidt(columns, target)}
+    tolerance = float(np.median(list(err.values())))
+    expected = {position for position, ratio in err.items() if ratio > tolerance}
+    expected |= {pivots[position] for position in expected if position in pivots}
+    expected |= {pivots[0]} if constrained else {2}
+    kept = np.full(6, -7)
+    count = prune_increments(gram, 6, reduction, 2, tolerance, kept)
+    assert kept[:count].tolist() == sorted(expected)
