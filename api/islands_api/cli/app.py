@@ -15,7 +15,7 @@ from islands.distribution import describe_missing_extra, read_version
 from islands.errors import IslandsError, SettingsError, suggest
 from islands_api.cli.console import errors, exit_with_closed_output
 from islands_api.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
-from islands_api.cli.stop_requests import exit_code, raise_on_signals
+from islands_api.cli.stop_requests import exit_code, ignore_signals, raise_on_signals
 from islands_service.process.process_settings import limit_threads
 
 #: Commands and their descriptions, in the order of the help. Each is a file with a function or a group of the
@@ -195,9 +195,12 @@ def main() -> None:
     try:
         try:
             with raise_on_signals():
-                app()
+                try:
+                    app()
+                finally:
+                    sys.stdout.flush()
         finally:
-            sys.stdout.flush()
+            ignore_signals()
     except BrokenPipeError:
         exit_with_closed_output()
     except SystemExit as end:

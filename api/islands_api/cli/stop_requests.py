@@ -63,6 +63,12 @@ def _handle(receive: Callable[[int, Any], None], signals: Iterable[signal.Signal
             signal.signal(number, handler)
 
 
+def ignore_signals() -> None:
+    """Ignore signals from now on: the command has ended, and its result and exit code are known."""
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
 def end_at_once(interrupt: KeyboardInterrupt) -> NoReturn:
     """End this process although another of its threads is in a library that does not return."""
     errors.print("stopped")

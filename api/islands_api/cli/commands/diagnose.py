@@ -35,7 +35,7 @@ from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
-from islands_api.cli.runs.diagnosis_fits import keep_fits, say_to_continue, write_fits
+from islands_api.cli.runs.diagnosis_fits import explain_continuation, keep_fits, say_to_continue, write_fits
 from islands_api.cli.runs.plan_run import (
     PLAN,
     PlanOptions,
@@ -155,11 +155,7 @@ def diagnose(
     if limits is not None:
         output.print(summarise_self_test(limits), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
-    stop.end(
-        out,
-        (*diagnosis.left_out, *steps.left_out),
-        "repeat the command with --force, which continues with its fits",
-    )
+    stop.end(out, (*diagnosis.left_out, *steps.left_out), explain_continuation(out))
 
 
 def _diagnose_until_stopped(

@@ -7,9 +7,13 @@ from pathlib import Path
 
 from islands.discrepancy.calibration.fit_journal import FitJournal, journal_from_document
 from islands_api.cli.console import errors
+from islands_api.cli.stop_requests import REPEAT
 
 #: File of the fits in the output folder.
 FITS = "fits.json"
+
+#: How to get the complete result of a diagnosis that has written its fits.
+CONTINUE = "repeat the command with --force, which continues with its fits"
 
 
 @contextmanager
@@ -36,9 +40,15 @@ def say_to_continue(folder: Path) -> None:
 
 
 def write_fits(folder: Path, journal: FitJournal) -> None:
-    """Write the fits into the output folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / FITS).write_text(json.dumps(journal.to_document()))
+    """Write the fits into the output folder, if there are any."""
+    if fits := journal.to_document():
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / FITS).write_text(json.dumps(fits))
+
+
+def explain_continuation(folder: Path) -> str:
+    """Say how to get the complete result of a diagnosis whose result so far is in a folder."""
+    return CONTINUE if (folder / FITS).exists() else REPEAT
 
 
 def _read(path: Path) -> FitJournal:

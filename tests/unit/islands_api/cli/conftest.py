@@ -15,6 +15,7 @@ def command_line(
 ) -> Callable[..., tuple[int, str, str]]:
     """Run ``islands`` in ``tmp_path``; return exit code, standard output and standard error."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("islands_api.cli.app.ignore_signals", lambda: None)  # this process goes on
 
     def call(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["islands", *map(str, arguments)])

@@ -1,7 +1,9 @@
-"""Commands whose reader closes the pipe exit quietly, and unknown commands suggest similar ones."""
+"""Ends of commands: a closed pipe, a late signal; and unknown commands suggest similar ones."""
 
 import os
+import signal
 import subprocess
+import sys
 
 import pytest
 
@@ -41,6 +43,22 @@ def test_head_receives_its_lines_from_a_shell() -> None:
     assert (found.stderr, "Usage: islands" in found.stdout) == ("", True)
     # All of the help may be in the pipe before its reader ends.
     assert found.returncode in (0, CLOSED_OUTPUT)
+
+
+def test_a_signal_after_the_end_of_a_command_does_not_change_its_exit_code() -> None:
+    """Ctrl-C killed a command whose result was complete while Python ended."""
+    code = (
+        "import atexit, sys, time; from islands_api.cli.app import main; "
+        "atexit.register(lambda: (print('ending', flush=True), time.sleep(0.2))); "
+        "sys.argv = ['islands', '--version']; main()"
+    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", code], text=True, **pipes) as process:
+        assert process.stdout is not None
+        assert [process.stdout.readline().split()[0] for _ in range(2)] == ["islands", "ending"]
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=10)
+    assert (err, process.returncode) == ("", 0)
 
 
 @pytest.mark.parametrize("name", COMMANDS)

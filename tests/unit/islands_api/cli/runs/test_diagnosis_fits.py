@@ -14,7 +14,8 @@ from islands.discrepancy.inference.screening import StartFinder
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.io.diagnosis_json import as_json, diagnosis_document
-from islands_api.cli.runs.diagnosis_fits import FITS, keep_fits
+from islands_api.cli.runs.diagnosis_fits import CONTINUE, FITS, explain_continuation, keep_fits, write_fits
+from islands_api.cli.stop_requests import REPEAT
 from support.simulated_records import recorded, wave
 
 U = wave(400)
@@ -56,3 +57,12 @@ def test_damaged_file_costs_only_time(tmp_path: Path, capsys: pytest.CaptureFixt
     with keep_fits(tmp_path) as journal:
         assert journal.to_document() == []
     assert "the diagnosis starts again" in capsys.readouterr().err
+
+
+def test_a_diagnosis_without_fits_leaves_no_file_and_promises_none(tmp_path: Path) -> None:
+    write_fits(tmp_path, FitJournal())
+    assert not (tmp_path / FITS).exists()
+    assert explain_continuation(tmp_path) == REPEAT
+    with pytest.raises(KeyboardInterrupt), keep_fits(tmp_path) as journal:
+        run(RECORD, journal, interrupted_map)
+    assert explain_continuation(tmp_path) == CONTINUE
