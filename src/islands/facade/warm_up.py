@@ -24,7 +24,14 @@ from islands.facade.identify import identify
 from islands.facade.setting_changes import SettingChanges
 from islands.kernels.jit_cache import cache_folder, ready
 from islands.kernels.pair_table import complete_pairs
-from islands.kernels.population import PopulationContext, empty_results, evaluate_individuals
+from islands.kernels.population import (
+    PopulationContext,
+    SelectedTerms,
+    empty_results,
+    empty_terms,
+    evaluate_individuals,
+    select_terms,
+)
 from islands.model.expression import Lagged
 from islands.model.model import make_model
 from islands.simulation.coupled_free_run import coupled_free_run
@@ -44,7 +51,7 @@ SMALL: Final[SettingChanges] = {
 }
 
 #: Terms of one structure, which consists of term 1, and its size.
-_ONE_TERM = np.ones((1, 1), np.int64), np.ones(1, np.int64)
+_ONE_TERM = SelectedTerms(np.ones((1, 1), np.int64), np.ones(1, np.int64))
 
 
 def warm_up(report: Callable[[str], None] = print) -> bool:
@@ -81,6 +88,7 @@ def use_other_kernels() -> None:
     record = _make_record()
     context = _make_context(record)
     complete_pairs(*_ONE_TERM, context.target, context.nodes, context.pairs, context.rows)
+    select_terms(_ONE_TERM, np.ones(1, np.bool_), context, empty_terms(1, 1))
     model = PUBLISHED["13"].model
     problem = make_selection_problem(model.regressors, record, "none")
     if isinstance(problem, SelectionProblem):
@@ -132,8 +140,7 @@ def _make_context(record: Dataset) -> PopulationContext:
 
 def _evaluate_individual(context: PopulationContext) -> None:
     """Evaluate an individual with the term y(k-1) whose inner products are missing: as zeros."""
-    nothing_pruned, unlimited = np.zeros(1, np.bool_), np.full(2, np.inf)
-    evaluate_individuals(*_ONE_TERM, nothing_pruned, unlimited, context, empty_results(1, 1))
+    evaluate_individuals(_ONE_TERM, np.full(2, np.inf), context, empty_results(1, 1))
 
 
 def _make_record() -> Dataset:

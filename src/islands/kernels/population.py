@@ -1,8 +1,9 @@
 """Evaluation of a whole population (the paper, section 5.2): prune, estimate, simulate.
 
-First, the inner products that the pair table lacks are computed together, each column once. Then the
-individuals are evaluated one after the other. The result of an individual depends on that individual alone,
-not on the table and not on the other individuals.
+First, the inner products that the pair table lacks are computed together, each column once. Then terms are
+selected: pruning removes some, constraints others. Individuals with equal terms are equal from here on, and a
+caller evaluates them once. The result of an individual depends on that individual alone, not on the table and
+not on the other individuals.
 """
 
 from typing import NamedTuple
@@ -108,119 +109,150 @@ class PopulationContext(NamedTuple):
     bound: float
 
 
-class PopulationResults(NamedTuple):
-    """Arrays that `evaluate` writes.
+class SelectedTerms(NamedTuple):
+    """Terms of individuals; `select_terms` writes them.
 
     Attributes
     ----------
-    kept : ndarray of int64, shape (individuals, most terms)
-        Positions of the terms that are left, ascending.
+    terms : ndarray of int64, shape (individuals, most terms)
+        Terms in the order of their content.
     lengths : ndarray of int64, shape (individuals,)
-        Number of terms that are left.
+        Number of terms.
+    """
+
+    terms: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+
+
+class PopulationResults(NamedTuple):
+    """Arrays that `evaluate_individuals` writes.
+
+    Attributes
+    ----------
     theta : ndarray of float64, shape (individuals, most terms)
-        Parameters of these terms.
+        Parameters of the terms.
     error : ndarray of float64, shape (individuals,)
         Sum of squared errors; infinite unless the status is `OK`.
     status : ndarray of int64, shape (individuals,)
         `OK` or the reason of the failure.
     """
 
-    kept: NDArray[np.int64]
-    lengths: NDArray[np.int64]
     theta: NDArray[np.float64]
     error: NDArray[np.float64]
     status: NDArray[np.int64]
 
 
+def empty_terms(individuals: int, most: int) -> SelectedTerms:
+    """Return uninitialised arrays for a number of individuals of at most ``most`` terms."""
+    return SelectedTerms(np.empty((individuals, most), np.int64), np.empty(individuals, np.int64))
+
+
 def empty_results(individuals: int, most: int) -> PopulationResults:
     """Return uninitialised arrays for a number of individuals of at most ``most`` terms."""
     return PopulationResults(
-        np.empty((individuals, most), np.int64),
-        np.empty(individuals, np.int64),
-        np.empty((individuals, most)),
-        np.empty(individuals),
-        np.empty(individuals, np.int64),
+        np.empty((individuals, most)), np.empty(individuals), np.empty(individuals, np.int64)
     )
 
 
 def evaluate(
-    structures: NDArray[np.int64],
-    sizes: NDArray[np.int64],
+    structures: SelectedTerms,
     pruned: NDArray[np.bool_],
     allowed: NDArray[np.float64],
     context: PopulationContext,
+    selected: SelectedTerms,
     results: PopulationResults,
 ) -> None:
-    """Evaluate individuals.
+    """Complete the table of pairs, select terms and evaluate individuals; ``selected`` is written."""
+    complete_pairs(*structures, context.target, context.nodes, context.pairs, context.rows)
+    select_terms(structures, pruned, context, selected)
+    evaluate_individuals(selected, allowed, context, results)
+
+
+@kernel
+def select_terms(structures, pruned, context, selected):
+    """Prune individuals and leave out terms whose parameter must be zero.
+
+    The inner products are in the table of pairs. An individual with an inner product that is not finite keeps
+    its terms.
 
     Parameters
     ----------
-    structures : ndarray of int64, shape (individuals, most terms)
-        Terms in the order of their content.
-    sizes : ndarray of int64, shape (individuals,)
-        Number of terms.
+    structures : SelectedTerms
+        Individuals.
     pruned : ndarray of bool, shape (individuals,)
         Whether the individual is pruned.
+    context : PopulationContext
+    selected : SelectedTerms
+        Written.
+    """
+    most = structures.terms.shape[1]
+    matrix = np.empty((most + 1, most + 1))
+    positions = np.empty(most, np.int64)
+    for index in range(structures.lengths.size):
+        terms = structures.terms[index, : structures.lengths[index]]
+        size = _select_positions(terms, pruned[index], context, matrix, positions)
+        selected.lengths[index] = size
+        for place in range(size):
+            selected.terms[index, place] = terms[positions[place]]
+
+
+@kernel
+def evaluate_individuals(selected, allowed, context, results):
+    """Estimate and simulate individuals whose terms are selected; the pairs are in the table.
+
+    It takes half of the time of all compilations, so it is a kernel of its own.
+
+    Parameters
+    ----------
+    selected : SelectedTerms
     allowed : ndarray of float64, shape (sizes,)
         A model of a size is abandoned if its sum of squared errors is larger.
     context : PopulationContext
     results : PopulationResults
         Written.
     """
-    complete_pairs(structures, sizes, context.target, context.nodes, context.pairs, context.rows)
-    evaluate_individuals(structures, sizes, pruned, allowed, context, results)
-
-
-@kernel
-def evaluate_individuals(structures, sizes, pruned, allowed, context, results):
-    """Evaluate individuals, as `evaluate`, whose inner products are in the table of pairs.
-
-    It takes half of the time of all compilations, so it is not part of the same kernel.
-    """
     nodes, layout, bound = context.nodes, context.layout, context.bound
     operand_index = np.full(nodes.operation.size, -1, np.int64)
-    most = structures.shape[1]
+    most = selected.terms.shape[1]
     matrix = np.empty((most + 1, most + 1))
     lanes = layout.start.size
     squared, diverged, predicted = np.empty(lanes), np.empty(lanes, np.int64), np.empty(0)
-    for index in range(sizes.size):
-        terms, positions = structures[index], results.kept[index]
+    for index in range(selected.lengths.size):
+        size = selected.lengths[index]
+        chosen, theta = selected.terms[index, :size], results.theta[index, :size]
         results.error[index] = np.inf
-        size, status = _select_terms(terms, sizes[index], pruned[index], context, matrix, positions)
-        results.lengths[index] = size
+        status = _estimate(chosen, context, matrix, operand_index, theta) if size > 0 else NO_TERMS
         if status == OK:
-            chosen, theta = terms[positions[:size]], results.theta[index, :size]
-            status = _estimate(chosen, context, matrix, operand_index, theta)
+            program = generate_program(nodes, chosen, operand_index)
+            limit = allowed[size]
+            status = simulate(program, theta, layout, bound, limit, False, squared, diverged, predicted)
             if status == OK:
-                program = generate_program(nodes, chosen, operand_index)
-                limit = allowed[size]
-                status = simulate(program, theta, layout, bound, limit, False, squared, diverged, predicted)
-                if status == OK:
-                    results.error[index] = total(squared)
+                results.error[index] = total(squared)
         results.status[index] = status
 
 
 @kernel
-def _select_terms(terms, size, pruned, context, matrix, positions):
-    """Prune an individual and leave out terms whose parameter must be zero; return the size and the status.
+def _select_positions(terms, pruned, context, matrix, positions):
+    """Return the number of terms that are left, and their positions in ``positions``.
 
-    ``positions``, out, are the terms that are left. ``matrix`` is scratch memory.
+    ``matrix`` is scratch memory.
     """
+    size = terms.size
     for position in range(size):
         positions[position] = position
-    if not read_gram(terms[:size], context.target, context.pairs, matrix):
-        return size, OVERFLOW
+    if not read_gram(terms, context.target, context.pairs, matrix):
+        return size
     if pruned and context.err_target == OUTPUT:
         size = prune(matrix, size, context.tolerance, positions)
     elif pruned and context.err_target == INCREMENT:
-        size = _prune_increments(terms[:size], context, matrix, positions)
+        size = _prune_increments(terms, context, matrix, positions)
     elif pruned:
         size = prune_single(matrix, size, context.tolerance, positions)
     if context.groups.sums.size > 0:
         size = drop_single_members(terms, positions, size, context.groups)
     if context.groups.targets.size > 0:
         size = drop_zero_parameters(terms, positions, size, context.groups)
-    return size, OK if size > 0 else NO_TERMS
+    return size
 
 
 @kernel
@@ -248,12 +280,13 @@ def _estimate(chosen, context, matrix, operand_index, theta):
     ``theta``, out, are the parameters. ``matrix`` is scratch memory.
     """
     size = chosen.size
+    if not read_gram(chosen, context.target, context.pairs, matrix):
+        return OVERFLOW
     group, weight, sums, feasible = get_constraint(chosen, context.groups)
     if not feasible:
         return INFEASIBLE
     if context.rows.count <= size:
         return TOO_FEW_ROWS
-    read_gram(chosen, context.target, context.pairs, matrix)
     if _has_zero_column(matrix, size):  # a column is zero on the record, and was not pruned
         return DEPENDENT
     reduction = reduce(matrix, size, group, weight, sums)

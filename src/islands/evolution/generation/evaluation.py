@@ -4,7 +4,7 @@ An evaluator holds the record in the layout of the kernels, and caches. Its resu
 individuals, the pruning decisions and the abandon thresholds, never on earlier calls.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -20,7 +20,7 @@ from islands.evolution.gp.gene_index import ZERO, GeneIndex
 from islands.evolution.gp.individual import Individual
 from islands.evolution.settings import Settings
 from islands.kernels import population as kernel
-from islands.kernels.pair_table import PLACE_BYTES, clear, pair_table
+from islands.kernels.pair_table import PLACE_BYTES, clear, complete_pairs, pair_table
 from islands.model.expression import Expression, Lagged
 from islands.model.regressor import Regressor
 from islands.program.regressor_matrix import select_rows
@@ -69,20 +69,24 @@ class Limits:
     structures: int = 1 << 27
 
 
-#: Approximate size of a cached evaluation, in bytes.
-_STRUCTURE_BYTES = 1_500
+#: Approximate sizes of a cached evaluation and of a cached selection of terms, in bytes.
+_EVALUATION_BYTES, _SELECTION_BYTES = 1_500, 1_000
 
+#: A structure and the decision whether to prune it.
 _Key = tuple[frozenset[int], bool]
+
+#: Terms that remain after pruning and constraints, ordered by content.
+_Terms = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """Cached evaluation of a structure.
+    """Cached evaluation of the terms that remain after pruning and constraints.
 
     Attributes
     ----------
     numbers, regressors : tuple
-        Terms that remain after pruning and constraints, ordered by content.
+        The terms, ordered by content.
     theta : tuple of float
         Parameters of the terms; empty after a failure.
     fitness : float
@@ -90,7 +94,7 @@ class Evaluation:
     outcome : EvaluationOutcome
     """
 
-    numbers: tuple[int, ...]
+    numbers: _Terms
     regressors: tuple[Regressor, ...]
     theta: tuple[float, ...]
     fitness: float
@@ -143,7 +147,9 @@ class Evaluator:
             kernel.INFEASIBLE: EvaluationOutcome(Status.INFEASIBLE, self._constraint.lacking),
         }
         self._pairs = pair_table(self.limits.pairs)
-        self._evaluations: dict[_Key, Evaluation] = {}
+        # More than half of the pruned individuals have the terms of an earlier one.
+        self._selections: dict[_Key, _Terms] = {}
+        self._evaluations: dict[_Terms, Evaluation] = {}
         self._root_rule = root_rule
         self._gene_index = self._empty_index()
 
@@ -172,8 +178,12 @@ class Evaluator:
         return {
             "pairs": (PLACE_BYTES * int(self._pairs.taken[0]), self.limits.pairs),
             "genes": (self._gene_index.bytes, self.limits.genes),
-            "structures": (_STRUCTURE_BYTES * len(self._evaluations), self.limits.structures),
+            "structures": (self._structure_bytes, self.limits.structures),
         }
+
+    @property
+    def _structure_bytes(self) -> int:
+        return _EVALUATION_BYTES * len(self._evaluations) + _SELECTION_BYTES * len(self._selections)
 
     def gene_indices(self, individual: Individual) -> frozenset[int]:
         """Return the indices of an individual's genes: equal sets mean equal structures.
@@ -185,8 +195,12 @@ class Evaluator:
     def clear_caches(self) -> None:
         """Empty all caches."""
         clear(self._pairs)
-        self._evaluations.clear()
+        self._clear_structures()
         self._gene_index = self._empty_index()
+
+    def _clear_structures(self) -> None:
+        self._selections.clear()
+        self._evaluations.clear()
 
     def evaluate(
         self, population: Sequence[tuple[Individual, bool]], thresholds: Sequence[float] | None = None
@@ -206,7 +220,7 @@ class Evaluator:
         individuals : tuple of Individual
             The evaluated individuals in the same order, without the genes that were removed.
         duplicates : int
-            Number of individuals whose structure occurs earlier in the population or in the cache.
+            Number of individuals whose terms, after pruning, occur earlier in the population or in the cache.
         """
         self._enforce_limits()
         index_of = self._gene_index.index_of
@@ -224,14 +238,19 @@ class Evaluator:
         allowed = np.full(max(largest + 1, len(thresholds or ())), inf)
         if thresholds is not None and self.abandon:
             allowed[: len(thresholds)] = thresholds
-        cache = self._evaluations
-        missing = dict.fromkeys(
-            key for key in keys if key not in cache or not cache[key].is_sufficient(allowed)
+        selections, cache = self._selections, self._evaluations
+        unknown = list(dict.fromkeys(key for key in keys if key not in selections))
+        selections.update(zip(unknown, self._select_terms(unknown), strict=True))
+        remaining = [selections[key] for key in keys]
+        missing = list(
+            dict.fromkeys(
+                terms for terms in remaining if terms not in cache or not cache[terms].is_sufficient(allowed)
+            )
         )
-        cache.update(zip(missing, self._evaluate_structures(list(missing), allowed), strict=True))
+        cache.update(zip(missing, self._evaluate_terms(missing, allowed), strict=True))
         evaluated = tuple(
-            _make_evaluated(individual, by_number, cache[key], allowed)
-            for (individual, _), by_number, key in zip(population, genes, keys, strict=True)
+            _make_evaluated(individual, by_number, cache[terms], allowed)
+            for (individual, _), by_number, terms in zip(population, genes, remaining, strict=True)
         )
         return evaluated, len(keys) - len(missing)
 
@@ -247,16 +266,47 @@ class Evaluator:
     def _enforce_limits(self) -> None:
         if self._gene_index.bytes > self.limits.genes:
             self.clear_caches()
-        if _STRUCTURE_BYTES * len(self._evaluations) > self.limits.structures:
-            self._evaluations.clear()
+        if self._structure_bytes > self.limits.structures:
+            self._clear_structures()
 
     def evaluate_abandoned(self, abandoned: Sequence[Individual]) -> tuple[Individual, ...]:
         """Evaluate abandoned individuals completely."""
         return self.evaluate([(each, False) for each in abandoned])[0]
 
-    def _evaluate_structures(self, keys: list[_Key], allowed: NDArray[np.float64]) -> list[Evaluation]:
-        """Evaluate structures in batches that fit into the table of pairs."""
-        structures = [sorted(numbers, key=self._gene_index.content) for numbers, _ in keys]
+    def _select_terms(self, keys: Sequence[_Key]) -> list[_Terms]:
+        """Return the terms of structures that pruning and constraints leave."""
+        structures = [tuple(sorted(numbers, key=self._gene_index.content)) for numbers, _ in keys]
+        pruned = np.array([decision for _, decision in keys], np.bool_)
+        remaining: list[_Terms] = []
+        for part, given in self._make_batches(structures):
+            selected = kernel.empty_terms(*given.terms.shape)
+            kernel.select_terms(given, pruned[part], self.context, selected)
+            remaining += _list_terms(selected)
+        return remaining
+
+    def _evaluate_terms(self, terms: Sequence[_Terms], allowed: NDArray[np.float64]) -> list[Evaluation]:
+        """Estimate and simulate models of these terms."""
+        evaluations: list[Evaluation] = []
+        for part, given in self._make_batches(terms):
+            results = kernel.empty_results(*given.terms.shape)
+            kernel.evaluate_individuals(given, allowed * self._predicted, self.context, results)
+            for numbers, parameters, squares, code in zip(
+                terms[part], *(array.tolist() for array in results), strict=True
+            ):
+                outcome, length = self._outcomes[code], len(numbers)
+                evaluations.append(
+                    Evaluation(
+                        numbers,
+                        tuple([self._gene_index.regressor(number) for number in numbers]),
+                        tuple(parameters[:length]) if outcome is OK else (),
+                        float(allowed[length]) if outcome is _ABANDONED else squares / self._predicted,
+                        outcome,
+                    )
+                )
+        return evaluations
+
+    def _make_batches(self, structures: Sequence[_Terms]) -> Iterator[tuple[slice, kernel.SelectedTerms]]:
+        """Yield structures in batches whose inner products the table of pairs has room for, and has."""
         largest = max(map(len, structures), default=0)
         pairs = (largest + 1) * (largest + 2) // 2
         if 2 * pairs > len(self._pairs.keys):
@@ -264,50 +314,23 @@ class Evaluator:
             self._pairs = pair_table(4 * pairs * PLACE_BYTES)
         places = len(self._pairs.keys)
         batch = max(1, places // 2 // pairs)
-        evaluations: list[Evaluation] = []
-        for begin in range(0, len(keys), batch):
+        for begin in range(0, len(structures), batch):
             part = slice(begin, begin + batch)
-            if int(self._pairs.taken[0]) + pairs * len(keys[part]) > places * 3 // 4:
+            count = len(structures[part])
+            if int(self._pairs.taken[0]) + pairs * count > places * 3 // 4:
                 clear(self._pairs)
-            evaluations += self._call_kernel(
-                structures[part], [pruned for _, pruned in keys[part]], allowed, largest
-            )
-        return evaluations
+            terms = np.zeros((count, largest), np.int64)
+            for row, structure in zip(terms, structures[part], strict=True):
+                row[: len(structure)] = structure
+            given = kernel.SelectedTerms(terms, np.array([len(each) for each in structures[part]], np.int64))
+            context = self.context
+            complete_pairs(*given, context.target, context.nodes, context.pairs, context.rows)
+            yield part, given
 
-    def _call_kernel(
-        self, structures: list[list[int]], pruned: list[bool], allowed: NDArray[np.float64], largest: int
-    ) -> list[Evaluation]:
-        count = len(structures)
-        numbers = np.zeros((count, largest), np.int64)
-        for row, structure in zip(numbers, structures, strict=True):
-            row[: len(structure)] = structure
-        results = kernel.empty_results(count, largest)
-        kernel.evaluate(
-            numbers,
-            np.array([len(structure) for structure in structures], np.int64),
-            np.array(pruned, np.bool_),
-            allowed * self._predicted,
-            self.context,
-            results,
-        )
-        evaluations = []
-        for structure, positions, length, parameters, squares, code in zip(
-            structures,
-            *(array.tolist() for array in results),
-            strict=True,
-        ):
-            remaining = tuple([structure[position] for position in positions[:length]])
-            outcome = self._outcomes[code]
-            evaluations.append(
-                Evaluation(
-                    remaining,
-                    tuple([self._gene_index.regressor(number) for number in remaining]),
-                    tuple(parameters[:length]) if outcome is OK else (),
-                    float(allowed[length]) if outcome is _ABANDONED else squares / self._predicted,
-                    outcome,
-                )
-            )
-        return evaluations
+
+def _list_terms(selected: kernel.SelectedTerms) -> list[_Terms]:
+    rows, lengths = (array.tolist() for array in selected)
+    return [tuple(row[:length]) for row, length in zip(rows, lengths, strict=True)]
 
 
 def _make_evaluated(

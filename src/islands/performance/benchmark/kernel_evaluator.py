@@ -20,7 +20,7 @@ from islands.kernels.err_selection import OUTPUT
 from islands.kernels.gram import gram
 from islands.kernels.interpreter import Program
 from islands.kernels.pair_table import clear, pair_table
-from islands.kernels.population import PopulationContext, empty_results, evaluate
+from islands.kernels.population import PopulationContext, SelectedTerms, empty_results, empty_terms, evaluate
 from islands.kernels.regressor_columns import Rows
 from islands.kernels.simulate import COMPLETE, Layout, simulate
 from islands.model.expression import Lagged
@@ -116,7 +116,8 @@ def _evaluation(state: Prepared, candidate: WorkloadModel, pruned: bool, cached:
     size = len(candidate.regressors)
     index = GeneIndex(CONSTRAINTS[candidate.constraints], [Lagged(0, 0)])
     terms = np.array([[index.index_of(item.expression) for item in candidate.regressors]], np.int64)
-    sizes, decided, allowed = np.array([size]), np.array([pruned]), np.full(size + 1, inf)
+    given, selected = SelectedTerms(terms, np.array([size])), empty_terms(1, size)
+    decided, allowed = np.array([pruned]), np.full(size + 1, inf)
     pairs, program, theta = pair_table(_TABLE_BYTES), link(candidate.regressors), np.array(candidate.theta)
     context = PopulationContext(
         0, -1, OUTPUT, 0.0, index.nodes, index.groups, pairs, state.rows, state.step, state.bound
@@ -126,7 +127,7 @@ def _evaluation(state: Prepared, candidate: WorkloadModel, pruned: bool, cached:
     def call() -> None:
         if not cached:
             clear(pairs)
-        evaluate(terms, sizes, decided, allowed, context, results)
+        evaluate(given, decided, allowed, context, selected, results)
         _squared_errors(state, program, theta)
 
     if not np.isfinite(_squared_errors(state, program, theta)).all():

@@ -23,7 +23,9 @@ from islands.kernels.population import (
     TOO_FEW_ROWS,
     Groups,
     PopulationContext,
+    SelectedTerms,
     empty_results,
+    empty_terms,
     evaluate,
 )
 from islands.model.clusters import OUTPUT_AT_REST, clusters, steady_state
@@ -97,8 +99,8 @@ def evaluated(
     numbers = np.full((len(structures), most), -1)
     for row, structure in zip(numbers, structures, strict=True):
         row[: len(structure)] = np.array(structure, np.int64) + 1
-    results = empty_results(len(structures), most)
-    for array in results:
+    selected, results = empty_terms(len(structures), most), empty_results(len(structures), most)
+    for array in (*selected, *results):
         array.fill(-7)
     context = PopulationContext(
         0,
@@ -113,12 +115,19 @@ def evaluated(
         divergence_bound(data),
     )
     sizes = np.array([len(structure) for structure in structures])
-    evaluate(numbers, sizes, np.array(pruned), np.full(most + 1, allowed), context, results)
+    given, bounds = SelectedTerms(numbers, sizes), np.full(most + 1, allowed)
+    evaluate(given, np.array(pruned), bounds, context, selected, results)
     return [
-        (tuple(positions[:length].tolist()), tuple(parameters[:length].tolist()), squares, end)
-        for positions, length, parameters, squares, end in zip(
-            results.kept,
-            results.lengths.tolist(),
+        (
+            tuple(structure.index(term - 1) for term in kept[:length].tolist()),
+            tuple(parameters[:length].tolist()),
+            squares,
+            end,
+        )
+        for structure, kept, length, parameters, squares, end in zip(
+            structures,
+            selected.terms,
+            selected.lengths.tolist(),
             results.theta,
             results.error.tolist(),
             results.status.tolist(),

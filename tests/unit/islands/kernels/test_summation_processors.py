@@ -25,7 +25,9 @@ from islands.data.dataset import Dataset
 from islands.estimation.structure_selection.froe import froe
 from islands.estimation.least_squares import factorise
 from islands.kernels import simulate as kernel
-from islands.kernels.population import Groups, PopulationContext, empty_results, evaluate
+from islands.kernels.population import (
+    Groups, PopulationContext, SelectedTerms, empty_results, empty_terms, evaluate,
+)
 from islands.kernels.err_selection import OUTPUT
 from islands.model.expression import Lagged
 from islands.model.model import Model
@@ -66,14 +68,16 @@ free = Groups(np.full(count + 1, -1), weight, np.empty(0), 0, *plain)
 for name, groups in (("clusters", clusters), ("free", free)):
     for interval in (1, 50, 1000):
         cut = layout(record, 4, interval)
-        results = empty_results(4, count)
-        for array in results:
+        selected, results = empty_terms(4, count), empty_results(4, count)
+        for array in (*selected, *results):
             array.fill(0)
         context = PopulationContext(0, -1, OUTPUT, 1e-4, store.nodes, groups, pair_table(1 << 16),
                                     select_rows(record, 4), cut, divergence_bound(record))
         pruned = np.array([True, False, False, False])
-        evaluate(structures, sizes, pruned, np.full(count + 1, np.inf), context, results)
-        found |= {f"{name}, {interval}, {part}": array for part, array in results._asdict().items()}
+        given = SelectedTerms(structures, sizes)
+        evaluate(given, pruned, np.full(count + 1, np.inf), context, selected, results)
+        written = selected._asdict() | results._asdict()
+        found |= {f"{name}, {interval}, {part}": array for part, array in written.items()}
         print(name, interval, "width", cut.width, "status", results.status)
 model = Model(tuple(terms[:4]), tuple(found["free, 50, theta"][1][:4].tolist()), ("u",), "y", 0.1)
 for interval in (1, 3, 50, None):

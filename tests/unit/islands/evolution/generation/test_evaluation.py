@@ -238,7 +238,8 @@ def test_regressors_that_differ_only_by_rounding_are_singular():
 # Duplicates, and model (13) of the paper.
 
 
-def test_duplicates_are_counted_within_a_batch_and_in_the_cache():
+def test_individuals_with_equal_remaining_terms_are_evaluated_once():
+    """Constraints and pruning leave y(k-1) of all four: u(k-3) alone has the parameter zero."""
     evaluator = Evaluator(record(), SETTINGS)
     one, same, other = (
         individual("y(k-1)", "u(k-3)"),
@@ -246,10 +247,11 @@ def test_duplicates_are_counted_within_a_batch_and_in_the_cache():
         individual("y(k-1)"),
     )
     found, duplicates = evaluator.evaluate([(one, False), (same, False), (other, False), (one, True)])
-    assert duplicates == 1
-    assert found[0].theta == found[1].theta
+    assert duplicates == 3
+    assert len({each.theta for each in found}) == 1
     assert found[1].genes == (same.genes[1],)
-    assert evaluator.evaluate([(other, False), (same, True), (individual("u(k-1)"), False)])[1] == 2
+    different = individual("y(k-1)", "y(k-2)")
+    assert evaluator.evaluate([(other, False), (same, True), (different, False)])[1] == 2
     assert evaluator.evaluate([]) == ((), 0)
 
 
