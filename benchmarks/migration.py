@@ -2,9 +2,9 @@
 
     python benchmarks/migration.py [--preset paper-case1] [--seeds 10] [--json FILE]
 
-Results are printed, not asserted; the figures are in docs/decisions. The error is the RMSE of multiple
-shooting on the estimation data, which evolution minimises, for the best model of any size and of at most six
-terms.
+Results are printed, not asserted; the figures are in docs/explanation/islands-on-ray.md. The error is the
+RMSE of multiple shooting on the estimation data, which evolution minimises, for the best model of any size
+and of at most six terms.
 """
 
 import argparse

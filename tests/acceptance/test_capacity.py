@@ -16,7 +16,7 @@ PAGE = ROOT / "docs/how-to/plan-capacity.md"
     ("epoch", "measured"), [(0.05, 0.75), (0.09, 0.83), (0.09, 0.85), (0.5, 0.97), (1.0, 0.98), (1.0, 0.97)]
 )
 def test_the_model_gives_the_measured_efficiency_of_two_islands(epoch: float, measured: float) -> None:
-    """Decision 0008, measured without checkpoints."""
+    """Measured without checkpoints: docs/explanation/islands-on-ray.md."""
     assert LargeJob(cores=2, epoch=epoch, checkpoint=1e-9).efficiency == pytest.approx(measured, abs=0.035)
 
 
@@ -24,7 +24,7 @@ def test_the_model_gives_the_measured_efficiency_of_two_islands(epoch: float, me
     ("flat", "epoch", "islands"),
     [(0.00035, 1.0, 2_900), (0.001, 1.0, 1_000), (0.00035, 3.5, 10_000), (0.001, 10.0, 10_000)],
 )
-def test_a_single_coordinator_saturates_where_the_decision_says(
+def test_a_single_coordinator_saturates_where_it_was_measured(
     flat: float, epoch: float, islands: int
 ) -> None:
     job = LargeJob(flat=flat, epoch=epoch, region=1e9, cores=0.97 * islands)
@@ -33,7 +33,7 @@ def test_a_single_coordinator_saturates_where_the_decision_says(
 
 
 def test_regions_carry_ten_thousand_islands_at_epochs_of_a_second() -> None:
-    """Decision 0008: a fifth of a core for the driver, a quarter for each of 20 coordinators."""
+    """Islands on Ray: a fifth of a core for the driver, a quarter for each of 20 coordinators."""
     job = LargeJob(cores=10_000, checkpoint=1e-9)
     assert job.regions == 20
     assert job.efficiency == pytest.approx(1.0 / 1.015)
