@@ -23,6 +23,7 @@ from islands.evolution.settings import Settings as Settings
 from islands.facade.coupled.coupled_identification import fit_coupled as fit_coupled
 from islands.facade.coupled.coupled_identification import identify_coupled as identify_coupled
 from islands.facade.coupled.coupled_result import CoupledResult as CoupledResult
+from islands.facade.coupled.coupled_result import FittedCoupledModel as FittedCoupledModel
 from islands.facade.diagnose import diagnose as diagnose
 from islands.facade.diagnose import function_simulator as function_simulator
 from islands.facade.diagnose import plan_experiment as plan_experiment
@@ -31,6 +32,7 @@ from islands.facade.explain_residual import explain_residual as explain_residual
 from islands.facade.fit import fit as fit
 from islands.facade.identify import identify as identify
 from islands.facade.inspect_record import inspect_record as inspect_record
+from islands.facade.load import load as load
 from islands.facade.record_monitor import create_monitor as create_monitor
 from islands.facade.record_monitor import monitor_record as monitor_record
 from islands.facade.results.fitted_model import FittedModel as FittedModel
@@ -40,6 +42,8 @@ from islands.facade.results.result import Result as Result
 from islands.facade.results.saved_result import SavedModel as SavedModel
 from islands.facade.results.saved_result import SavedResult as SavedResult
 from islands.facade.results.saved_result import read_result as read_result
+from islands.facade.results.saved_simulation import SavedDiagnosis as SavedDiagnosis
+from islands.facade.results.saved_simulation import SavedSimulation as SavedSimulation
 from islands.io.checkpoints.monitor_state import SavedMonitor as SavedMonitor
 from islands.io.checkpoints.monitor_state import read_monitor as read_monitor
 from islands.io.checkpoints.monitor_state import write_monitor as write_monitor

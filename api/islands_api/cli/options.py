@@ -6,19 +6,7 @@ from typing import Annotated
 import typer
 
 from islands.errors import SettingsError
-from islands.io.models import read_model
-from islands.io.result_models import find_model_file
-from islands.io.simulator_spec.code_spec import FmuSpec
-from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import (
-    SIMULATORS,
-    LocalExtendedSpec,
-    find_extended_file,
-    is_extended,
-    parse_spec,
-)
-from islands.model.model import Model
-from islands.systems.published_models import get_published_model
+from islands.io.simulator_spec.specification import SIMULATORS
 
 Record = Annotated[
     Path, typer.Argument(help="The record: text, XLSX, NPZ, MAT, HDF5, Parquet, MDF or TDMS; also .gz, .zip.")
@@ -72,9 +60,6 @@ Tolerances = Annotated[
     typer.Option("--tolerance", help="PARAM=REL: relative standard deviation of a parameter, 0.02 for 2 %."),
 ]
 
-#: Prefix of a published model: ``published:13``.
-PUBLISHED = "published:"
-
 
 def columns(texts: list[str]) -> list[str]:
     """Return the column names of a repeated option whose values may be lists, such as ``--input a,b``."""
@@ -112,29 +97,3 @@ def tolerances(texts: list[str]) -> dict[str, float]:
         except ValueError:
             raise SettingsError(f"--tolerance {text}: write PARAM=REL, for example dp=0.01") from None
     return found
-
-
-def extended(text: str) -> LocalExtendedSpec | None:
-    """Read an extended simulation of a file or of the folder of a diagnosis; return None if there is none."""
-    text = find_extended_file(text)
-    if text.startswith(PUBLISHED) or not is_extended(text):
-        return None
-    found = parse_spec(f"model:{text}")
-    assert isinstance(found, LocalExtendedSpec)
-    return found
-
-
-def written_simulation(text: str) -> OdeSpec | FmuSpec | None:
-    """Read equations, ``ode:FILE.toml``, or an FMU with all names filled in; None for anything else."""
-    found = parse_spec(text) if text.startswith(("ode:", "fmu:")) else None
-    if isinstance(found, FmuSpec):
-        model = found.make_model()
-        return FmuSpec.from_system(model, found.make_system(model))
-    return found if isinstance(found, OdeSpec) else None
-
-
-def model(text: str) -> Model:
-    """Read a model file, or the recommended model of a result folder, or return a published model."""
-    if text.startswith(PUBLISHED):
-        return get_published_model(text.removeprefix(PUBLISHED)).model
-    return read_model(find_model_file(text))

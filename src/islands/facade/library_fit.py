@@ -41,6 +41,7 @@ from islands.evolution.search_result import (
 )
 from islands.evolution.settings import Settings
 from islands.facade.final_models import screen
+from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.rate_selection import select_rate
@@ -49,9 +50,6 @@ from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
 from islands.validation.ensemble import ValidatedModel
-
-#: Samples of a shooting interval (case 1 of the paper); at most a tenth of a short record.
-SHOOTING = 500
 
 #: Structures of every size that are simulated on the validation data.
 _SCREENED = 150
@@ -118,6 +116,7 @@ def fit_library(
         The record is too short.
     """
     constraints = library.constraints
+    # At most a tenth of a short record.
     shooting = settings.shooting or min(SHOOTING, max(1, split.estimation.samples // 10))
     steps = Steps(progress, stop)
     steps("sampling rate and direct feedthrough", 0.0)

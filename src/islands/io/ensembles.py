@@ -1,16 +1,13 @@
-"""Ensemble and prediction bands of a result as JSON values, and reading them from a result folder."""
+"""Ensemble and prediction bands of a result as JSON values."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from islands.errors import ModelError
-from islands.io.models import terms_document
 from islands.model.expression import Primitive
 from islands.model.model import Model
 from islands.model.parsing import parse
@@ -19,9 +16,6 @@ from islands.model.regressor import Regressor, regressor
 from islands.model.rendering import plain
 from islands.validation.ensemble import Ensemble, EnsembleStructure
 from islands.validation.prediction_bands import PredictionBands
-
-#: File of a result folder that contains the ensemble.
-RESULT = "result.json"
 
 
 class StructureDocument(BaseModel):
@@ -133,40 +127,3 @@ def bands_from_document(document: Any, ensemble: Ensemble | None) -> PredictionB
         return PredictionBands(ensemble, found.noise, found.width, factors)
     except ValueError as error:
         raise ModelError(f"the bands of the result are damaged: {error}") from error
-
-
-def read_bands(path: str | Path, model: Model) -> PredictionBands:
-    """Read the prediction bands of a model of a result folder.
-
-    Parameters
-    ----------
-    path : str or Path
-        Model file ``FOLDER/models/NN.json`` of the folder.
-    model : Model
-        Model of that file.
-
-    Raises
-    ------
-    ModelError
-        The folder has no ``result.json``, its result lacks the model, or the model has no bands.
-    """
-    file = Path(path).resolve().parent.parent / RESULT
-    try:
-        document = json.loads(file.read_text(encoding="utf-8"))
-        entries = {str(_terms(each["terms"])): each for each in document["models"]}
-        ensemble = ensemble_from_document(document["ensemble"], model)
-        entry = entries.get(str(_terms(terms_document(model))))
-        bands = entry and bands_from_document(entry["bands"], ensemble)
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise ModelError(
-            f"prediction bands need a model of a result folder of this version: cannot read {file}: {error!r}"
-        ) from error
-    if entry is None:
-        raise ModelError(f"{path} is not a model of {file}: give a file of its folder models/")
-    if bands is None:
-        raise ModelError(f"{path} has no prediction bands, because its free run diverged: take another model")
-    return bands
-
-
-def _terms(terms: list[dict[str, Any]]) -> list[tuple[str, float]]:
-    return [(each["regressor"], each["parameter"]) for each in terms]

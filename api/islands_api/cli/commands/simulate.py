@@ -1,5 +1,7 @@
-"""``islands simulate``: prediction of a record by a model."""
+"""``islands simulate``: prediction of a record by whatever `islands.load` opens."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -7,33 +9,65 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import DETREND
 from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
-from islands.facade.library_fit import SHOOTING
-from islands.facade.results.model_simulation import simulate as run
-from islands.io.ensembles import read_bands
+from islands.facade.coupled.coupled_result import FittedCoupledModel
+from islands.facade.load import load
+from islands.facade.results.model_simulation import SHOOTING
+from islands.facade.results.saved_result import SavedModel, SavedResult
+from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
+from islands.io.export.coupled.coupled_equations import coupled_signals
 from islands.io.records import read_dataset, write_simulation
+from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
-from islands.io.result_models import (
-    ErrorMeasurement,
-    find_model_file,
-    read_error_measurement,
-)
-from islands.io.simulator_spec.code_spec import FmuSpec
-from islands.io.simulator_spec.factory import simulate_spec
-from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost
+from islands.io.records.table_reading import read_table
+from islands.io.records.writer import write_coupled_simulation
 from islands.model.equations import named_signals
+from islands.simulation.coupled_free_run import match_coupled
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output
 from islands_api.cli.record_options import with_reading_options
-from islands_api.cli.runs.coupled_run import read_coupled, read_warm_up, simulate_coupled
+
+
+@dataclass(frozen=True, slots=True)
+class _Request:
+    """Options of the command: what is read, how it is simulated, and where the simulation is written."""
+
+    record: Path
+    mode: str
+    out: Path | None
+    inputs: list[str]
+    outputs: list[str]
+    dt: float | None
+    rows: slice | None
+    reading: ReadingOptions
+    detrend: str
+    shooting: int | None
+    warm_up: int | None
+    bands: float | None
+
+    def read(self, inputs: Sequence[str], output_name: str, missing_output: bool = False) -> Dataset:
+        """Read a record of one output; a given output column replaces that of the model."""
+        if len(self.outputs) > 1:
+            raise SettingsError(f"the model has one output, got {', '.join(self.outputs)}: give one --output")
+        name = self.outputs[0] if self.outputs else output_name
+        return read_dataset(
+            *(self.record, inputs, name, self.dt, self.rows),
+            missing_output=missing_output,
+            options=self.reading,
+        )
+
+    def refuse_detrend(self, model: str) -> None:
+        """Refuse ``--detrend`` for a model that states its signals."""
+        if self.detrend != "none":
+            raise SettingsError(f"{model} reads the record as measured: leave out --detrend")
 
 
 @with_reading_options
@@ -88,91 +122,97 @@ def simulate(
 
     For a model of a result folder, the errors on the validation data are those of the result.
     """
-    outputs = options.columns(output_columns or [])
-    coupled = read_coupled(model)
-    if coupled is not None:
-        if mode != "free-run" or bands is not None:
-            raise SettingsError("a model of several outputs has free runs only: leave out --mode and --bands")
-        _check_detrend(detrend, False, "a model of several outputs")
-        first = read_warm_up(model) if warm_up is None else warm_up
-        columns = (options.columns(inputs or []), outputs)
-        simulate_coupled(coupled, record, *columns, dt, parse_rows(rows), reading, first, out)
-        return
-    if len(outputs) > 1:
-        raise SettingsError(f"the model has one output, got {', '.join(outputs)}: give one --output")
-    output_column = outputs[0] if outputs else None
-    extended = options.written_simulation(model) or options.extended(model)
-    if bands is not None and (mode != "free-run" or extended is not None):
-        raise SettingsError("--bands are for free runs of models of a result folder")
-    if extended is not None:
-        _check_detrend(detrend, False, "a simulation")
-        _simulate_extended(extended, record, mode, out, inputs, output_column, dt, rows, reading)
-        return
-    chosen = options.model(model)
-    recorded = read_dataset(
-        record,
-        options.columns(inputs or list(chosen.column_names)),
-        output_column or chosen.output_name,
-        dt,
-        parse_rows(rows),
-        missing_output=True,
-        options=reading,
+    request = _Request(
+        *(record, mode, out, options.columns(inputs or []), options.columns(output_columns or []), dt),
+        *(parse_rows(rows), reading, detrend, shooting, warm_up, bands),
     )
+    match load(model):
+        case SavedResult() as result:
+            _simulate_model(result.best, request)
+        case SavedModel() as single:
+            _simulate_model(single, request)
+        case FittedCoupledModel() as coupled:
+            _simulate_outputs(coupled, request)
+        case SavedDiagnosis() as diagnosis:
+            _simulate_system(diagnosis.require_extension(), request)
+        case SavedSimulation() as simulation:
+            _simulate_system(simulation, request)
+
+
+def _simulate_model(found: SavedModel, request: _Request) -> None:
+    model, mode = found.model, request.mode
+    if request.bands is not None and mode != "free-run":
+        raise SettingsError("--bands are for free runs of models of a result folder")
+    recorded = request.read(request.inputs or model.column_names, model.output_name, missing_output=True)
     for step in recorded.reading:
         output.print(step, markup=False)
-    _check_detrend(detrend, chosen.preprocessing is None, "a model that states its preprocessing")
-    data = match_rate(chosen, preprocess(recorded, detrend=detrend))
-    if statement := named_signals(chosen):
+    if model.preprocessing is not None:
+        request.refuse_detrend("a model that states its preprocessing")
+    data = match_rate(model, preprocess(recorded, detrend=request.detrend))
+    if statement := named_signals(model):
         output.print(f"as in the model, {statement}", markup=False)
     compile_kernels()
-    reported = read_error_measurement(find_model_file(model)) or ErrorMeasurement(None, SHOOTING)
-    interval = reported.shooting if shooting is None else shooting
-    first = next(each for each in (warm_up, reported.warm_up, chosen.maximum_lag) if each is not None)
-    band = None
-    if bands is not None:
-        band = read_bands(find_model_file(model), chosen).predict(chosen, data, bands, first)
-    simulation = run(chosen, data, mode, interval, warm_up=first)
-    _print_metrics(
-        data, simulation.y, f"{mode} after a warm-up of {first} samples: {simulation.outcome}", out, band
+    first = found.warm_up if request.warm_up is None else request.warm_up
+    band = None if request.bands is None else found.bands(data, request.bands, first)
+    simulation = found.simulate(data, mode, first, request.shooting)
+    line = f"{mode} after a warm-up of {first} samples: {simulation.outcome}"
+    _print_metrics(data, simulation.y, line, request.out, band)
+
+
+def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
+    """Simulate all outputs of a record from its first samples; print the errors and write the outputs."""
+    model, outputs = found.model, request.outputs
+    if request.mode != "free-run" or request.bands is not None:
+        raise SettingsError("a model of several outputs has free runs only: leave out --mode and --bands")
+    request.refuse_detrend("a model of several outputs")
+    if outputs and len(outputs) != len(model.output_names):
+        raise SettingsError(
+            f"the model has the outputs {', '.join(model.output_names)}: give as many --output, or none"
+        )
+    inputs = request.inputs or model.models[0].column_names[: len(model.input_names)]
+    table = open_record(request.record, request.reading)
+    recorded = CoupledRecord(
+        tuple(
+            read_table(
+                *(table, request.record.name, inputs, name, request.dt, request.rows),
+                missing_output=True,
+                options=request.reading,
+            )
+            for name in outputs or model.output_names
+        )
     )
+    data = match_coupled(model, recorded.map(lambda each: match_rate(model, each)))
+    if statement := coupled_signals(model):
+        output.print(f"as in the model, {statement}", markup=False)
+    compile_kernels()
+    first = found.warm_up if request.warm_up is None else request.warm_up
+    simulation = found.simulate(data, first)
+    if request.out is not None:
+        write_coupled_simulation(data, simulation.y, request.out)
+        output.print(f"{request.out}: {data.samples} rows", markup=False)
+    output.print(f"free-run after a warm-up of {first} samples: {simulation.outcome}", markup=False)
+    for each, y in zip(data.records, simulation.y.T, strict=True):
+        errors = metrics(each.y, y)
+        output.print(
+            f"{each.output_name}: MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} "
+            f"{each.output_unit}".rstrip(),
+            markup=False,
+        )
 
 
-def _check_detrend(detrend: str, allowed: bool, model: str) -> None:
-    if detrend != "none" and not allowed:
-        raise SettingsError(f"{model} reads the record as measured: leave out --detrend")
-
-
-def _simulate_extended(
-    spec: LocalExtendedSpec | OdeSpec | FmuSpec,
-    record: Path,
-    mode: str,
-    out: Path | None,
-    inputs: list[str] | None,
-    output_column: str | None,
-    dt: float | None,
-    rows: str | None,
-    reading: ReadingOptions,
-) -> None:
+def _simulate_system(found: SavedSimulation, request: _Request) -> None:
     """Simulate equations, an FMU or the result of a diagnosis; initial states are fitted to the record."""
-    if mode != "free-run":
-        raise SettingsError(f"a simulation supports free runs only: --mode {mode} is for models")
-    if isinstance(spec, OdeSpec | FmuSpec):
-        expected, expected_output, effects = (spec.input, *spec.channels), spec.output, [spec.name]
-    else:
-        expected, expected_output = spec.inputs, spec.output
-        effects = [effect.name for effect in spec.effects]
-        effects += [] if spec.output_equation is None else ["missing terms"]
-    inner = innermost(spec)
-    recorded = (inner.column,) if isinstance(inner, ColumnSpec) else ()
-    driving = options.columns(inputs or list(expected))
-    names = [*driving, *recorded]
-    whole = read_dataset(
-        record, names, output_column or expected_output, dt, parse_rows(rows), options=reading
-    )
+    if request.bands is not None:
+        raise SettingsError("--bands are for free runs of models of a result folder")
+    request.refuse_detrend("a simulation")
+    if request.mode != "free-run":
+        raise SettingsError(f"a simulation supports free runs only: --mode {request.mode} is for models")
+    driving, recorded = request.inputs or found.column_names, found.recorded_columns
+    whole = request.read([*driving, *recorded], found.output_name)
     data = whole.first_inputs(len(driving))
     compile_kernels()
-    y = simulate_spec(spec, data, dict.fromkeys(recorded, whole.u[:, -1]))
-    _print_metrics(data, y, f"{mode}: with {', '.join(effects)}", out)
+    y = found.simulate(data, dict.fromkeys(recorded, whole.u[:, -1])).y
+    _print_metrics(data, y, f"{request.mode}: with {', '.join(found.parts)}", request.out)
 
 
 def _print_metrics(

@@ -1,6 +1,5 @@
-"""Several outputs on the command line: a coupled model is identified, fitted and simulated."""
+"""Several outputs on the command line: a coupled model is identified and fitted."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
@@ -13,21 +12,10 @@ from islands.data.coupled_record import CoupledRecord, check_outputs, couple
 from islands.data.dataset import Dataset
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import PreprocessingSteps
-from islands.data.signal_map import match_rate
-from islands.errors import SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.evolution.progress import Steps
 from islands.facade.coupled.coupled_identification import StoppedCouplingError
 from islands.facade.coupled.coupled_result import list_folders
-from islands.io.export.coupled.coupled_document import is_coupled
-from islands.io.export.coupled.coupled_equations import coupled_signals
-from islands.io.records.reader import open_record
-from islands.io.records.reading_options import ReadingOptions
-from islands.io.records.table_reading import read_table
-from islands.io.records.writer import write_coupled_simulation
-from islands.simulation.coupled_free_run import coupled_free_run, match_coupled
-from islands.validation.metrics import metrics
-from islands_api.cli import options
 from islands_api.cli.console import Display, compile_kernels, output, print_message, progress
 from islands_api.cli.recordings import advance_as_named
 from islands_api.cli.runs.identify_run import RunOptions
@@ -130,61 +118,3 @@ def keep_coupled(
     files = "result.json, model.json, summary.txt, figures/, outputs/ (the result of each output)"
     output.print(f"{folder}/: {files}", markup=False)
     stop.end(folder, (*result.left_out, *drawing.left_out), REPEAT)
-
-
-def read_coupled(text: str) -> "islands.CoupledModel | None":
-    """Read the coupled model of a file or a result folder; return None if it is not one."""
-    if text.startswith(options.PUBLISHED) or not is_coupled(text):
-        return None
-    return islands.read_coupled_model(text)
-
-
-def read_warm_up(text: str) -> int | None:
-    """Return the warm-up of the errors of a result folder; None for a file."""
-    result = Path(text) / "result.json"
-    return int(json.loads(result.read_text(encoding="utf-8"))["warm_up"]) if result.is_file() else None
-
-
-def simulate_coupled(
-    model: "islands.CoupledModel",
-    record: Path,
-    inputs: Sequence[str],
-    outputs: Sequence[str],
-    dt: float | None,
-    rows: slice | None,
-    reading: ReadingOptions,
-    warm_up: int | None,
-    out: Path | None,
-) -> None:
-    """Simulate all outputs of a record from its first samples; print the errors and write the outputs."""
-    if outputs and len(outputs) != len(model.output_names):
-        raise SettingsError(
-            f"the model has the outputs {', '.join(model.output_names)}: give as many --output, or none"
-        )
-    names = model.models[0].column_names[: len(model.input_names)]
-    table = open_record(record, reading)
-    recorded = CoupledRecord(
-        tuple(
-            read_table(
-                *(table, record.name, inputs or names, name, dt, rows), missing_output=True, options=reading
-            )
-            for name in outputs or model.output_names
-        )
-    )
-    data = match_coupled(model, recorded.map(lambda each: match_rate(model, each)))
-    if statement := coupled_signals(model):
-        output.print(f"as in the model, {statement}", markup=False)
-    compile_kernels()
-    simulation = coupled_free_run(model, data, warm_up)
-    if out is not None:
-        write_coupled_simulation(data, simulation.y, out)
-        output.print(f"{out}: {data.samples} rows", markup=False)
-    first = model.maximum_lag if warm_up is None else warm_up
-    output.print(f"free-run after a warm-up of {first} samples: {simulation.outcome}", markup=False)
-    for each, y in zip(data.records, simulation.y.T, strict=True):
-        errors = metrics(each.y, y)
-        output.print(
-            f"{each.output_name}: MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} "
-            f"{each.output_unit}".rstrip(),
-            markup=False,
-        )

@@ -289,12 +289,12 @@ def _couple(
     ]
     return CoupledResult(
         refined or model,
+        warm_up,
         tuple(results),
         choice.ranks,
         refined is not None,
         estimation,
         validation,
-        warm_up,
         (*left_out, *steps.left_out),
     )
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from islands.data.coupled_record import CoupledRecord
 from islands.evolution.progress import Steps
 from islands.facade.results.result import Result
-from islands.io.export import export
+from islands.io.export import export, write_export
 from islands.io.export.coupled.coupled_document import coupled_json
 from islands.io.export.coupled.coupled_equations import coupled_equation, coupled_signals
 from islands.io.result_folder import record_document
@@ -27,14 +27,60 @@ if TYPE_CHECKING:
 COUPLED_RESULT_SCHEMA = "islands.coupled-result/1"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CoupledResult:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class FittedCoupledModel:
+    """Model of several outputs, of a result or of a file.
+
+    Attributes
+    ----------
+    model : CoupledModel
+        Equations of all outputs.
+    warm_up : int
+        Number of samples before the first prediction. The errors depend on it.
+    """
+
+    model: CoupledModel
+    warm_up: int
+
+    @property
+    def equation(self) -> str:
+        """Equations with the column names of the record, one line per output."""
+        return coupled_equation(self.model)
+
+    def simulate(self, record: CoupledRecord, warm_up: int | None = None) -> CoupledSimulation:
+        """Simulate all outputs of a record from its first samples.
+
+        Parameters
+        ----------
+        record : CoupledRecord
+            Its samples are averaged as those of the search.
+        warm_up : int, optional
+            Number of samples before the first prediction; by default that of the errors of the result.
+        """
+        return coupled_free_run(self.model, record, self.warm_up if warm_up is None else warm_up)
+
+    def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
+        """Return the coupled model as text in a format of ``COUPLED_EXPORTS``, or write it to a file."""
+        if path is None:
+            return export(self.model, kind)
+        write_export(self.model, kind, path)
+        return None
+
+    def __repr__(self) -> str:
+        names, equations = ", ".join(self.model.output_names), "; ".join(self.equation.splitlines())
+        return f"<{type(self).__name__} of {names}: {equations}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CoupledResult(FittedCoupledModel):
     """One equation per output, chosen for their common free run.
 
     Attributes
     ----------
     model : CoupledModel
         Equations of all outputs.
+    warm_up : int
+        Number of samples before the first prediction. The errors depend on it.
     results : tuple of Result
         Result of every output, whose models read the measured values of the other outputs.
     ranks : tuple of int
@@ -43,25 +89,16 @@ class CoupledResult:
         Whether the parameters were refined on the common simulation. If not, they are those of the results.
     estimation, validation : CoupledRecord
         Data with the sampling time of the model.
-    warm_up : int
-        Number of samples before the first prediction. The errors depend on it.
     left_out : tuple of str
         Steps that a request to stop has left out; empty for a complete result.
     """
 
-    model: CoupledModel
     results: tuple[Result, ...]
     ranks: tuple[int, ...]
     refined: bool
     estimation: CoupledRecord
     validation: CoupledRecord
-    warm_up: int
     left_out: tuple[str, ...] = ()
-
-    @property
-    def equation(self) -> str:
-        """Equations with the column names of the record, one line per output."""
-        return coupled_equation(self.model)
 
     @property
     def metrics(self) -> Mapping[str, Mapping[str, Mapping[str, Metrics]]]:
@@ -86,28 +123,12 @@ class CoupledResult:
                 }
         return found
 
-    def simulate(self, record: CoupledRecord, warm_up: int | None = None) -> CoupledSimulation:
-        """Simulate all outputs of a record from its first samples.
-
-        Parameters
-        ----------
-        record : CoupledRecord
-            Its samples are averaged as those of the search.
-        warm_up : int, optional
-            Number of samples before the first prediction; by default that of the errors in `metrics`.
-        """
-        return coupled_free_run(self.model, record, self.warm_up if warm_up is None else warm_up)
-
     def plot(self, output: str) -> "Figure":
         """Draw the free run of one output on the validation data."""
         from islands.figures.free_run import draw_free_run  # noqa: PLC0415 - matplotlib takes half a second
 
         place = self.model.output_names.index(output)
         return draw_free_run(self.validation.records[place], self.simulate(self.validation).y[:, place])
-
-    def export(self, kind: str = "python") -> str:
-        """Return the coupled model as text in a format of ``COUPLED_EXPORTS``."""
-        return export(self.model, kind)
 
     def save(self, folder: str | Path, steps: Steps | None = None) -> Path:
         """Write ``result.json``, ``model.json``, ``summary.txt``, ``figures/`` and ``outputs/``.
@@ -184,10 +205,6 @@ class CoupledResult:
                 f"{f'{one.rmse:.4g}{unit}':>18}"
             )
         return "\n".join(lines)
-
-    def __repr__(self) -> str:
-        names, equations = ", ".join(self.model.output_names), "; ".join(self.equation.splitlines())
-        return f"<CoupledResult of {names}: {equations}>"
 
 
 def list_folders(outputs: Sequence[str]) -> list[str]:

@@ -32,8 +32,8 @@ class AssessedModel(AnalysedModel, ABC):
 
     Attributes
     ----------
-    rank : int
-        Rank of the model; 1 has the least validation error.
+    rank : int or None
+        Rank of the model; 1 has the least validation error. None outside of a result.
     model : Model
         Regressors, parameters, standard errors.
     metrics : mapping
@@ -54,7 +54,7 @@ class AssessedModel(AnalysedModel, ABC):
     if TYPE_CHECKING:
 
         @property
-        def rank(self) -> int:
+        def rank(self) -> int | None:
             """Rank of the model."""
 
         @property
@@ -121,7 +121,11 @@ class AssessedModel(AnalysedModel, ABC):
         return predict(self.model, data)
 
     def simulate(
-        self, record: "RecordLike", mode: str = "free-run", warm_up: int | None = None
+        self,
+        record: "RecordLike",
+        mode: str = "free-run",
+        warm_up: int | None = None,
+        shooting: int | None = None,
     ) -> Simulation:
         """Simulate the model on a record.
 
@@ -135,9 +139,12 @@ class AssessedModel(AnalysedModel, ABC):
             ``one-step``, ``shooting`` or ``free-run``.
         warm_up : int, optional
             Number of samples before the first prediction; by default that of the errors in `metrics`.
+        shooting : int, optional
+            Steps of the model in each shooting interval; by default those of the errors in `metrics`.
         """
         warm_up = self.warm_up if warm_up is None else warm_up
-        return simulate(self.model, record, mode, self.shooting_interval, warm_up=warm_up)
+        shooting = self.shooting_interval if shooting is None else shooting
+        return simulate(self.model, record, mode, shooting, warm_up=warm_up)
 
     def bands(self, record: "RecordLike", level: float = LEVEL, warm_up: int | None = None) -> PredictionBand:
         """Simulate the model on a record, with a band that contains a measured sample with a probability.
@@ -154,13 +161,17 @@ class AssessedModel(AnalysedModel, ABC):
         Raises
         ------
         ModelError
-            The free runs of the model diverged on the data that calibrate the bands.
+            The free runs of the model diverged on the data that calibrate the bands, the search was stopped
+            before them, or the model is of no result.
         SettingsError
             The level is out of range.
         """
+        if self.prediction_bands is None and self.rank is None:
+            raise ModelError("prediction bands need a model of a result folder: give its folder or file")
         if self.prediction_bands is None:
             raise ModelError(
-                f"model {self.rank} has no prediction bands: its free run diverged, take another"
+                f"model {self.rank} has no prediction bands: its free run diverged, or the search was "
+                "stopped before them or is of an earlier version. Take another model"
             )
         warm_up = self.warm_up if warm_up is None else warm_up
         data = match_rate(self.model, record_of_model(self.model, record))
@@ -235,7 +246,8 @@ class AssessedModel(AnalysedModel, ABC):
         return self.equation
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of rank {self.rank}: {self.equation}>"
+        rank = "" if self.rank is None else f" of rank {self.rank}"
+        return f"<{type(self).__name__}{rank}: {self.equation}>"
 
     def _repr_html_(self) -> str:
         return render_html(self.model, [self.describe_error()], self.plot())

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from islands.io.data_frames import RecordLike
     from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
 
+#: Samples of a shooting interval (case 1 of the paper), unless a setting or a result states another number.
+SHOOTING = 500
+
 #: Simulation modes, by the names of the command line.
 SIMULATION_MODES = ("one-step", "shooting", "free-run")
 
@@ -29,7 +32,7 @@ def simulate(
     model: "Model | str | Mapping[str, object] | SimulationSpec | LocalSpec",
     record: "RecordLike",
     mode: str = "free-run",
-    shooting: int = 500,
+    shooting: int = SHOOTING,
     columns: Mapping[str, NDArray[np.float64]] | None = None,
     warm_up: int | None = None,
 ) -> Simulation:

@@ -3,6 +3,7 @@
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from islands.errors import SettingsError
 from islands.facade.results.assessed_model import AssessedModel
 from islands.facade.results.result_comparison import ResultComparison, compare_models
+from islands.simulation.predictors import Simulation
 from islands.validation.recommendation import Recommendation
 
 if TYPE_CHECKING:
@@ -72,6 +74,20 @@ class RankedModels(ABC, Generic[M]):
     ) -> NDArray[np.float64]:
         """Return the free run of the recommended model; see `AssessedModel.predict`."""
         return self.best.predict(record, y, dt, inputs=inputs, output=output)
+
+    def simulate(
+        self,
+        record: "RecordLike",
+        mode: str = "free-run",
+        warm_up: int | None = None,
+        shooting: int | None = None,
+    ) -> Simulation:
+        """Simulate a record with the recommended model; see `AssessedModel.simulate`."""
+        return self.best.simulate(record, mode, warm_up, shooting)
+
+    def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
+        """Return the recommended model as text, or write it to a file; see `AssessedModel.export`."""
+        return self.best.export(kind, path)
 
     def plot(
         self, kind: str = "free-run", record: "RecordLike | None" = None, *, ax: "Axes | None" = None

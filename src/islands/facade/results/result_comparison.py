@@ -141,7 +141,8 @@ def compare_models(
     if len(set(names)) != len(results):
         raise SettingsError(f"two results need two different names, got {', '.join(names)}")
     rows = [
-        [_row(name, each, record) for each in models] for name, models in zip(names, results, strict=True)
+        [_row(name, rank, each, record) for rank, each in enumerate(models, start=1)]
+        for name, models in zip(names, results, strict=True)
     ]
     data = "the given record"
     if record is None:
@@ -152,13 +153,11 @@ def compare_models(
     return ResultComparison(recommended, tuple(row for models in rows for row in models), data)
 
 
-def _row(name: str, entry: AssessedModel, record: "RecordLike | None") -> ComparedModel:
+def _row(name: str, rank: int, entry: AssessedModel, record: "RecordLike | None") -> ComparedModel:
     if record is None:
         errors = entry.metrics["validation"]["free_run"]
     else:
         data = match_rate(entry.model, record_of_model(entry.model, record))
         run = entry.simulate(data)
         errors = metrics(data.y, run.y) if run.outcome else Metrics(nan, nan, nan, nan)
-    return ComparedModel(
-        name, entry.rank, entry.model.size, errors.rmse, errors.mape, errors.r2, entry.equation
-    )
+    return ComparedModel(name, rank, entry.model.size, errors.rmse, errors.mape, errors.r2, entry.equation)

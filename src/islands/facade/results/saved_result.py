@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.facade.results.assessed_model import AssessedModel
+from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.results.notebook_html import render_html
 from islands.facade.results.ranked_models import RankedModels, write_validation_key
 from islands.io.ensembles import bands_from_document, ensemble_from_document
-from islands.io.models import read_model
+from islands.io.models import read_model, terms_document
 from islands.io.result_models import check_single_output, read_shooting_interval
 from islands.model.expression import Primitive
 from islands.model.model import Model
@@ -29,27 +30,30 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SavedModel(AssessedModel):
-    """One model of a result folder.
+    """One model of a result folder, or of a model file.
 
     Attributes
     ----------
-    rank : int
-        Rank of the model; 1 has the least validation error.
+    rank : int or None
+        Rank of the model; 1 has the least validation error. None for a file outside of a result folder.
     model : Model
         Regressors, parameters, standard errors.
     document : mapping
-        Entry of the model in ``result.json``: also physics checks, residual tests and constraints.
+        Entry of the model in ``result.json``: also physics checks, residual tests and constraints. Empty
+        outside of a result folder.
     metrics : mapping
-        Errors by part and prediction, for example ``metrics["validation"]["free_run"].mape``.
+        Errors by part and prediction, for example ``metrics["validation"]["free_run"].mape``; empty outside
+        of a result folder.
     warm_up, shooting_interval : int
         Samples before the first prediction, and steps in an interval of multiple shooting, of these errors.
     prediction_bands : PredictionBands or None
-        Prediction bands of every level; None if the free run of the model diverged.
+        Prediction bands of every level; None if the free run of the model diverged, or outside of a result
+        folder.
     output_unit : str
         Unit of the output; empty if unknown.
     """
 
-    rank: int
+    rank: int | None
     model: Model
     document: Mapping[str, Any]
     metrics: Mapping[str, Mapping[str, Metrics]]
@@ -73,7 +77,7 @@ class SavedModel(AssessedModel):
         raise ModelError(f"a result folder has no data: give a record, plot({kind!r}, record=...)")
 
     def _repr_html_(self) -> str:
-        return render_html(self.model, [self.describe_error()])
+        return render_html(self.model, [self.describe_error()] if self.metrics else [])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -132,7 +136,7 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
     Raises
     ------
     ModelError
-        There is no result in the folder, it is damaged, or it was written by a version without these files.
+        There is no result in the folder, it is damaged, or a model file was changed.
     """
     folder = Path(folder)
     file = folder / "result.json"
@@ -146,10 +150,9 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
         check_single_output(document, folder)
     try:
         entries = document["models"]
-        models = [
-            read_model(folder / "models" / f"{entry['rank']:02d}.json", primitives) for entry in entries
-        ]
-        ensemble = ensemble_from_document(document["ensemble"], models[0], primitives)
+        models = [_read_model(folder, entry, primitives) for entry in entries]
+        # Results of earlier versions have no ensemble and no warm-up, and recommend no model.
+        ensemble = ensemble_from_document(document.get("ensemble"), models[0], primitives)
         shooting = read_shooting_interval(document)
         stored = tuple(
             SavedModel(
@@ -157,18 +160,40 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
                 model,
                 MappingProxyType(entry),
                 _read_metrics(entry["metrics"]),
-                entry["warm_up"],
+                model.maximum_lag if entry.get("warm_up") is None else entry["warm_up"],
                 shooting,
-                bands_from_document(entry["bands"], ensemble),
+                bands_from_document(entry.get("bands"), ensemble),
                 document["record"]["units"]["output"],
             )
             for entry, model in zip(entries, models, strict=True)
         )
-        chosen = document["recommended"]
-        recommendation = Recommendation(stored[chosen["rank"] - 1].rank, tuple(chosen["reasons"]))
+        chosen = document.get("recommended", {"rank": 1, "reasons": ()})
+        recommendation = Recommendation(entries[chosen["rank"] - 1]["rank"], tuple(chosen["reasons"]))
     except (KeyError, TypeError, IndexError, ValueError) as error:
         raise ModelError(f"{file} is damaged or of another version: {error!r} is missing or wrong") from error
     return SavedResult(folder, MappingProxyType(document), stored, recommendation)
+
+
+def make_single_model(model: Model) -> SavedModel:
+    """Return a model outside of a result folder: simulations start after its largest lag."""
+    nothing: Mapping[str, Any] = MappingProxyType({})
+    return SavedModel(None, model, nothing, nothing, model.maximum_lag, SHOOTING, None, "")
+
+
+def _read_model(folder: Path, entry: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> Model:
+    """Read the file of an entry of ``result.json``, which must be the model of the entry."""
+    path = folder / "models" / f"{entry['rank']:02d}.json"
+    model = read_model(path, primitives)
+    written, expected = (
+        [(term["regressor"], term["parameter"]) for term in terms]
+        for terms in (terms_document(model), entry["terms"])
+    )
+    if written != expected:
+        raise ModelError(
+            f"{path} is not the model of {folder / 'result.json'}, whose errors and bands belong to another: "
+            "give a changed model as a file outside of the folder"
+        )
+    return model
 
 
 def _read_metrics(document: Mapping[str, Any]) -> dict[str, dict[str, Metrics]]:

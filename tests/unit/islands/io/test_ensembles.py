@@ -13,7 +13,6 @@ from islands.io.ensembles import (
     bands_from_document,
     ensemble_document,
     ensemble_from_document,
-    read_bands,
 )
 from islands.io.result_folder import write_result
 
@@ -38,7 +37,7 @@ def folder(tmp_path):
 def test_a_result_folder_reproduces_the_bands_bit_for_bit(folder):
     for model in result().models:
         file = folder / "models" / f"{model.rank:02d}.json"
-        bands = read_bands(file, islands.read_model(file))
+        bands = islands.load(file).prediction_bands
         expected = result().search_result.ensemble
         own = model.ranked_model.bands
         assert (bands.noise, bands.width, bands.factors) == (own.noise, own.width, own.factors)
@@ -58,26 +57,6 @@ def test_no_ensemble_and_no_bands_are_null():
     assert ensemble_from_document(None, result().best.model) is None
     assert bands_document(None) is None
     assert bands_from_document(None, result().search_result.ensemble) is None
-
-
-def test_a_model_outside_a_result_folder_has_no_bands(tmp_path):
-    islands.write_model(result().best.model, tmp_path / "mine.json")
-    with pytest.raises(ModelError, match="result folder"):
-        read_bands(tmp_path / "mine.json", result().best.model)
-
-
-def test_a_result_of_an_earlier_version_has_no_bands(folder):
-    document = json.loads((folder / "result.json").read_text())
-    del document["ensemble"]
-    (folder / "result.json").write_text(json.dumps(document))
-    with pytest.raises(ModelError, match="of this version"):
-        read_bands(folder / "models" / "01.json", result().best.model)
-
-
-def test_a_changed_model_is_not_a_model_of_the_result(folder):
-    changed = result().best.model.with_parameters([1.0] * result().best.model.size)
-    with pytest.raises(ModelError, match="is not a model of"):
-        read_bands(folder / "models" / "01.json", changed)
 
 
 @pytest.mark.parametrize(

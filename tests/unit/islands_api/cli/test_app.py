@@ -18,7 +18,6 @@ from islands.io.records import write_record
 from islands.io.records.row_range import parse_rows
 from islands.model.model import make_model
 from islands.model.parsing import parse
-from islands.systems.published_models import PUBLISHED
 from islands_api.cli import options
 from islands_api.cli.output_folder import check_folder
 from support.command_line import succeed
@@ -100,11 +99,6 @@ def test_malformed_rows_are_rejected(text):
     with pytest.raises(SettingsError) as caught:
         parse_rows(text)
     assert str(caught.value) == f"cannot read the rows {text!r}: write START:STOP, for example 0:5000"
-
-
-def test_model_is_a_file_or_a_published_model(tmp_path):
-    write_model(PUBLISHED["12"].model, tmp_path / "m.json")
-    assert options.model(str(tmp_path / "m.json")) == options.model("published:12") == PUBLISHED["12"].model
 
 
 # Output folders.
@@ -218,7 +212,7 @@ def test_simulate_starts_after_the_given_warm_up_or_the_lags_of_a_single_file(ru
     assert "the warm-up has 0" in run("simulate", "out", "r.csv", "--warm-up", "0")[2]
     Path("out/result.json").write_text("{}")
     code, _, error = run("simulate", "out", "r.csv")
-    assert (code, "result.json cannot be read" in error) == (2, True)
+    assert (code, "result.json holds no model" in error) == (2, True)
 
 
 @pytest.mark.parametrize("name", ["u_V", "u_V+1"])
@@ -269,8 +263,8 @@ def test_an_export_is_written_to_a_file(run, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("show", "[/red]"), "cannot read the model file [/red]"),
-        (("show", "y[k-1].json"), "cannot read the model file y[k-1].json"),
+        (("show", "[/red]"), "there is no file or folder [/red]"),
+        (("show", "y[k-1].json"), "there is no file or folder y[k-1].json"),
         (("show", "published:12", "--format", "[bold]"), "unknown format '[bold]'"),
         (("show", "published:12", "--format", "fmu"), "the format fmu is not text: write a file with --out"),
         (("simulate", "published:12", "nowhere.csv"), "there is no file nowhere.csv"),

@@ -75,14 +75,6 @@ def read_coupled_model(path: str | Path, primitives: Mapping[str, Primitive] = P
     )
 
 
-def is_coupled(path: str | Path) -> bool:
-    """Return whether a file or a result folder holds a coupled model; False if it cannot be read."""
-    try:
-        return _read_object(_find_file(path)).get("schema") == COUPLED_SCHEMA
-    except ModelError:
-        return False
-
-
 def _find_file(path: str | Path) -> Path:
     path = Path(path)
     return path / "model.json" if path.is_dir() else path

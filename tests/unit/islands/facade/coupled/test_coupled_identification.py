@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import islands
 from islands.data.averaging import average_samples
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import join
@@ -14,7 +15,6 @@ from islands.facade.coupled.coupled_identification import fit_coupled, identify_
 from islands.facade.coupled.coupled_selection import measure_error
 from islands.facade.results.saved_result import read_result
 from islands.io.export.coupled.coupled_document import read_coupled_model
-from islands.io.result_models import find_model_file
 from islands.simulation.coupled_free_run import coupled_free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures
@@ -56,6 +56,8 @@ def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> Non
     with undrawn_figures():
         folder = found.save(tmp_path / "result")
     assert read_coupled_model(folder) == found.model
+    loaded = islands.load(folder)
+    assert (loaded.model, loaded.warm_up) == (found.model, found.warm_up)
     document = json.loads((folder / "result.json").read_text())
     assert [each["name"] for each in document["outputs"]] == ["y1", "y2"]
     for each in document["outputs"]:
@@ -66,8 +68,6 @@ def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> Non
     assert "y1(k) =" in (folder / "summary.txt").read_text()
     with pytest.raises(ModelError, match="several outputs"):
         read_result(folder)
-    with pytest.raises(ModelError, match="several outputs"):
-        find_model_file(folder)
     assert read_result(folder / "outputs" / "1-y1").models[0].model.output_name == "y1"
 
 

@@ -58,7 +58,8 @@ def test_a_result_and_its_folder_have_the_same_errors_on_the_same_data(result, s
     [
         (lambda document: document.clear(), "of another version"),
         (lambda document: document["models"].pop(), "out of range"),
-        (lambda document: document["models"][0].pop("warm_up"), "'warm_up'"),
+        (lambda document: document["models"][0].pop("metrics"), "'metrics'"),
+        (lambda document: document["models"][0]["terms"].pop(), "is not the model of"),
     ],
 )
 def test_damaged_results_are_named(folder, tmp_path, damage, message):
@@ -70,6 +71,21 @@ def test_damaged_results_are_named(folder, tmp_path, damage, message):
     file.write_text(json.dumps(document))
     with pytest.raises(islands.ModelError, match=message):
         islands.read_result(tmp_path / "copy")
+
+
+def test_a_result_of_an_earlier_version_has_no_bands_and_starts_after_the_lags_of_a_model(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "copy")
+    file = tmp_path / "copy" / "result.json"
+    document = json.loads(file.read_text())
+    del document["ensemble"], document["recommended"]
+    for entry in document["models"]:
+        del entry["warm_up"], entry["bands"]
+    file.write_text(json.dumps(document))
+    stored = islands.read_result(tmp_path / "copy")
+    assert [each.warm_up for each in stored.models] == [each.model.maximum_lag for each in stored.models]
+    assert stored.best.rank == 1
+    with pytest.raises(islands.ModelError, match="no prediction bands"):
+        stored.best.bands(record(300))
 
 
 def test_a_folder_without_a_result_is_named(tmp_path):

@@ -13,7 +13,6 @@ from islands.data.split import average_split, split
 from islands.facade.trials.rate_selection import TrialLibrary, select_rate
 from islands.io.models import model_from_json, model_json
 from islands.io.result_folder import result_json, write_result
-from islands.io.result_models import read_error_measurement
 from islands.io.result_text.summary_text import summary
 
 LIBRARY = {"library": "polynomial", "degree": 1, "max_terms": 4}
@@ -193,8 +192,8 @@ def test_a_simulation_over_shooting_intervals_has_the_reported_error(tmp_path):
     document = json.loads((tmp_path / "result.json").read_text())
     assert document["settings"]["shooting"] == 52
     assert document["preprocessing"]["shooting_interval"] == 10
-    assert read_error_measurement(tmp_path / "models/01.json").shooting == 10
+    assert islands.load(tmp_path / "models/01.json").shooting_interval == 10
     # Results of earlier versions state the setting only, and used it as the number of means.
     del document["preprocessing"]["shooting_interval"]
     (tmp_path / "result.json").write_text(json.dumps(document))
-    assert read_error_measurement(tmp_path / "models/01.json").shooting == 52
+    assert islands.load(tmp_path / "models/01.json").shooting_interval == 52

@@ -7,7 +7,6 @@ import pytest
 from islands.errors import ModelError
 from islands.io.export.coupled.coupled_document import (
     coupled_json,
-    is_coupled,
     read_coupled_model,
     write_coupled_model,
 )
@@ -20,13 +19,10 @@ def test_a_model_is_read_as_it_was_written(model, tmp_path) -> None:
     write_coupled_model(model, tmp_path / "model.json")
     assert read_coupled_model(tmp_path / "model.json") == model
     assert read_coupled_model(tmp_path) == model
-    assert is_coupled(tmp_path)
 
 
 def test_other_files_are_not_coupled_models(tmp_path) -> None:
     write_model(PREY.models[0], tmp_path / "single.json")
-    assert not is_coupled(tmp_path / "single.json")
-    assert not is_coupled(tmp_path)
     with pytest.raises(ModelError, match="not a coupled model of schema"):
         read_coupled_model(tmp_path / "single.json")
 

@@ -1,0 +1,152 @@
+"""`load`: a result, a model, a diagnosis or a simulation, whatever file or folder holds it."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+from islands.errors import ModelError
+from islands.facade.coupled.coupled_result import FittedCoupledModel
+from islands.facade.results.saved_result import SavedModel, SavedResult, make_single_model, read_result
+from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
+from islands.io.export.coupled.coupled_document import read_coupled_model
+from islands.io.models import read_model
+from islands.io.simulator_spec.code_spec import FmuSpec
+from islands.io.simulator_spec.ode_spec import OdeSpec
+from islands.io.simulator_spec.specification import EXTENDED_FILE, LocalExtendedSpec, parse_spec
+from islands.model.expression import Primitive
+from islands.model.primitives import PRIMITIVES
+from islands.systems.published_models import get_published_model
+
+#: Values of `load`; each has ``simulate`` and ``export``.
+Loaded: TypeAlias = SavedResult | SavedModel | FittedCoupledModel | SavedSimulation | SavedDiagnosis
+
+#: Files and folders that can be loaded, for messages.
+KINDS = (
+    "a result folder, a model file, the folder of a diagnosis, an extended.json, ode:FILE.toml, "
+    "fmu:FILE.fmu, or published:12, :13, :14"
+)
+
+#: Files that say what a folder holds; the first one that exists counts.
+_DOCUMENTS = ("discrepancy.json", EXTENDED_FILE, "result.json", "model.json")
+
+
+def load(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Loaded:
+    """Open a result, a model, a diagnosis or a simulation, to simulate records with it.
+
+    ``islands simulate`` opens its first argument with this function, so both give the same numbers.
+
+    Parameters
+    ----------
+    path : str or Path
+        A result folder of ``fit`` or ``identify``, of one or several outputs; a model file; the folder of a
+        diagnosis, or its ``extended.json``; ``ode:FILE.toml``, ``fmu:FILE.fmu`` or ``published:13``, as on
+        the command line.
+    primitives : mapping
+        Primitives that expressions may contain; add your own with ``PRIMITIVES | {mine.name: mine}``.
+
+    Returns
+    -------
+    SavedResult, SavedModel, FittedCoupledModel, SavedDiagnosis or SavedSimulation
+        Each has ``simulate(record)`` and ``export(kind, path)``. A model file of a result folder has the
+        errors, the warm-up and the prediction bands of the result.
+
+    Raises
+    ------
+    ModelError
+        There is no such file, it is damaged, or it holds something else; the message lists the kinds.
+    """
+    kind, _, rest = str(path).partition(":")
+    if kind == "published":
+        return make_single_model(get_published_model(rest).model)
+    if kind in ("ode", "fmu"):
+        return SavedSimulation(_read_equations(str(path)))
+    file = _find_document(Path(path))
+    document = _read_document(file)
+    schema = str(document.get("schema", "islands.model/1" if "terms" in document else ""))
+    reader = _READERS.get(schema.partition("/")[0])
+    if reader is None:
+        raise ModelError(f"{file} holds no model, result or simulation: give {KINDS}")
+    return reader(file, primitives)
+
+
+def _find_document(path: Path) -> Path:
+    if path.is_dir():
+        found = [path / name for name in _DOCUMENTS if (path / name).is_file()]
+        if not found:
+            raise ModelError(f"{path} has no {', '.join(sorted(_DOCUMENTS))}: give {KINDS}")
+        return found[0]
+    if not path.is_file():
+        raise ModelError(f"there is no file or folder {path}: give {KINDS}")
+    return path
+
+
+def _read_document(file: Path) -> dict[str, Any]:
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ModelError(f"{file} cannot be read ({error}): give {KINDS}") from error
+    return document if isinstance(document, dict) else {}
+
+
+def _read_equations(text: str) -> OdeSpec | FmuSpec:
+    """Read equations, or an FMU with all names filled in."""
+    found = parse_spec(text)
+    if isinstance(found, FmuSpec):
+        model = found.make_model()
+        return FmuSpec.from_system(model, found.make_system(model))
+    assert isinstance(found, OdeSpec)
+    return found
+
+
+def _load_result(file: Path, primitives: Mapping[str, Primitive]) -> SavedResult:
+    return read_result(file.parent, primitives)
+
+
+def _load_model(file: Path, primitives: Mapping[str, Primitive]) -> SavedModel:
+    """Read a model file; a model of a result folder has the errors and the bands of the result."""
+    folder = file.absolute().parent.parent
+    if file.absolute().parent.name == "models" and (folder / "result.json").is_file():
+        for each in read_result(folder, primitives).models:
+            if f"{each.rank:02d}.json" == file.name:
+                return each
+    return make_single_model(read_model(file, primitives))
+
+
+def _load_coupled(file: Path, primitives: Mapping[str, Primitive]) -> FittedCoupledModel:
+    """Read a model of several outputs, with the warm-up of the errors of its folder."""
+    if file.name == "result.json":
+        warm_up = _read_document(file).get("warm_up")
+        model = read_coupled_model(file.parent, primitives)
+        return FittedCoupledModel(model, model.maximum_lag if warm_up is None else int(warm_up))
+    model = read_coupled_model(file, primitives)
+    return FittedCoupledModel(model, model.maximum_lag)
+
+
+def _load_extended(file: Path, _primitives: Mapping[str, Primitive]) -> SavedSimulation:
+    spec = parse_spec(f"model:{file}")
+    assert isinstance(spec, LocalExtendedSpec)
+    return SavedSimulation(spec)
+
+
+def _load_diagnosis(file: Path, primitives: Mapping[str, Primitive]) -> SavedDiagnosis:
+    folder, document = file.parent, _read_document(file)
+    if "verdict" not in document:
+        raise ModelError(f"{file} is damaged: it has no verdict. Diagnose again, or give {KINDS}")
+    extended = folder / EXTENDED_FILE
+    extension = _load_extended(extended, primitives) if extended.is_file() else None
+    return SavedDiagnosis(folder, MappingProxyType(document), extension)
+
+
+#: Readers by the schema of the document, without its version.
+_READERS: Mapping[str, Callable[[Path, Mapping[str, Primitive]], Loaded]] = MappingProxyType(
+    {
+        "islands.result": _load_result,
+        "islands.model": _load_model,
+        "islands.coupled-result": _load_coupled,
+        "islands.coupled-model": _load_coupled,
+        "islands.extended": _load_extended,
+        "islands.discrepancy": _load_diagnosis,
+    }
+)
