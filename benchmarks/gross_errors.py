@@ -22,8 +22,11 @@ import numpy as np  # noqa: E402 - after the environment is set
 
 from islands.data.dataset import Dataset  # noqa: E402
 from islands.discrepancy.calibration.levenberg_marquardt import calibrate  # noqa: E402
-from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context  # noqa: E402
-from islands.discrepancy.calibration.target import Target  # noqa: E402
+from islands.discrepancy.calibration.preparation import (  # noqa: E402
+    count_fitted_samples,
+    make_context,
+    make_target,
+)
 from islands.discrepancy.detectability import estimate_rate  # noqa: E402
 from islands.discrepancy.gross_errors.channel_admission import admit_channels  # noqa: E402
 from islands.discrepancy.gross_errors.closed_loop import find_closed_loop  # noqa: E402
@@ -135,10 +138,10 @@ def find(record: Dataset, simulator: Simulator, tolerance: Mapping[str, float]) 
     fitted = count_fitted_samples(record)
     admitted, channels = admit_channels(record, fitted)
     simulation = ExtendedSimulator(simulator, (), make_context(admitted, simulator, fitted))
-    target = Target(record.y, np.arange(record.samples) < fitted, None, tolerance)
+    target = make_target(record, fitted, tolerance)
     base = calibrate(simulation, target, simulation.nominal)
-    errors = find_gross_errors(admitted, simulator, base, fitted, tolerance)
-    closed = find_closed_loop(base, record.y, fitted, "u")
+    errors = find_gross_errors(admitted, simulator, base, target)
+    closed = find_closed_loop(base, target, "u")
     return list(errors), [each.name for each in (*channels, *closed)]
 
 

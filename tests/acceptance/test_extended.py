@@ -35,7 +35,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     values = simulation.nominal
     values[simulation.get_slice(effect)] = STRENGTH
     measured = replace(record, y=simulation.simulate(values))
-    target = Target(measured.y, np.ones(record.samples, dtype=bool), None, {})
+    target = Target(measured.y, np.ones(record.samples, dtype=bool), None, {}, fitted=record.samples)
     write_record(measured, base / "record.csv")
     (base / "extended.json").write_text(extended_json(evaluate_fit(simulation, target, values), measured))
     return base

@@ -77,7 +77,7 @@ def extend(
     residual = 0.01 * context.output_peak * np.sin(2 * np.pi * 7.3 * context.time)
     for effect in simulation.effects:
         values[simulation.get_slice(effect)] = effect.starting_points(context, residual)[-1]
-    target = Target(record.y, np.ones(record.samples, dtype=bool), None, {})
+    target = Target(record.y, np.ones(record.samples, dtype=bool), None, {}, fitted=record.samples)
     fit = evaluate_fit(simulation, target, values)
     return LocalExtendedSpec.model_validate(extended_document(fit, record)), simulation.simulate(values)
 

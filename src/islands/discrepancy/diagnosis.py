@@ -108,38 +108,36 @@ def diagnose(
     fitted = count_fitted_samples(record)
     record, record_findings = admit_channels(record, fitted, find_read_channels(simulator))
     record_findings += describe_gaps(record)
+    target = make_target(record, fitted, prior_std)
     try:
         context = make_context(record, simulator, fitted)
     except RecordError as error:
-        raise explain_divergence(error, record, simulator, fitted, prior_std) from error
+        raise explain_divergence(error, record, simulator, target) from error
     rng = np.random.default_rng(seed)
     if find_equations(simulator) is None:
         simulator = add_output_equation(simulator, context)
     simulation = ExtendedSimulator(simulator, (), context)
-    target = make_target(record, fitted, prior_std)
     progress("calibrating the simulation", 0.0)
     base = calibrate(simulation, target, simulation.nominal)
-    interim.begin(record, base, target, fitted, record_findings)
+    interim.begin(record, base, target, record_findings)
     progress("looking for gross errors of the record", 0.01)
-    if gross_errors := find_gross_errors(record, simulator, base, fitted, prior_std):
-        found = make_gross_diagnosis(record, base, gross_errors, fitted)
+    if gross_errors := find_gross_errors(record, simulator, base, target):
+        found = make_gross_diagnosis(record, base, gross_errors, target)
         return interim.complete(replace(found, record_findings=(*found.record_findings, *record_findings)))
     if is_rounding_error(record.y - base.output, record.y):
-        found = make_diagnosis(record, make_exact_outcome(base, target), base, None, (), fitted, rng, map)
+        found = make_diagnosis(record, make_exact_outcome(base, target), base, None, (), rng, map)
         return interim.complete(replace(found, record_findings=tuple(record_findings)))
     effects = select_effects(simulator, context, prior_std, catalogue)
     base, outcome = _search(base, target, effects, progress, parallel_map, interim)
     simulator = base.simulation.simulator
     interim.reach(EVIDENCE)
     progress("analysing the residual", 0.9)
-    outcome = interim.keep_outcome(
-        base, assess_evidence(outcome, fitted, effects, rng), effects, step=MODEL_ERROR
-    )
+    outcome = interim.keep_outcome(base, assess_evidence(outcome, effects, rng), effects, step=MODEL_ERROR)
     is_unknown = outcome.verdict == Verdict.UNKNOWN
     is_noise = outcome.verdict == Verdict.NOTHING and outcome.hypothesis.fit.noise.order
-    if is_noise or (is_unknown and not explain_all(base, target, fitted, seed, parallel_map)):
+    if is_noise or (is_unknown and not explain_all(base, target, seed, parallel_map)):
         model_error = search_with_model_error(base, target, effects, progress, parallel_map)
-        second = assess_evidence(model_error, fitted, effects, rng)
+        second = assess_evidence(model_error, effects, rng)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome
     interim.keep_outcome(base, outcome, effects, step=FREE_FORMS)
     # Coloured noise may hide a discrepancy that no effect of the catalogue explains.
@@ -147,20 +145,18 @@ def diagnose(
     if not is_clean:
         progress("comparing with free forms", 0.9)
         forms = select_effects(simulator, context, prior_std, catalogue, free=True)
-        outcome = compare_with_free_forms(outcome, forms, fitted, (*effects, *forms), rng, parallel_map)
+        outcome = compare_with_free_forms(outcome, forms, (*effects, *forms), rng, parallel_map)
         effects = [*effects, *(form for form in forms if form in outcome.hypothesis.effects)]
     interim.keep_outcome(base, outcome, effects, step=MISSING_TERMS)
     progress("searching for missing terms", 0.92)
     terms = interim.keep_terms(
-        None if is_clean else find_missing_terms(base, outcome, target, effects, fitted, rng, parallel_map)
+        None if is_clean else find_missing_terms(base, outcome, target, effects, rng, parallel_map)
     )
     progress("screening alternative causes", 0.95)
-    found = interim.keep_diagnosis(
-        make_diagnosis(record, outcome, base, terms, effects, fitted, rng, parallel_map)
-    )
-    if terms is not None and replaces_effects(terms, base, outcome, target, fitted, rng):
+    found = interim.keep_diagnosis(make_diagnosis(record, outcome, base, terms, effects, rng, parallel_map))
+    if terms is not None and replaces_effects(terms, base, outcome, target, rng):
         found = extend_equations(found, terms, target, effects, rng, parallel_map)
-    closed_loop = find_closed_loop(found.best, record.y, fitted, record.input_names[0])
+    closed_loop = find_closed_loop(found.best, target, record.input_names[0])
     return interim.complete(replace(found, record_findings=(*record_findings, *closed_loop)))
 
 

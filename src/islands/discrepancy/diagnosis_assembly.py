@@ -34,7 +34,7 @@ MIN_CONFIDENCE = 0.15
 
 
 def make_gross_diagnosis(
-    record: Dataset, base: CalibrationResult, errors: Sequence[GrossError], fitted: int
+    record: Dataset, base: CalibrationResult, errors: Sequence[GrossError], target: Target
 ) -> Diagnosis:
     """Describe gross errors. No effects are searched for; the best fit is that of the corrected record."""
     best = errors[0]
@@ -46,12 +46,12 @@ def make_gross_diagnosis(
         residual_structure={},
         suggested_experiment="",
         record=record,
-        estimation_samples=fitted,
+        estimation_samples=target.fitted,
         base=base,
         best=best.fit_of_record or base,
         noise_floor=best.rmse,
         is_noise_floor_measured=False,
-        nominal_rmse=compute_rmse((record.y - base.output)[fitted:]),
+        nominal_rmse=compute_rmse((record.y - base.output)[target.fitted :]),
         record_findings=list_record_findings(errors),
     )
 
@@ -120,7 +120,6 @@ def make_diagnosis(
     base: CalibrationResult,
     terms: MissingTerms | None,
     effects: Sequence[Effect],
-    fitted: int,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
 ) -> Diagnosis:
@@ -130,6 +129,7 @@ def make_diagnosis(
     ones. Missing terms, if there are any, are an alternative of a single effect.
     """
     verdict, floor, target = outcome.verdict, outcome.noise_floor, outcome.target
+    fitted = target.fitted
     base = fit_initial_states(base, target, fitted)
     hypothesis = replace(outcome.hypothesis, fit=fit_initial_states(outcome.hypothesis.fit, target, fitted))
     holdout = slice(fitted, record.samples)
@@ -140,7 +140,7 @@ def make_diagnosis(
         gain = measure_gain(record, before, hypothesis.fit.output, holdout, floor**0.5, rng)
         # Under model error, a gain in the estimation part is no evidence of one in another part.
         is_confirmed = (
-            bound_gain(gain, before, hypothesis.fit, target, fitted, rng) >= -MAX_HOLDOUT_LOSS_PERCENT
+            bound_gain(gain, before, hypothesis.fit, target, rng) >= -MAX_HOLDOUT_LOSS_PERCENT
             if target.effective_samples is None
             else gain.ci95[0] > 0.0
         )

@@ -52,7 +52,7 @@ class InterimFindings:
     """
 
     def __init__(self) -> None:
-        self._begun: tuple[Dataset, CalibrationResult, Target, int, Sequence[RecordFinding]] | None = None
+        self._begun: tuple[Dataset, CalibrationResult, Target, Sequence[RecordFinding]] | None = None
         self._fits: _ScreeningFits | None = None
         self._screened: tuple[CalibrationResult, Sequence[ScreenedEffect]] | None = None
         self._assessed: tuple[CalibrationResult, SearchOutcome, Sequence[Effect]] | None = None
@@ -65,11 +65,10 @@ class InterimFindings:
         record: Dataset,
         base: CalibrationResult,
         target: Target,
-        fitted: int,
         record_findings: Sequence[RecordFinding],
     ) -> None:
         """Keep the calibrated simulation, the first result of a diagnosis."""
-        self._begun = record, base, target, fitted, record_findings
+        self._begun = record, base, target, record_findings
 
     def record_screening(self, base: CalibrationResult, parallel_map: ParallelMap) -> ParallelMap:
         """Return a map that keeps the fits of the first screening while it runs."""
@@ -133,7 +132,7 @@ class InterimFindings:
         """
         if self._step is None or self._begun is None:
             return self._found
-        record, base, target, fitted, record_findings = self._begun
+        record, base, target, record_findings = self._begun
         rng = np.random.default_rng(seed)
         left_out = list(STEPS[STEPS.index(self._step) :])
         if self._found is not None:
@@ -141,7 +140,7 @@ class InterimFindings:
         elif self._assessed is not None and _has_alternatives(self._assessed[1]):
             base, outcome, effects = self._assessed
             left_out.remove(ALTERNATIVES)
-            found = make_diagnosis(record, outcome, base, self._terms, effects, fitted, rng, map)
+            found = make_diagnosis(record, outcome, base, self._terms, effects, rng, map)
         else:
             screened: Sequence[ScreenedEffect] = ()
             if self._screened is not None:
@@ -150,9 +149,9 @@ class InterimFindings:
                 base, screened = self._fits.base, self._fits.rank()
                 if self._step == SCREENING:
                     left_out[0] = f"{SCREENING} ({len(screened)} are screened)"
-            outcome = _make_outcome(base, screened, target, fitted, rng)
-            found = make_diagnosis(record, outcome, base, None, (), fitted, rng, map)
-        closed_loop = find_closed_loop(found.best, record.y, fitted, record.input_names[0])
+            outcome = _make_outcome(base, screened, target, rng)
+            found = make_diagnosis(record, outcome, base, None, (), rng, map)
+        closed_loop = find_closed_loop(found.best, target, record.input_names[0])
         return replace(found, record_findings=(*record_findings, *closed_loop), left_out=tuple(left_out))
 
 
@@ -201,11 +200,10 @@ def _make_outcome(
     base: CalibrationResult,
     screened: Sequence[ScreenedEffect],
     target: Target,
-    fitted: int,
     rng: np.random.Generator,
 ) -> SearchOutcome:
     """Return the outcome of a search that was stopped before a verdict."""
-    rest = analyse_residual(base, target, fitted, rng)
+    rest = analyse_residual(base, target, rng)
     return replace(
         make_outcome(base, screened, target, Hypothesis(base, base.score, ())),
         noise_floor=rest.noise_floor,

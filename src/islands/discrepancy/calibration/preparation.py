@@ -185,7 +185,8 @@ def make_target(record: Dataset, fitted: int, prior_std: Mapping[str, float]) ->
     """Return the target of a calibration; missing outputs are not part of it."""
     is_known = ~np.isnan(record.y)
     is_fitted = is_known & (np.arange(record.samples) < fitted)
-    return Target(record.y, is_fitted, None, prior_std, segments=split_at_gaps(is_known, record.segments))
+    segments = split_at_gaps(is_known, record.segments)
+    return Target(record.y, is_fitted, None, prior_std, segments=segments, fitted=fitted)
 
 
 def make_context(record: Dataset, simulator: Simulator, fitted: int) -> SimulationContext:

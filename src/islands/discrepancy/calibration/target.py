@@ -1,7 +1,7 @@
 """Target of a calibration: the measured output, its weighting and the prior of the parameters."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,8 @@ class Target:
         white or coloured.
     segments : tuple of int
         Lengths in samples of the recordings, cut at the gaps of the output; empty for a single recording.
+    fitted : int
+        Number of samples before the hold-out part, missing ones included.
     """
 
     y: Signal
@@ -39,6 +41,7 @@ class Target:
     prior_std: Mapping[str, float]
     effective_samples: float | None = None
     segments: tuple[int, ...] = ()
+    fitted: int = field(kw_only=True)
 
     @property
     def fitted_segments(self) -> tuple[int, ...]:

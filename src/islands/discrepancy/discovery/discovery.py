@@ -109,7 +109,6 @@ def find_missing_terms(
     alone: SearchOutcome,
     target: Target,
     effects: Sequence[Effect],
-    fitted: int,
     rng: np.random.Generator,
     parallel_map: ParallelMap = map,
 ) -> MissingTerms | None:
@@ -127,8 +126,6 @@ def find_missing_terms(
         Target of ``base``.
     effects : sequence of Effect
         Effects that are searched for.
-    fitted : int
-        Number of samples used for estimation.
     parallel_map : ParallelMap
         Fits the terms.
 
@@ -145,9 +142,9 @@ def find_missing_terms(
     is_better = terms is not None and terms.is_better(alone)
     if not is_better and len(alone.hypothesis.effects) == 1 and alone.verdict == Verdict.NAMED:
         return terms
-    if terms and is_better and _is_contradicted(terms.search.fit, effects_alone.fit, target, fitted, rng):
+    if terms and is_better and _is_contradicted(terms.search.fit, effects_alone.fit, target, rng):
         return terms
-    joint = search_jointly(found, base, alone, effects_alone.cost, target, effects, fitted, rng, parallel_map)
+    joint = search_jointly(found, base, alone, effects_alone.cost, target, effects, rng, parallel_map)
     if joint is None:
         return terms
     together = _compare(joint, effects_alone)
@@ -156,9 +153,7 @@ def find_missing_terms(
     return terms
 
 
-def explain_all(
-    base: CalibrationResult, target: Target, fitted: int, seed: int, parallel_map: ParallelMap = map
-) -> bool:
+def explain_all(base: CalibrationResult, target: Target, seed: int, parallel_map: ParallelMap = map) -> bool:
     """Return whether missing terms at the output of a simulation leave nothing but noise.
 
     It is for simulations without equations, whose terms are found in a tenth of the time that the search with
@@ -166,7 +161,7 @@ def explain_all(
 
     Parameters
     ----------
-    base, target, fitted, parallel_map
+    base, target, parallel_map
         Arguments of `find_missing_terms`.
     seed : int
         Seed of the surrogates of the residual.
@@ -176,17 +171,17 @@ def explain_all(
     found = search_terms(base, target, parallel_map)
     if found is None:
         return False
-    return not analyse_residual(found.fit, target, fitted, np.random.default_rng(seed)).is_structured
+    return not analyse_residual(found.fit, target, np.random.default_rng(seed)).is_structured
 
 
 def _is_contradicted(
-    after: CalibrationResult, before: CalibrationResult, target: Target, fitted: int, rng: np.random.Generator
+    after: CalibrationResult, before: CalibrationResult, target: Target, rng: np.random.Generator
 ) -> bool:
     """Return whether a fit with the better score has the larger error in the hold-out part.
 
     The residual is then no noise, and scores of further terms say nothing.
     """
-    old, new = (compute_holdout_errors(each, target, fitted) for each in (before, after))
+    old, new = (compute_holdout_errors(each, target) for each in (before, after))
     return bound_reduction(old, new, rng)[1] < 0.0
 
 
@@ -217,7 +212,6 @@ def replaces_effects(
     base: CalibrationResult,
     alone: SearchOutcome,
     target: Target,
-    fitted: int,
     rng: np.random.Generator,
 ) -> bool:
     """Return whether missing terms explain clearly more than effects, also on blocks that are left out.
@@ -226,12 +220,10 @@ def replaces_effects(
     ----------
     base, alone, target
         Arguments of `find_missing_terms`.
-    fitted : int
-        Number of samples used for estimation.
     """
     if not terms.is_better(alone):
         return False
-    return cross_validate_gain(base, False, terms.search.fit, target, fitted, rng) > 0.0
+    return cross_validate_gain(base, False, terms.search.fit, target, rng) > 0.0
 
 
 def _count_values(fit: CalibrationResult) -> int:

@@ -41,7 +41,6 @@ MAX_REPLACEMENTS = 3
 def compare_with_free_forms(
     outcome: SearchOutcome,
     forms: Sequence[Effect],
-    fitted: int,
     effects: Sequence[Effect],
     rng: np.random.Generator,
     parallel_map: ParallelMap,
@@ -53,7 +52,7 @@ def compare_with_free_forms(
     named = [effect for effect in effects if not effect.is_free]
     freer = search_free_forms(outcome, forms, named, parallel_map)
     if freer.hypothesis is not outcome.hypothesis:
-        assessed = assess_evidence(freer, fitted, effects, rng)
+        assessed = assess_evidence(freer, effects, rng)
         has_forms = any(effect.is_free for effect in assessed.hypothesis.effects)
         if has_forms and assessed.verdict != Verdict.UNKNOWN:
             return assessed

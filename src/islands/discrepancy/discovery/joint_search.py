@@ -49,7 +49,6 @@ def search_jointly(
     least: float,
     target: Target,
     effects: Sequence[Effect],
-    fitted: int,
     rng: np.random.Generator,
     parallel_map: ParallelMap = map,
 ) -> JointResult | None:
@@ -64,7 +63,7 @@ def search_jointly(
         Terms that were found without effects.
     least : float
         Cost of the effects without terms.
-    base, alone, target, effects, fitted
+    base, alone, target, effects
         Arguments of `discovery.find_missing_terms`.
     """
     starts = _list_starts(alone)
@@ -79,7 +78,7 @@ def search_jointly(
     if best is None:
         return None
     terms = search_terms(best.base, target, parallel_map, least, best)
-    return _assess_effects(terms or best, target, effects, fitted, rng, parallel_map)
+    return _assess_effects(terms or best, target, effects, rng, parallel_map)
 
 
 def _list_starts(alone: SearchOutcome) -> list[Hypothesis]:
@@ -130,7 +129,6 @@ def _assess_effects(
     terms: TermSearchResult,
     target: Target,
     effects: Sequence[Effect],
-    fitted: int,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
 ) -> JointResult | None:
@@ -139,7 +137,7 @@ def _assess_effects(
     without = _calibrate_with(fit, (), whitened)
     (hypothesis,), whitened = refit_with_ar_noise([Hypothesis(fit, terms.cost, terms.effects)], whitened)
     hypothesis = eliminate_backward(hypothesis, whitened, MIN_GAIN, parallel_map)
-    outcome = assess_evidence(make_outcome(without, (), whitened, hypothesis), fitted, effects, rng)
+    outcome = assess_evidence(make_outcome(without, (), whitened, hypothesis), effects, rng)
     kept = outcome.hypothesis
     if not kept.effects:
         return None

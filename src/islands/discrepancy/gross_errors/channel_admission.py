@@ -40,10 +40,10 @@ def admit_channels(
     read : set of str
         Names of the channels that the simulation reads.
     """
-    kept, findings = [0], []
+    kept, findings, estimation = [0], [], record[:fitted]
     for place in range(1, record.inputs):
         is_read = record.input_names[place] in read
-        finding = None if is_read else _examine_channel(record, place, fitted)
+        finding = None if is_read else _examine_channel(estimation, place)
         if finding is None:
             kept.append(place)
         else:
@@ -61,9 +61,9 @@ def admit_channels(
     )
 
 
-def _examine_channel(record: Dataset, place: int, fitted: int) -> RecordFinding | None:
-    """Return the reason to leave a channel out, or None."""
-    name, channel = record.input_names[place], record.u[:fitted, place]
+def _examine_channel(record: Dataset, place: int) -> RecordFinding | None:
+    """Return the reason to leave a channel out of the estimation part of a record, or None."""
+    name, channel = record.input_names[place], record.u[:, place]
     if np.ptp(channel) == 0.0:
         return RecordFinding(
             "constant-channel",
@@ -73,8 +73,8 @@ def _examine_channel(record: Dataset, place: int, fitted: int) -> RecordFinding 
     is_thermal = record.input_units[place] in TEMPERATURES
     allowed = MAX_DIFFERENCE_OF_TEMPERATURE if is_thermal else MAX_DIFFERENCE
     difference, factor, original = min(
-        (*_fit_copy(channel, record.y[:fitted]), record.output_name),
-        (*_fit_copy(channel, record.u[:fitted, 0]), record.input_names[0]),
+        (*_fit_copy(channel, record.y), record.output_name),
+        (*_fit_copy(channel, record.u[:, 0]), record.input_names[0]),
     )
     if difference > allowed:
         return None

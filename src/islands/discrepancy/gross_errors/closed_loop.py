@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.gross_errors.record_finding import RecordFinding
 from islands.discrepancy.interfaces.effect import Signal
 
@@ -40,21 +41,15 @@ MIN_SAMPLES = 10 * ORDER
 MIN_SHIFT = 4 * LAGS
 
 
-def find_closed_loop(
-    fit: CalibrationResult, y: Signal, fitted: int, input_name: str
-) -> tuple[RecordFinding, ...]:
+def find_closed_loop(fit: CalibrationResult, target: Target, input_name: str) -> tuple[RecordFinding, ...]:
     """Return a finding if the input depends on earlier errors of a simulation; otherwise nothing.
 
     Parameters
     ----------
     fit : CalibrationResult
         The best simulation.
-    y : ndarray, shape (samples,)
-        Measured output.
-    fitted : int
-        Number of samples used for estimation.
     """
-    u, residual = fit.simulation.context.u[:fitted], (y - fit.output)[:fitted]
+    u, residual = fit.simulation.context.u[: target.fitted], (target.y - fit.output)[: target.fitted]
     residual = np.where(np.isnan(residual), np.nanmean(residual), residual)
     # Feedback within a sample and a simulation that responds at once are alike.
     first = 1 if acts_at_once(fit) else 0

@@ -69,7 +69,7 @@ class CorrectedSimulation:
 
 
 def make_corrected_simulation(
-    correction: Correction, simulator: Simulator, target: Target, fitted: int
+    correction: Correction, simulator: Simulator, target: Target
 ) -> CorrectedSimulation | None:
     """Return the simulation of a corrected record; None if it fails or diverges.
 
@@ -77,10 +77,8 @@ def make_corrected_simulation(
     ----------
     target : Target
         Target of the record as given.
-    fitted : int
-        Number of samples used for estimation.
     """
-    record = correction.record
+    record, fitted = correction.record, target.fitted
     context = _try(lambda: make_context(record, simulator, fitted))
     if context is None:
         return None

@@ -1,6 +1,6 @@
 """Search for gross errors of a record: a few discrete corrections, each compared with the record as given."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +8,6 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.discrepancy.calibration.noise_model import estimate_effective_samples
-from islands.discrepancy.calibration.preparation import make_target
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.gross_errors.channel_corrections import correct_swapped_channels
 from islands.discrepancy.gross_errors.corrected_simulation import (
@@ -72,8 +71,7 @@ def find_gross_errors(
     record: Dataset,
     simulator: Simulator,
     base: CalibrationResult | None,
-    fitted: int,
-    prior_std: Mapping[str, float],
+    target: Target,
 ) -> tuple[GrossError, ...]:
     """Return the gross errors that explain nearly all of a large misfit, the best first; usually none.
 
@@ -83,12 +81,9 @@ def find_gross_errors(
     ----------
     base : CalibrationResult or None
         The simulation as given, calibrated; None if it diverges.
-    fitted : int
-        Number of samples used for estimation.
-    prior_std : mapping
-        Relative standard deviations of the simulator's parameters about their nominal values.
+    target : Target
+        Target of the record as given.
     """
-    target = make_target(record, fitted, prior_std)
     error_before, free_error, nominal = DIVERGED, DIVERGED, np.full(record.samples, np.nan)
     if base is not None:
         error_before = relative_error(limit_to_tolerances(base, target), target)
@@ -99,7 +94,7 @@ def find_gross_errors(
     found = []
     read = find_read_channels(simulator)
     for check in CHECKS:
-        for candidate in _select(check(record, read, nominal, fitted), simulator, target, nominal, fitted):
+        for candidate in _select(check(record, read, nominal, target.fitted), simulator, target, nominal):
             if (fit := candidate.calibrate()) is None:
                 continue
             correction, corrected = candidate.correction, candidate.target
@@ -131,11 +126,10 @@ def explain_divergence(
     error: RecordError,
     record: Dataset,
     simulator: Simulator,
-    fitted: int,
-    prior_std: Mapping[str, float],
+    target: Target,
 ) -> RecordError:
     """Return the error of a simulation that diverges, with the gross error of the record that explains it."""
-    found = find_gross_errors(record, simulator, None, fitted, prior_std)
+    found = find_gross_errors(record, simulator, None, target)
     if not found:
         return error
     correction = found[0].correction
@@ -166,7 +160,7 @@ def _explain_negative_parameters(
 
 
 def _select(
-    corrections: Iterable[Correction], simulator: Simulator, target: Target, nominal: Signal, fitted: int
+    corrections: Iterable[Correction], simulator: Simulator, target: Target, nominal: Signal
 ) -> Sequence[CorrectedSimulation]:
     """Return the simulations of the best corrections that change something, from their fitted initial states.
 
@@ -174,7 +168,7 @@ def _select(
     """
     rated = []
     for correction in corrections:
-        candidate = make_corrected_simulation(correction, simulator, target, fitted)
+        candidate = make_corrected_simulation(correction, simulator, target)
         if candidate is None or _changes_nothing(candidate, target, nominal):
             continue
         fit = candidate.fit_states()

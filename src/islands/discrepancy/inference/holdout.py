@@ -96,10 +96,10 @@ def measure_gain(
     )
 
 
-def compute_holdout_errors(fit: CalibrationResult, target: Target, fitted: int) -> Signal:
+def compute_holdout_errors(fit: CalibrationResult, target: Target) -> Signal:
     """Return the errors of a fit at the samples of the hold-out part that are not missing."""
-    errors: Signal = (target.y - fit_initial_states(fit, target, fitted).output)[fitted:]
-    return errors[~np.isnan(target.y[fitted:])]
+    errors: Signal = (target.y - fit_initial_states(fit, target, target.fitted).output)[target.fitted :]
+    return errors[~np.isnan(target.y[target.fitted :])]
 
 
 def bound_reduction(before: Signal, after: Signal, rng: np.random.Generator) -> tuple[float, float]:
@@ -136,7 +136,6 @@ def bound_gain(
     before: Signal,
     after: CalibrationResult,
     target: Target,
-    fitted: int,
     rng: np.random.Generator,
 ) -> float:
     """Return an upper bound on the reduction of the error of the hold-out part, in percent.
@@ -147,13 +146,12 @@ def bound_gain(
     ----------
     before : ndarray, shape (samples,)
         Output of the simulation without the effects.
-    fitted : int
-        Number of samples used for estimation.
     """
     if not after.noise.order:
         return gain.ci95[1]
     old, new = (
-        after.noise.whiten(target.y - output, target.segments)[fitted:] for output in (before, after.output)
+        after.noise.whiten(target.y - output, target.segments)[target.fitted :]
+        for output in (before, after.output)
     )
     is_known = ~np.isnan(old)
     return min(gain.ci95[1], bound_reduction(old[is_known], new[is_known], rng)[1])
@@ -169,7 +167,6 @@ def cross_validate_gain(
     keep_values: bool,
     after: CalibrationResult,
     target: Target,
-    fitted: int,
     rng: np.random.Generator,
 ) -> float:
     """Return a lower bound on the gain of an extension over blocks that were left out of the fits.
@@ -181,9 +178,8 @@ def cross_validate_gain(
     ----------
     keep_values : bool
         Whether ``before`` keeps its values instead of being calibrated to each fold.
-    fitted : int
-        Number of samples used for estimation.
     """
+    fitted = target.fitted
     block = np.arange(target.y.size) * BLOCKS // fitted
     is_kept = block == 0
     for first, last in find_bounds(after.simulation.context.segments, fitted)[1:]:

@@ -153,25 +153,23 @@ def make_exact_outcome(base: CalibrationResult, target: Target) -> SearchOutcome
 
 
 def assess_evidence(
-    outcome: SearchOutcome, fitted: int, effects: Sequence[Effect], rng: np.random.Generator
+    outcome: SearchOutcome, effects: Sequence[Effect], rng: np.random.Generator
 ) -> SearchOutcome:
     """Remove effects that fail on other samples, analyse the residual, and classify the outcome.
 
     Parameters
     ----------
-    fitted : int
-        Number of samples used for estimation.
     effects : sequence of Effect
         Effects that were searched for.
     """
     base, target = outcome.base, outcome.target
     hypothesis = remove_chance_effects(outcome.hypothesis, base, target, effects)
-    hypothesis = validate_out_of_sample(hypothesis, base, target, fitted, rng)
-    rest = analyse_residual(hypothesis.fit, target, fitted, rng)
+    hypothesis = validate_out_of_sample(hypothesis, base, target, rng)
+    rest = analyse_residual(hypothesis.fit, target, rng)
     if rest.is_structured or target.effective_samples is not None:
-        confirmed = withdraw_effects(hypothesis, target, fitted, rng)
+        confirmed = withdraw_effects(hypothesis, target, rng)
         if confirmed is not hypothesis:
-            hypothesis, rest = confirmed, analyse_residual(confirmed.fit, target, fitted, rng)
+            hypothesis, rest = confirmed, analyse_residual(confirmed.fit, target, rng)
     # Under model error the noise floor is unknown: the fraction refers to the whole misfit.
     explained = explained_fraction(
         choose_reference_fit(hypothesis, base, target),
@@ -204,11 +202,10 @@ class ResidualAnalysis:
     is_structured: bool
 
 
-def analyse_residual(
-    fit: CalibrationResult, target: Target, fitted: int, rng: np.random.Generator
-) -> ResidualAnalysis:
+def analyse_residual(fit: CalibrationResult, target: Target, rng: np.random.Generator) -> ResidualAnalysis:
     """Estimate the noise floor, and decide whether the residual of a fit has structure."""
-    context, output = fit.simulation.context, fit.output[:fitted]
+    fitted, context = target.fitted, fit.simulation.context
+    output = fit.output[:fitted]
     residual = target.y[:fitted] - output
     explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
     structure = find_residual_structure(residual, output, context, rng)

@@ -78,7 +78,7 @@ def remove_chance_effects(
 
 
 def validate_out_of_sample(
-    hypothesis: Hypothesis, base: CalibrationResult, target: Target, fitted: int, rng: np.random.Generator
+    hypothesis: Hypothesis, base: CalibrationResult, target: Target, rng: np.random.Generator
 ) -> Hypothesis:
     """Remove effects, the least important first, until the rest has a cross-validated gain.
 
@@ -88,7 +88,7 @@ def validate_out_of_sample(
     while hypothesis.effects:
         reference = choose_reference_fit(hypothesis, base, target)
         keep_values = reference is not base
-        if cross_validate_gain(reference, keep_values, hypothesis.fit, target, fitted, rng) > 0.0:
+        if cross_validate_gain(reference, keep_values, hypothesis.fit, target, rng) > 0.0:
             break
         hypothesis = without_effect(hypothesis, hypothesis.effects[-1], target)
     excess = _sum_confounder_excess(hypothesis, target)
@@ -100,24 +100,17 @@ def validate_out_of_sample(
     return hypothesis
 
 
-def withdraw_effects(
-    hypothesis: Hypothesis, target: Target, fitted: int, rng: np.random.Generator
-) -> Hypothesis:
+def withdraw_effects(hypothesis: Hypothesis, target: Target, rng: np.random.Generator) -> Hypothesis:
     """Remove further effects, the least important first, that do not reduce the error of the hold-out part.
 
     It is for simulations that are still wrong. An effect is kept if the hold-out part cannot show it, as a
     state that does not reach its limit there, and if it is a gain or a parameter, which calibration replaces.
-
-    Parameters
-    ----------
-    fitted : int
-        Number of samples used for estimation.
     """
     for effect in hypothesis.effects[:0:-1]:
         if effect.family == "scale":
             continue
         without = without_effect(hypothesis, effect, target)
-        before, after = (compute_holdout_errors(each.fit, target, fitted) for each in (without, hypothesis))
+        before, after = (compute_holdout_errors(each.fit, target) for each in (without, hypothesis))
         is_visible = np.std(after - before) > MIN_VISIBLE_FRACTION * np.std(before)
         if is_visible and bound_reduction(before, after, rng)[0] <= 0.0:
             hypothesis = without

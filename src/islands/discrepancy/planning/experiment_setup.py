@@ -10,6 +10,7 @@ from islands.discrepancy.calibration.preparation import (
     MIN_SAMPLES,
     estimation_part,
     make_context,
+    make_target,
     select_effects,
 )
 from islands.discrepancy.effects import EFFECTS
@@ -55,7 +56,8 @@ def make_experiment(
     fitted = estimation_part(record).samples
     context = make_context(_fill_output(record), simulator, fitted)
     if noise_std is None:
-        noise = estimate_noise(record, ExtendedSimulator(simulator, (), context), prior_std, fitted)
+        target = make_target(record, fitted, prior_std)
+        noise = estimate_noise(record, ExtendedSimulator(simulator, (), context), target)
     else:
         noise = make_white_noise(noise_std)
     output = MeasuredChannel(record.output_name, record.output_unit, simulator, context, noise)

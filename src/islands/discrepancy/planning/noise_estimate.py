@@ -1,13 +1,11 @@
 """Noise model of an output, estimated from its measured values before an experiment is planned."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import calibrate
 from islands.discrepancy.calibration.noise_model import fit_noise
-from islands.discrepancy.calibration.preparation import make_target
+from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.inference.noise_floor import contrast_periods, explain_residual
 from islands.discrepancy.planning.channel_noise import ChannelNoise, NoiseOrigin
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -17,19 +15,12 @@ from islands.errors import RecordError
 _ROUNDING = 1e-9
 
 
-def estimate_noise(
-    record: Dataset, simulation: ExtendedSimulator, prior_std: Mapping[str, float], fitted: int
-) -> ChannelNoise:
+def estimate_noise(record: Dataset, simulation: ExtendedSimulator, target: Target) -> ChannelNoise:
     """Estimate the noise of a measured output, and its colour.
 
     If the input repeats, the noise is what differs between periods. Otherwise it is the part of the residual
     of the calibrated simulation that a regression on its signals does not predict: an upper bound, since it
     may contain errors of the simulation.
-
-    Parameters
-    ----------
-    fitted : int
-        Number of samples, from the first on, that are used.
 
     Raises
     ------
@@ -40,10 +31,11 @@ def estimate_noise(
         raise RecordError(
             "the noise is unknown, since the record has no complete output: give its standard deviation"
         )
+    fitted = target.fitted
     u, y = record.u[:fitted, 0], record.y[:fitted]
     parts, origin = contrast_periods(u, y), NoiseOrigin.PERIODS
     if parts is None:
-        base = calibrate(simulation, make_target(record, fitted, prior_std), simulation.nominal)
+        base = calibrate(simulation, target, simulation.nominal)
         output = base.output[:fitted]
         left = explain_residual(y - output, u, output, np.random.default_rng(0))[1]
         parts, origin = left[None], NoiseOrigin.RESIDUAL

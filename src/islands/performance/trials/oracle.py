@@ -38,8 +38,9 @@ def compute_gain_share(
     float or None
         None if the oracle improves the fit by less than 1 %, or if a fault has no effect in the catalogue.
     """
-    estimation_part = np.arange(found.record.samples) < found.estimation_samples
-    target = Target(found.record.y, estimation_part, None, tolerance, segments=found.record.segments)
+    record, fitted = found.record, found.estimation_samples
+    estimation_part = np.arange(record.samples) < fitted
+    target = Target(record.y, estimation_part, None, tolerance, segments=record.segments, fitted=fitted)
     simulation = found.base.simulation
     effects = select_effects(simulation.simulator, simulation.context, tolerance)
     oracle = found.base

@@ -129,7 +129,7 @@ def make_fit(segments: tuple[int, ...]) -> tuple[CalibrationResult, Target]:
     u = np.concatenate(parts)
     context = make_context(u, segments)
     simulator = LinearSimulator(np.array([0.1, 0.0]), np.array([0.9]), 0.0, 0.0, 0, "um")
-    target = Target(np.roll(u, 3), np.arange(SAMPLES) < 750, None, {}, segments=segments)
+    target = Target(np.roll(u, 3), np.arange(SAMPLES) < 750, None, {}, segments=segments, fitted=750)
     simulation = ExtendedSimulator(simulator, (), context)
     return evaluate_fit(simulation, target, simulation.nominal + 0.05), target
 
@@ -186,7 +186,7 @@ def test_first_samples_of_recordings_are_never_left_out(monkeypatch: pytest.Monk
         return fit
 
     monkeypatch.setattr("islands.discrepancy.inference.holdout.calibrate", record_part)
-    cross_validate_gain(fit, True, fit, target, 750, np.random.default_rng(0))
+    cross_validate_gain(fit, True, fit, target, np.random.default_rng(0))
     fitted = np.array(parts)
     for first in (0, 400, 700):
         assert fitted[:, first : first + 20].all()

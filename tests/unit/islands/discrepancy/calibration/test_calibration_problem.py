@@ -25,7 +25,7 @@ def oscillator() -> tuple[ExtendedSimulator, Target]:
     core = make_simulator(SPRING, record)
     simulation = ExtendedSimulator(core, (CATALOGUE["cubic-stiffness"],), make_context(record, core, 180))
     y = simulation.simulate(1.03 * simulation.nominal) + 1e-2 * np.random.default_rng(4).standard_normal(240)
-    return simulation, Target(y, np.arange(240) < 180, None, {})
+    return simulation, Target(y, np.arange(240) < 180, None, {}, fitted=180)
 
 
 def test_derivatives_of_the_same_call_have_the_same_bits(
@@ -91,6 +91,6 @@ def test_calibration_reaches_values_next_to_the_limit_of_an_effect(chi: float, g
     part = simulation.get_slice(effect)
     true[part] = [60.0, 4.0 / peak, -1.4 * 4.0 / peak, 0.0]
     start[part] = [30.0, chi / peak, g * chi / peak, 0.0]
-    target = Target(simulation.simulate(true), np.arange(600) < 450, None, {})
+    target = Target(simulation.simulate(true), np.arange(600) < 450, None, {}, fitted=450)
     fit = calibrate(simulation, target, start)
     np.testing.assert_allclose(fit.values[part][:3], true[part][:3], rtol=1e-3)

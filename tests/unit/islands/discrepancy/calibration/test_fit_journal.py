@@ -37,7 +37,7 @@ def due() -> tuple[StartsCalibrator, Tasks]:
         simulation.with_effects((CATALOGUE[name],))
         for name in ("offset", "jump", "even-nonlinearity", "delay")
     ]
-    target = Target(record.y, np.arange(100) < 75, None, {})
+    target = Target(record.y, np.arange(100) < 75, None, {}, fitted=75)
     return StartsCalibrator(target), [(each, [each.nominal, each.nominal + 0.01]) for each in extended]
 
 

@@ -56,7 +56,7 @@ def make_inputs(intersample: InterSample) -> tuple[Array, Array]:
 def calibrate_to(record: Dataset, core: Simulator) -> tuple[CalibrationResult, Target]:
     samples = count_fitted_samples(record)
     simulation = ExtendedSimulator(core, (), make_context(record, core, samples))
-    target = Target(record.y, np.arange(record.samples) < samples, None, {})
+    target = Target(record.y, np.arange(record.samples) < samples, None, {}, fitted=samples)
     return calibrate(simulation, target, simulation.nominal), target
 
 
@@ -158,7 +158,7 @@ def test_a_simulation_that_smaller_steps_do_not_improve_keeps_its_step() -> None
     )
     simulator = make_ode_simulator(make_system(lorenz), record)
     simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, 3000))
-    target = Target(record.y, np.arange(4000) < 3000, None, {})
+    target = Target(record.y, np.arange(4000) < 3000, None, {}, fitted=3000)
     selected = select_intersample(evaluate_fit(simulation, target, simulation.nominal), target)
     steps = selected.oversampling if isinstance(selected, ResampledSimulator) else 1
     assert steps == 1

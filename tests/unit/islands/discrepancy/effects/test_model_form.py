@@ -68,7 +68,7 @@ def test_calibrated_missing_terms_reduce_the_error_to_the_noise(
     extended: ExtendedSimulator, faulty: FaultyRecord
 ) -> None:
     alone = extended.with_effects(())
-    target = Target(faulty.record.y, np.arange(2000) < 1500, None, {})
+    target = Target(faulty.record.y, np.arange(2000) < 1500, None, {}, fitted=1500)
     before = calibrate(alone, target, alone.nominal)
     after = calibrate(extended, target, get_starting_values(extended, faulty))
     assert before.mean_square > 1.2 * faulty.sigma**2
@@ -98,7 +98,7 @@ def test_an_extended_model_contains_the_missing_terms(
     extended: ExtendedSimulator, faulty: FaultyRecord
 ) -> None:
     record, values = faulty.record, get_starting_values(extended, faulty)
-    target = Target(record.y, np.arange(record.samples) < 1500, None, {})
+    target = Target(record.y, np.arange(record.samples) < 1500, None, {}, fitted=1500)
     fit = evaluate_fit(extended, target, values)
     document = extended_document(fit, record)
     assert document["effects"] == []

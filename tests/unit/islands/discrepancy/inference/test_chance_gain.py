@@ -27,7 +27,7 @@ def calibrated(noise: np.ndarray, has_model_error: bool = False):
     fitted = count_fitted_samples(record)
     simulator = RecordedOutput("theirs", u)
     simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
-    target = Target(record.y, np.arange(record.samples) < fitted, None, {})
+    target = Target(record.y, np.arange(record.samples) < fitted, None, {}, fitted=fitted)
     if has_model_error:
         residual = target.residual(u)
         target = replace(target, effective_samples=estimate_effective_samples(residual))

@@ -59,7 +59,7 @@ def fit_and_find(u: Array, y: Array, name: str, simulator: Simulator = UNIT_GAIN
     """Fit an effect and return its confounder."""
     record = recorded(u, y)
     simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, u.size))
-    target = Target(y, np.ones(u.size, dtype=bool), None, {})
+    target = Target(y, np.ones(u.size, dtype=bool), None, {}, fitted=u.size)
     base = calibrate(simulation, target, simulation.nominal)
     return find_confounder(screen_effects(base, target, [CATALOGUE[name]])[0].fit, CATALOGUE[name], target)
 

@@ -22,7 +22,7 @@ def test_parameter_whose_change_lets_the_simulation_diverge_absorbs_nothing() ->
     simulator = LinearSimulator(np.array([1.0, 0.0]), np.array([1.0]), 0.0, 0.0, 0, "um")
     record = Dataset(u[:, None], y, 0.01)
     simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, SAMPLES))
-    target = Target(y + 1.0, np.ones(SAMPLES, dtype=bool), None, {})
+    target = Target(y + 1.0, np.ones(SAMPLES, dtype=bool), None, {}, fitted=SAMPLES)
     fit = evaluate_fit(simulation, target, simulation.nominal)
     shifted = fit.values + 0.01 * np.diag(simulation.scales)
     diverges = [bool(np.isnan(each).any()) for each in simulation.simulate_batch(shifted)]

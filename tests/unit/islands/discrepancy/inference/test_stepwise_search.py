@@ -60,7 +60,7 @@ def calibrate_to(
 ) -> tuple[CalibrationResult, Target]:
     samples = count_fitted_samples(record)
     simulation = ExtendedSimulator(core, (), make_context(record, core, samples))
-    target = Target(record.y, np.arange(record.samples) < samples, None, {}, effective)
+    target = Target(record.y, np.arange(record.samples) < samples, None, {}, effective, fitted=samples)
     return calibrate(simulation, target, simulation.nominal), target
 
 

@@ -5,8 +5,7 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import calibrate
-from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
-from islands.discrepancy.calibration.target import Target
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, make_target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.strategies import assess_evidence, search_with_model_error
 from islands.discrepancy.inference.verdict import Verdict
@@ -56,11 +55,11 @@ def assessed(request):
     core = make_simulator(PhysicalSpec(kind="cascaded-tanks"), record)
     fitted = count_fitted_samples(record)
     simulation = ExtendedSimulator(core, (), make_context(record, core, fitted))
-    target = Target(record.y, np.arange(record.samples) < fitted, None, {})
+    target = make_target(record, fitted, {})
     base = calibrate(simulation, target, simulation.nominal)
     effects = [*core.state_effects, *(CATALOGUE[name] for name in request.param)]
     outcome = search_with_model_error(base, target, effects, ignore_progress, map)
-    return record, fitted, outcome, assess_evidence(outcome, fitted, effects, np.random.default_rng(0))
+    return record, fitted, outcome, assess_evidence(outcome, effects, np.random.default_rng(0))
 
 
 @pytest.mark.ci

@@ -54,7 +54,7 @@ def extend(case: SpecAndRecord, effects: list[Effect]) -> CalibrationResult:
     residual = 0.01 * context.output_peak * np.sin(2 * np.pi * 7.3 * context.time)
     for effect in simulation.effects:
         values[simulation.get_slice(effect)] = effect.starting_points(context, residual)[0]
-    target = Target(case.record.y, np.arange(case.record.samples) < fitted, None, {})
+    target = Target(case.record.y, np.arange(case.record.samples) < fitted, None, {}, fitted=fitted)
     return evaluate_fit(simulation, target, values)
 
 
