@@ -41,6 +41,7 @@ from islands.discrepancy.inference.strategies import (
     search_with_model_error,
 )
 from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator, find_read_channels, get_tolerances
@@ -113,7 +114,7 @@ def diagnose(
         context = make_context(record, simulator, fitted)
     except RecordError as error:
         raise explain_divergence(error, record, simulator, target) from error
-    rng = np.random.default_rng(seed)
+    run = DiagnosisRun((), np.random.default_rng(seed), parallel_map, progress)
     if find_equations(simulator) is None:
         simulator = add_output_equation(simulator, context)
     simulation = ExtendedSimulator(simulator, (), context)
@@ -125,37 +126,35 @@ def diagnose(
         found = make_gross_diagnosis(record, base, gross_errors, target)
         return interim.complete(replace(found, record_findings=(*found.record_findings, *record_findings)))
     if is_rounding_error(record.y - base.output, record.y):
-        found = make_diagnosis(record, make_exact_outcome(base, target), base, None, (), rng, map)
+        found = make_diagnosis(record, make_exact_outcome(base, target), base, None, run)
         return interim.complete(replace(found, record_findings=tuple(record_findings)))
-    effects = select_effects(simulator, context, prior_std, catalogue)
-    base, outcome = _search(base, target, effects, progress, parallel_map, interim)
+    run = run.with_effects(select_effects(simulator, context, prior_std, catalogue))
+    base, outcome = _search(base, target, run, interim)
     simulator = base.simulation.simulator
     interim.reach(EVIDENCE)
     progress("analysing the residual", 0.9)
-    outcome = interim.keep_outcome(base, assess_evidence(outcome, effects, rng), effects, step=MODEL_ERROR)
+    outcome = interim.keep_outcome(base, assess_evidence(outcome, run), run.effects, step=MODEL_ERROR)
     is_unknown = outcome.verdict == Verdict.UNKNOWN
     is_noise = outcome.verdict == Verdict.NOTHING and outcome.hypothesis.fit.noise.order
-    if is_noise or (is_unknown and not explain_all(base, target, seed, parallel_map)):
-        model_error = search_with_model_error(base, target, effects, progress, parallel_map)
-        second = assess_evidence(model_error, effects, rng)
+    if is_noise or (is_unknown and not explain_all(base, target, run, seed)):
+        second = assess_evidence(search_with_model_error(base, target, run), run)
         outcome = second if second.verdict != Verdict.UNKNOWN else outcome
-    interim.keep_outcome(base, outcome, effects, step=FREE_FORMS)
+    interim.keep_outcome(base, outcome, run.effects, step=FREE_FORMS)
     # Coloured noise may hide a discrepancy that no effect of the catalogue explains.
     is_clean = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
     if not is_clean:
         progress("comparing with free forms", 0.9)
         forms = select_effects(simulator, context, prior_std, catalogue, free=True)
-        outcome = compare_with_free_forms(outcome, forms, (*effects, *forms), rng, parallel_map)
-        effects = [*effects, *(form for form in forms if form in outcome.hypothesis.effects)]
-    interim.keep_outcome(base, outcome, effects, step=MISSING_TERMS)
+        outcome = compare_with_free_forms(outcome, forms, run)
+        found_forms = [form for form in forms if form in outcome.hypothesis.effects]
+        run = run.with_effects([*run.effects, *found_forms])
+    interim.keep_outcome(base, outcome, run.effects, step=MISSING_TERMS)
     progress("searching for missing terms", 0.92)
-    terms = interim.keep_terms(
-        None if is_clean else find_missing_terms(base, outcome, target, effects, rng, parallel_map)
-    )
+    terms = interim.keep_terms(None if is_clean else find_missing_terms(base, outcome, target, run))
     progress("screening alternative causes", 0.95)
-    found = interim.keep_diagnosis(make_diagnosis(record, outcome, base, terms, effects, rng, parallel_map))
-    if terms is not None and replaces_effects(terms, base, outcome, target, rng):
-        found = extend_equations(found, terms, target, effects, rng, parallel_map)
+    found = interim.keep_diagnosis(make_diagnosis(record, outcome, base, terms, run))
+    if terms is not None and replaces_effects(terms, base, outcome, target, run.rng):
+        found = extend_equations(found, terms, target, run)
     closed_loop = find_closed_loop(found.best, target, record.input_names[0])
     return interim.complete(replace(found, record_findings=(*record_findings, *closed_loop)))
 
@@ -163,9 +162,7 @@ def diagnose(
 def _search(
     base: CalibrationResult,
     target: Target,
-    effects: Sequence[Effect],
-    progress: ProgressCallback,
-    parallel_map: ParallelMap,
+    run: DiagnosisRun,
     interim: InterimFindings,
 ) -> tuple[CalibrationResult, SearchOutcome]:
     """Search with the intersample behaviour and the step size that suit the simulation with the effects.
@@ -183,18 +180,19 @@ def _search(
         current = get_discretisation(simulator)
         tried.add(current)
         base = calibrate(replace(simulation, simulator=simulator), target, base.values)
-        progress(f"screening {len(effects)} effects", 0.02)
-        screened = screen_effects(base, target, effects, interim.record_screening(base, parallel_map))
+        run.progress(f"screening {len(run.effects)} effects", 0.02)
+        recorded = replace(run, parallel_map=interim.record_screening(base, run.parallel_map))
+        screened = screen_effects(base, target, recorded)
         interim.keep_screening(base, screened)
         selected = select_intersample(best_single(base, screened), target)
         if (known := found.get(get_discretisation(selected))) is not None:
             return known
         if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
-            outcome = search_with_ar_noise(base, screened, target, effects, progress, parallel_map)
+            outcome = search_with_ar_noise(base, screened, target, run)
             found[current] = base, outcome
             selected = select_intersample(outcome.hypothesis.fit, outcome.target)
             if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
                 return found[current]
         # The missing effect had hidden that another intersample behaviour or a finer step fits better.
-        progress("intersample behaviour changed: repeating the search")
+        run.progress("intersample behaviour changed: repeating the search")
         simulator = selected

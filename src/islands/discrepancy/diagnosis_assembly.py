@@ -21,8 +21,7 @@ from islands.discrepancy.inference.residual_structure import find_residual_struc
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.strategies import SearchOutcome
 from islands.discrepancy.inference.verdict import Verdict, choose_reference_fit, classify, explained_fraction
-from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 
 #: Effects are rejected if they increase the error of the hold-out part by more than this percentage, with a
 #: certainty of 97.5 %. It is not zero, since an effect that calibration absorbs changes the RMSE by almost
@@ -60,9 +59,7 @@ def extend_equations(
     found: Diagnosis,
     terms: MissingTerms,
     target: Target,
-    effects: Sequence[Effect],
-    rng: np.random.Generator,
-    parallel_map: ParallelMap,
+    run: DiagnosisRun,
 ) -> Diagnosis:
     """Return the diagnosis with discovered terms in place of effects, if the hold-out part confirms them.
 
@@ -73,17 +70,17 @@ def extend_equations(
     fit = fit_initial_states(terms.search.fit, target, fitted)
     holdout = slice(fitted, record.samples)
     floor = min(found.noise_floor, float(np.sqrt(fit.mean_square)))
-    gain = measure_gain(record, found.base.output, fit.output, holdout, floor, rng)
+    gain = measure_gain(record, found.base.output, fit.output, holdout, floor, run.rng)
     if found.gain is None:
         is_confirmed = gain.ci95[0] > 0.0
     else:
-        compared = measure_gain(record, found.best.output, fit.output, holdout, floor, rng)
+        compared = measure_gain(record, found.best.output, fit.output, holdout, floor, run.rng)
         is_confirmed = compared.ci95[1] >= -MAX_HOLDOUT_LOSS_PERCENT
     if not is_confirmed:
         return found
     residual, output = (record.y - fit.output)[:fitted], fit.output[:fitted]
     context = fit.simulation.context
-    structure = find_residual_structure(residual, output, context, rng)
+    structure = find_residual_structure(residual, output, context, run.rng)
     if structure:  # The rest is no noise: only its innovations are.
         floor = min(floor, float(np.sqrt(fit.noise.variance)))
     explained = explained_fraction(found.base, fit, floor**2)
@@ -96,9 +93,9 @@ def extend_equations(
     if (added := terms.outcome) is not None:
         # Alternatives of several effects are screened without each of them.
         is_single = len(added.hypothesis.effects) == 1
-        screened = screen_effects(added.base, added.target, effects, parallel_map) if is_single else ()
+        screened = screen_effects(added.base, added.target, run) if is_single else ()
         added = replace(added, screened=screened, hypothesis=replace(added.hypothesis, fit=fit))
-        described = describe_effects(added, effects, None, parallel_map)[0]
+        described = describe_effects(added, run)[0]
         findings += tuple(replace(each, is_claimed=each.confidence >= MIN_CONFIDENCE) for each in described)
     return replace(
         found,
@@ -119,9 +116,7 @@ def make_diagnosis(
     outcome: SearchOutcome,
     base: CalibrationResult,
     terms: MissingTerms | None,
-    effects: Sequence[Effect],
-    rng: np.random.Generator,
-    parallel_map: ParallelMap,
+    run: DiagnosisRun,
 ) -> Diagnosis:
     """Measure the gain on the hold-out part, describe the effects and detect properties of the noise.
 
@@ -137,10 +132,10 @@ def make_diagnosis(
     if verdict in (Verdict.NAMED, Verdict.REMAINDER, Verdict.FAMILY):
         reference = choose_reference_fit(hypothesis, base, target)
         before = fit_initial_states(reference, target, fitted).output
-        gain = measure_gain(record, before, hypothesis.fit.output, holdout, floor**0.5, rng)
+        gain = measure_gain(record, before, hypothesis.fit.output, holdout, floor**0.5, run.rng)
         # Under model error, a gain in the estimation part is no evidence of one in another part.
         is_confirmed = (
-            bound_gain(gain, before, hypothesis.fit, target, rng) >= -MAX_HOLDOUT_LOSS_PERCENT
+            bound_gain(gain, before, hypothesis.fit, target, run.rng) >= -MAX_HOLDOUT_LOSS_PERCENT
             if target.effective_samples is None
             else gain.ci95[0] > 0.0
         )
@@ -152,7 +147,7 @@ def make_diagnosis(
     if gain is not None:
         rival = None if terms is None else terms.rival
         fitted_outcome = replace(outcome, hypothesis=hypothesis)
-        findings, equivalents = describe_effects(fitted_outcome, effects, rival, parallel_map)
+        findings, equivalents = describe_effects(fitted_outcome, run, rival)
         if verdict == Verdict.REMAINDER:
             findings = (findings[0], *(replace(each, is_claimed=False) for each in findings[1:]))
         if all(each.confidence < MIN_CONFIDENCE for each in findings if each.is_claimed):

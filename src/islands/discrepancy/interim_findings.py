@@ -1,8 +1,7 @@
 """Findings of a diagnosis while it runs, from which a stopped one makes its result."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -24,8 +23,9 @@ from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.screening import ScreenedEffect
 from islands.discrepancy.inference.strategies import SearchOutcome, analyse_residual, make_outcome
 from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.discrepancy.interfaces.parallel import ParallelMap, intercepted_map
 
 #: Steps of a diagnosis after the calibration of the simulation, in their order.
 STEPS = (
@@ -39,9 +39,6 @@ STEPS = (
     ALTERNATIVES := "alternative causes",
     EXTENSION := "extension by missing terms",
 )
-
-A = TypeVar("A")
-R = TypeVar("R")
 
 
 class InterimFindings:
@@ -140,7 +137,7 @@ class InterimFindings:
         elif self._assessed is not None and _has_alternatives(self._assessed[1]):
             base, outcome, effects = self._assessed
             left_out.remove(ALTERNATIVES)
-            found = make_diagnosis(record, outcome, base, self._terms, effects, rng, map)
+            found = make_diagnosis(record, outcome, base, self._terms, DiagnosisRun(effects, rng))
         else:
             screened: Sequence[ScreenedEffect] = ()
             if self._screened is not None:
@@ -150,7 +147,7 @@ class InterimFindings:
                 if self._step == SCREENING:
                     left_out[0] = f"{SCREENING} ({len(screened)} are screened)"
             outcome = _make_outcome(base, screened, target, rng)
-            found = make_diagnosis(record, outcome, base, None, (), rng, map)
+            found = make_diagnosis(record, outcome, base, None, DiagnosisRun((), rng))
         closed_loop = find_closed_loop(found.best, target, record.input_names[0])
         return replace(found, record_findings=(*record_findings, *closed_loop), left_out=tuple(left_out))
 
@@ -166,20 +163,18 @@ class _ScreeningFits:
     def record(self, parallel_map: ParallelMap) -> ParallelMap:
         """Return a map that keeps rough calibrations."""
 
-        def recorded_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
-            if isinstance(function, StartsCalibrator) and function.is_rough:
-                return self._keep(function, list(arguments), parallel_map)  # type: ignore[arg-type, return-value]
-            return parallel_map(function, arguments)
+        def keep(
+            calibrator: StartsCalibrator, tasks: Sequence[CalibrationTask]
+        ) -> Iterator[list[CalibratedStart]]:
+            if not calibrator.is_rough:
+                yield from parallel_map(calibrator, tasks)
+                return
+            self._calibrator = calibrator
+            for task, ends in zip(tasks, parallel_map(calibrator, tasks), strict=True):
+                self._ended.append((task, ends))
+                yield ends
 
-        return recorded_map
-
-    def _keep(
-        self, calibrator: StartsCalibrator, tasks: Sequence[CalibrationTask], parallel_map: ParallelMap
-    ) -> Iterator[list[CalibratedStart]]:
-        self._calibrator = calibrator
-        for task, ends in zip(tasks, parallel_map(calibrator, tasks), strict=True):
-            self._ended.append((task, ends))
-            yield ends
+        return intercepted_map(parallel_map, StartsCalibrator, keep)
 
     def rank(self) -> list[ScreenedEffect]:
         """Return the screened effects, the best first."""

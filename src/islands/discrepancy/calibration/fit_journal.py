@@ -1,10 +1,10 @@
 """Journal of the fits of a diagnosis, with which an interrupted diagnosis continues."""
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +14,7 @@ from islands.discrepancy.calibration.starts_calibrator import (
     StartsCalibrator,
 )
 from islands.discrepancy.interfaces.effect import Signal
-from islands.discrepancy.interfaces.parallel import ParallelMap
-
-A = TypeVar("A")
-R = TypeVar("R")
+from islands.discrepancy.interfaces.parallel import ParallelMap, intercepted_map
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,28 +61,23 @@ class FitJournal:
     def record(self, parallel_map: ParallelMap) -> ParallelMap:
         """Return a map that takes known fits from the journal and records the others."""
 
-        def recorded_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
-            if isinstance(function, StartsCalibrator):
-                return self._continue(function, list(arguments), parallel_map)  # type: ignore[arg-type, return-value]
-            return parallel_map(function, arguments)
+        def continue_fits(
+            calibrator: StartsCalibrator, tasks: Sequence[CalibrationTask]
+        ) -> Iterator[list[CalibratedStart]]:
+            first = 0
+            while first < len(tasks) and (known := self._take_known(calibrator, tasks[first])):
+                self._ended.append(known)
+                simulation, _ = tasks[first]
+                first += 1
+                yield [CalibratedStart(values, simulation.simulate(values)) for values in known.values]
+            remaining = tasks[first:]
+            if remaining:
+                for digest, fits in parallel_map(partial(_calibrate, calibrator), remaining):
+                    self._ended.append(RecordedFit(digest, [fit.values for fit in fits]))
+                    self.computed += 1
+                    yield fits
 
-        return recorded_map
-
-    def _continue(
-        self, calibrator: StartsCalibrator, tasks: Sequence[CalibrationTask], parallel_map: ParallelMap
-    ) -> Iterator[list[CalibratedStart]]:
-        first = 0
-        while first < len(tasks) and (known := self._take_known(calibrator, tasks[first])):
-            self._ended.append(known)
-            simulation, _ = tasks[first]
-            first += 1
-            yield [CalibratedStart(values, simulation.simulate(values)) for values in known.values]
-        remaining = tasks[first:]
-        if remaining:
-            for digest, fits in parallel_map(partial(_calibrate, calibrator), remaining):
-                self._ended.append(RecordedFit(digest, [fit.values for fit in fits]))
-                self.computed += 1
-                yield fits
+        return intercepted_map(parallel_map, StartsCalibrator, continue_fits)
 
     def _take_known(self, calibrator: StartsCalibrator, task: CalibrationTask) -> RecordedFit | None:
         """Return the next known fit if it is that of a task; otherwise drop all known fits."""

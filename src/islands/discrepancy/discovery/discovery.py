@@ -1,7 +1,6 @@
 """Discovery of missing terms: equations with more terms that explain a record better than the catalogue."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +24,7 @@ from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.strategies import SearchOutcome, analyse_residual
 from islands.discrepancy.inference.verdict import Verdict, explained_fraction
-from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.simulators.output_equation import OutputEquation
 
 #: Part of the gain of the terms by which they have to be better than effects. The catalogue has one form of
@@ -108,9 +106,7 @@ def find_missing_terms(
     base: CalibrationResult,
     alone: SearchOutcome,
     target: Target,
-    effects: Sequence[Effect],
-    rng: np.random.Generator,
-    parallel_map: ParallelMap = map,
+    run: DiagnosisRun,
 ) -> MissingTerms | None:
     """Search for missing terms, and compare them with the effects of the catalogue.
 
@@ -124,10 +120,7 @@ def find_missing_terms(
         Outcome of the search for effects. If it has none, the nearest one is the best of those screened.
     target : Target
         Target of ``base``.
-    effects : sequence of Effect
-        Effects that are searched for.
-    parallel_map : ParallelMap
-        Fits the terms.
+    run : DiagnosisRun
 
     Returns
     -------
@@ -135,16 +128,16 @@ def find_missing_terms(
         None if no term gains enough.
     """
     effects_alone = _score_effects(alone, base, target)
-    found = search_terms(base, target, parallel_map, effects_alone.cost)
+    found = search_terms(base, target, run, effects_alone.cost)
     terms = None if found is None else _compare(JointResult(found), effects_alone)
     if alone.target.effective_samples is not None:
         return terms  # A search with model error has no noise model that further effects could whiten.
     is_better = terms is not None and terms.is_better(alone)
     if not is_better and len(alone.hypothesis.effects) == 1 and alone.verdict == Verdict.NAMED:
         return terms
-    if terms and is_better and _is_contradicted(terms.search.fit, effects_alone.fit, target, rng):
+    if terms and is_better and _is_contradicted(terms.search.fit, effects_alone.fit, target, run.rng):
         return terms
-    joint = search_jointly(found, base, alone, effects_alone.cost, target, effects, rng, parallel_map)
+    joint = search_jointly(found, base, alone, effects_alone.cost, target, run)
     if joint is None:
         return terms
     together = _compare(joint, effects_alone)
@@ -153,7 +146,7 @@ def find_missing_terms(
     return terms
 
 
-def explain_all(base: CalibrationResult, target: Target, seed: int, parallel_map: ParallelMap = map) -> bool:
+def explain_all(base: CalibrationResult, target: Target, run: DiagnosisRun, seed: int) -> bool:
     """Return whether missing terms at the output of a simulation leave nothing but noise.
 
     It is for simulations without equations, whose terms are found in a tenth of the time that the search with
@@ -161,14 +154,14 @@ def explain_all(base: CalibrationResult, target: Target, seed: int, parallel_map
 
     Parameters
     ----------
-    base, target, parallel_map
+    base, target, run
         Arguments of `find_missing_terms`.
     seed : int
         Seed of the surrogates of the residual.
     """
     if not isinstance(base.simulation.simulator, OutputEquation):
         return False
-    found = search_terms(base, target, parallel_map)
+    found = search_terms(base, target, run)
     if found is None:
         return False
     return not analyse_residual(found.fit, target, np.random.default_rng(seed)).is_structured

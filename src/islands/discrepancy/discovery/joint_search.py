@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
-
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
@@ -24,8 +22,8 @@ from islands.discrepancy.inference.screening import (
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN, eliminate_backward, refit_with_ar_noise
 from islands.discrepancy.inference.strategies import SearchOutcome, assess_evidence, make_outcome
 from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
 
 
 class JointResult(NamedTuple):
@@ -48,9 +46,7 @@ def search_jointly(
     alone: SearchOutcome,
     least: float,
     target: Target,
-    effects: Sequence[Effect],
-    rng: np.random.Generator,
-    parallel_map: ParallelMap = map,
+    run: DiagnosisRun,
 ) -> JointResult | None:
     """Search for terms with effects in the simulation; return None if none are found, or no effect remains.
 
@@ -63,22 +59,22 @@ def search_jointly(
         Terms that were found without effects.
     least : float
         Cost of the effects without terms.
-    base, alone, target, effects
+    base, alone, target, run
         Arguments of `discovery.find_missing_terms`.
     """
     starts = _list_starts(alone)
     if found is not None and (found.cost < least or len(alone.hypothesis.effects) < 2):
-        starts += _add_effect(found, target, effects, parallel_map)
+        starts += _add_effect(found, target, run)
     best: TermSearchResult | None = None
     for kept in {frozenset(each.effects): each for each in starts}.values():
         if not any(each.is_free or each.family == "scale" for each in kept.effects):
-            terms = _search_one_term(kept, base, target, parallel_map)
+            terms = _search_one_term(kept, base, target, run)
             if terms is not None and (best is None or terms.cost < best.cost):
                 best = terms
     if best is None:
         return None
-    terms = search_terms(best.base, target, parallel_map, least, best)
-    return _assess_effects(terms or best, target, effects, rng, parallel_map)
+    terms = search_terms(best.base, target, run, least, best)
+    return _assess_effects(terms or best, target, run)
 
 
 def _list_starts(alone: SearchOutcome) -> list[Hypothesis]:
@@ -97,25 +93,23 @@ def _list_starts(alone: SearchOutcome) -> list[Hypothesis]:
     return starts + [with_effect(Hypothesis(base, base.score, ()), each) for each in forms]
 
 
-def _add_effect(
-    found: TermSearchResult, target: Target, effects: Sequence[Effect], parallel_map: ParallelMap
-) -> list[Hypothesis]:
+def _add_effect(found: TermSearchResult, target: Target, run: DiagnosisRun) -> list[Hypothesis]:
     """Return the hypothesis of the effect that improves the equations with terms most, if one does."""
     fit = found.fit
-    screened = screen_effects(fit, whiten_target(target, fit), effects, parallel_map)
+    screened = screen_effects(fit, whiten_target(target, fit), run)
     alone = Hypothesis(fit, found.cost, ())
     return [with_effect(alone, each) for each in screened[:1] if each.score_gain(fit) > MIN_GAIN]
 
 
 def _search_one_term(
-    kept: Hypothesis, base: CalibrationResult, target: Target, parallel_map: ParallelMap
+    kept: Hypothesis, base: CalibrationResult, target: Target, run: DiagnosisRun
 ) -> TermSearchResult | None:
     """Search for a term with the effects of a hypothesis in the simulation of ``base``."""
     simulation = base.simulation.with_effects(catalogue_order(kept.effects))
     whitened = whiten_target(target, kept.fit)
     start = transfer_parameters(base.values, base.simulation, simulation)
     transfer_effects(kept.fit.values, kept.fit.simulation, start, simulation)
-    terms = search_terms(calibrate(simulation, whitened, start), target, parallel_map, max_terms=1)
+    terms = search_terms(calibrate(simulation, whitened, start), target, run, max_terms=1)
     if terms is None:
         return None
     # Without the term, the fit may have moved an instant or a frequency to another optimum.
@@ -125,19 +119,13 @@ def _search_one_term(
     return replace(terms, fit=again) if again.score < terms.fit.score else terms
 
 
-def _assess_effects(
-    terms: TermSearchResult,
-    target: Target,
-    effects: Sequence[Effect],
-    rng: np.random.Generator,
-    parallel_map: ParallelMap,
-) -> JointResult | None:
+def _assess_effects(terms: TermSearchResult, target: Target, run: DiagnosisRun) -> JointResult | None:
     """Return the terms with those of their effects that pass the tests of effects; None if no effect does."""
     fit, whitened = terms.fit, whiten_target(target, terms.fit)
     without = _calibrate_with(fit, (), whitened)
     (hypothesis,), whitened = refit_with_ar_noise([Hypothesis(fit, terms.cost, terms.effects)], whitened)
-    hypothesis = eliminate_backward(hypothesis, whitened, MIN_GAIN, parallel_map)
-    outcome = assess_evidence(make_outcome(without, (), whitened, hypothesis), effects, rng)
+    hypothesis = eliminate_backward(hypothesis, whitened, MIN_GAIN, run)
+    outcome = assess_evidence(make_outcome(without, (), whitened, hypothesis), run)
     kept = outcome.hypothesis
     if not kept.effects:
         return None

@@ -32,8 +32,8 @@ from islands.discrepancy.inference.screening import bic_penalty
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.coordinates import peak_amplitude
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.systems.ode.ode_expression import render
 from islands.systems.ode.ode_system import OUTPUT, OdeSystem
@@ -129,7 +129,7 @@ class TermSearchResult:
 def search_terms(
     base: CalibrationResult,
     target: Target,
-    parallel_map: ParallelMap = map,
+    run: DiagnosisRun,
     least: float = np.inf,
     start: TermSearchResult | None = None,
     max_terms: int = MAX_TERMS,
@@ -141,8 +141,7 @@ def search_terms(
     base : CalibrationResult
         The calibrated simulation. It keeps its effects.
     target : Target
-    parallel_map : ParallelMap
-        Fits the terms.
+    run : DiagnosisRun
     least : float
         Cost of another explanation. The search ends if further terms are not expected to reach it.
     start : TermSearchResult, optional
@@ -173,12 +172,12 @@ def search_terms(
     while len(found.terms) < max_terms:
         target = whiten_target(target, found.fit)
         found = _improve(found, calibrate(found.fit.simulation, target, found.fit.values))
-        best = _find_best_term(found, target, unweighted, candidates, target_sizes, parallel_map)
+        best = _find_best_term(found, target, unweighted, candidates, target_sizes, run)
         if best is None or best.cost > found.cost - MIN_GAIN:
             break
         before = found.cost
         best = _select_discretisation(best, target)
-        found = _eliminate_terms(best, system, target, target_sizes, parallel_map)
+        found = _eliminate_terms(best, system, target, target_sizes, run)
         missing = max_terms - len(found.terms)
         if found.cost - missing * MAX_GAIN_RATIO * (before - found.cost) > least:
             break
@@ -204,7 +203,7 @@ def _eliminate_terms(
     system: OdeSystem,
     target: Target,
     target_sizes: Mapping[str, float],
-    parallel_map: ParallelMap,
+    run: DiagnosisRun,
 ) -> TermSearchResult:
     """Remove terms that later ones have made unnecessary; ``system`` has none of them."""
     while len(found.terms) > 1:
@@ -214,7 +213,7 @@ def _eliminate_terms(
             numbered = [(each.term, each.number) for each in kept]
             simulation, start = add_terms(found.fit, system, numbered, target_sizes)
             tasks.append((simulation, [start]))
-        fits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
+        fits = calibrate_all(StartsCalibrator(target), tasks, run.parallel_map)
         smaller = [replace(found, fit=fit, terms=kept) for fit, kept in zip(fits, reduced, strict=True)]
         best = min(smaller, key=lambda each: each.cost)
         if best.cost > found.cost + MIN_GAIN:
@@ -229,14 +228,14 @@ def _find_best_term(
     unweighted: Target,
     candidates: Sequence[CandidateTerm],
     target_sizes: Mapping[str, float],
-    parallel_map: ParallelMap,
+    run: DiagnosisRun,
 ) -> TermSearchResult | None:
     """Return the equations with the term that is best after a calibration of all parameters."""
     fit, used = found.fit, {(each.term.target, each.term.text) for each in found.terms}
     (number,) = find_free_numbers(find_used_names(fit), 1)
     free = [each for each in candidates if (each.target, each.text) not in used]
     log_n, log_choices = float(np.log(fit.noise.effective_samples)), 2.0 * float(np.log(len(candidates)))
-    ranked = rank_terms(fit, [target, unweighted], free, target_sizes, parallel_map)[:FITTED_TERMS]
+    ranked = rank_terms(fit, [target, unweighted], free, target_sizes, run.parallel_map)[:FITTED_TERMS]
     tasks = []
     for each in ranked:
         simulation, start = add_terms(fit, get_system(fit), [(each.term, number)], target_sizes)
@@ -244,7 +243,7 @@ def _find_best_term(
     # Any of the candidates could gain by chance.
     penalties = [each.term.value_count * log_n + log_choices for each in ranked]
     results = []
-    fits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
+    fits = calibrate_all(StartsCalibrator(target), tasks, run.parallel_map)
     for each, penalty, fitted in zip(ranked, penalties, fits, strict=True):
         if np.isfinite(fitted.score):
             added = DiscoveredTerm(each.term, number, fit.score - fitted.score - penalty, penalty)

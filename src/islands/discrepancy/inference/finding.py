@@ -20,8 +20,8 @@ from islands.discrepancy.inference.hypothesis import Alternatives, Hypothesis, f
 from islands.discrepancy.inference.screening import ScreenedEffect, bic_penalty
 from islands.discrepancy.inference.strategies import SearchOutcome
 from islands.discrepancy.inference.verdict import Verdict, choose_reference_fit, explained_fraction
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect, Signal
-from islands.discrepancy.interfaces.parallel import ParallelMap
 
 #: Effects whose scores are within this margin of the named one cannot be distinguished from it.
 EQUIVALENCE_MARGIN = 9.0
@@ -113,10 +113,7 @@ class Rival:
 
 
 def describe_effects(
-    outcome: SearchOutcome,
-    effects: Sequence[Effect],
-    rival: Rival | None = None,
-    parallel_map: ParallelMap = map,
+    outcome: SearchOutcome, run: DiagnosisRun, rival: Rival | None = None
 ) -> tuple[tuple[Finding, ...], tuple[ScreenedEffect, ...]]:
     """Return the findings of a search, and the alternatives that the record cannot distinguish from them.
 
@@ -126,8 +123,7 @@ def describe_effects(
     Parameters
     ----------
     outcome : SearchOutcome
-    effects : sequence of Effect
-        Effects that were searched for.
+    run : DiagnosisRun
     rival : Rival, optional
         Further alternative of those effects that it does not have.
     """
@@ -139,7 +135,7 @@ def describe_effects(
             Alternatives(Hypothesis(base, base.score, ()), outcome.screened),
         )
     else:
-        alternatives = hypothesis.alternatives or find_alternatives(hypothesis, target, effects, parallel_map)
+        alternatives = hypothesis.alternatives or find_alternatives(hypothesis, target, run)
     for effect, alternative in zip(hypothesis.effects, alternatives, strict=True):
         without = alternative.without
         compared = [alternative]

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from islands.discrepancy.inference.screening import (
     screen_effects,
     transfer_parameters,
 )
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 
@@ -46,6 +46,10 @@ class Hypothesis:
         """Cost in units of `SCORE_TIE`, rounded; hypotheses of equal rank keep their order."""
         return round(self.cost / SCORE_TIE)
 
+    def with_fit(self, fit: CalibrationResult) -> "Hypothesis":
+        """Return the hypothesis with another fit of its simulation, without alternatives."""
+        return Hypothesis(fit, self.cost + fit.score - self.fit.score, self.effects)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alternatives:
@@ -69,17 +73,9 @@ def with_effect(hypothesis: Hypothesis, screened: ScreenedEffect) -> Hypothesis:
     return Hypothesis(screened.fit, cost, (*hypothesis.effects, screened.effect))
 
 
-def refit(
-    hypotheses: Sequence[Hypothesis], target: Target, parallel_map: ParallelMap = map
-) -> list[Hypothesis]:
-    """Calibrate hypotheses to a target; a hypothesis whose rank does not improve is returned unchanged."""
-    tasks = [(each.fit.simulation, [each.fit.values]) for each in hypotheses]
-    fits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
-    refitted = [
-        Hypothesis(fit, each.cost + fit.score - each.fit.score, each.effects)
-        for each, fit in zip(hypotheses, fits, strict=True)
-    ]
-    return [min(pair, key=attrgetter("rank")) for pair in zip(hypotheses, refitted, strict=True)]
+def screen_others(hypothesis: Hypothesis, target: Target, run: DiagnosisRun) -> list[ScreenedEffect]:
+    """Screen the effects that a hypothesis does not have, in addition to its own."""
+    return screen_effects(hypothesis.fit, target, run.without_effects(hypothesis.effects))
 
 
 def without_effect(hypothesis: Hypothesis, effect: Effect, target: Target) -> Hypothesis:
@@ -104,12 +100,7 @@ def remove_each(
     return reduced
 
 
-def find_alternatives(
-    hypothesis: Hypothesis, target: Target, effects: Sequence[Effect], parallel_map: ParallelMap = map
-) -> tuple[Alternatives, ...]:
+def find_alternatives(hypothesis: Hypothesis, target: Target, run: DiagnosisRun) -> tuple[Alternatives, ...]:
     """Remove each effect in turn, and screen the effects that could take its place, itself included."""
-    alternatives = []
-    for without in remove_each(hypothesis, hypothesis.effects, target, parallel_map):
-        others = [each for each in effects if each not in without.effects]
-        alternatives.append(Alternatives(without, screen_effects(without.fit, target, others, parallel_map)))
-    return tuple(alternatives)
+    reduced = remove_each(hypothesis, hypothesis.effects, target, run.parallel_map)
+    return tuple(Alternatives(without, screen_others(without, target, run)) for without in reduced)

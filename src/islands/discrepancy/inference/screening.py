@@ -1,6 +1,6 @@
 """Screening: a simulation extended by each effect in turn, calibrated and sorted by score."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 
@@ -11,8 +11,8 @@ from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.starts_calibrator import calibrate_best
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect, Signal, invalid_effect_error
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.segments import fill_gaps
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
@@ -64,22 +64,13 @@ def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
     return (values + effect.extra_degrees_of_freedom) * float(np.log(base.noise.effective_samples))
 
 
-def screen_effects(
-    base: CalibrationResult, target: Target, effects: Iterable[Effect], parallel_map: ParallelMap = map
-) -> list[ScreenedEffect]:
-    """Extend a simulation by each effect in turn and calibrate it; return the best first.
-
-    Parameters
-    ----------
-    parallel_map : ParallelMap
-        Finds the starting points, and calibrates the extended simulations.
-    """
+def screen_effects(base: CalibrationResult, target: Target, run: DiagnosisRun) -> list[ScreenedEffect]:
+    """Extend a simulation by each effect in turn and calibrate it; return the best first."""
     projection = Projection(base, target)
-    listed = list(effects)
     candidates = [
         (starts[0][0], effect, [values for _, values in starts])
         for effect, starts in zip(
-            listed, parallel_map(StartFinder(base, target, projection), listed), strict=True
+            run.effects, run.parallel_map(StartFinder(base, target, projection), run.effects), strict=True
         )
         if starts
     ]
@@ -96,7 +87,7 @@ def screen_effects(
         ]
     tasks = [(_extend(base, effect), starts) for _, effect, starts in candidates]
     penalties = [bic_penalty(effect, base) for _, effect, _ in candidates]
-    fits = calibrate_best(tasks, penalties, target, parallel_map)
+    fits = calibrate_best(tasks, penalties, target, run.parallel_map)
     screened = [ScreenedEffect(effect, fit) for (_, effect, _), fit in zip(candidates, fits, strict=True)]
     return sorted(screened, key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
 

@@ -7,20 +7,21 @@ from operator import attrgetter
 import numpy as np
 
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, whiten_target
+from islands.discrepancy.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import model_form
 from islands.discrepancy.inference.hypothesis import (
     Alternatives,
     Hypothesis,
     find_alternatives,
-    refit,
     remove_each,
+    screen_others,
     with_effect,
 )
-from islands.discrepancy.inference.screening import SCORE_TIE, ScreenedEffect, screen_effects
+from islands.discrepancy.inference.screening import SCORE_TIE, ScreenedEffect
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
-from islands.evolution.progress import ProgressCallback
 
 #: Minimum score gain of an effect, in minus twice the log-likelihood: six is a likelihood ratio of twenty.
 MIN_GAIN = 6.0
@@ -46,9 +47,7 @@ def stepwise_search(
     base: CalibrationResult,
     screened: Sequence[ScreenedEffect],
     target: Target,
-    effects: Sequence[Effect],
-    progress: ProgressCallback,
-    parallel_map: ParallelMap = map,
+    run: DiagnosisRun,
     pairs: bool = False,
 ) -> tuple[Hypothesis, Target]:
     """Return the best hypothesis, and the target with its noise model.
@@ -74,15 +73,12 @@ def stepwise_search(
         is_first = not beam[0].effects
         if not is_first:
             names = [effect.name for effect in beam[0].effects]
-            progress(f"effects in addition to {' and '.join(names)}", min(0.1 + 0.2 * len(names), 0.7))
-        min_gain = MIN_GAIN if is_first else _get_min_further_gain(target, effects)
+            run.progress(f"effects in addition to {' and '.join(names)}", min(0.1 + 0.2 * len(names), 0.7))
+        min_gain = MIN_GAIN if is_first else _get_min_further_gain(target, run.effects)
         width = PAIR_SEEDS if is_first and pairs else BEAM_WIDTH
         extended: dict[frozenset[str], Hypothesis] = {}
         for hypothesis in beam:
-            others = [effect for effect in effects if effect not in hypothesis.effects]
-            candidates = (
-                screened if is_first else screen_effects(hypothesis.fit, target, others, parallel_map)
-            )
+            candidates = screened if is_first else screen_others(hypothesis, target, run)
             for candidate in candidates[:width]:
                 found = with_effect(hypothesis, candidate)
                 key = frozenset(effect.name for effect in found.effects)
@@ -90,7 +86,7 @@ def stepwise_search(
                 if is_accepted and (key not in extended or found.cost < extended[key].cost):
                     extended[key] = found
         beam = sorted(extended.values(), key=attrgetter("rank"))[:width]
-        beam, new_target = refit_with_ar_noise(beam, target, parallel_map)
+        beam, new_target = refit_with_ar_noise(beam, target, run.parallel_map)
         if beam and beam[0].cost < best.cost - min_gain:
             best, target = beam[0], new_target
         elif not (is_first and pairs):
@@ -98,7 +94,7 @@ def stepwise_search(
         if not pairs:
             least = MIN_FOLLOWED_GAIN * (base.score - beam[0].cost)
             beam = [each for each in beam if base.score - each.cost >= least]
-    return refine_by_swaps(best, target, effects, progress, parallel_map, max_effects)
+    return refine_by_swaps(best, target, run, max_effects)
 
 
 def _count_causes(hypothesis: Hypothesis) -> int:
@@ -113,7 +109,13 @@ def refit_with_ar_noise(
     for _ in range(MAX_REFITS if beam and target.effective_samples is None else 0):
         before = beam[0].cost
         target = whiten_target(target, beam[0].fit)
-        beam = sorted(refit(beam, target, parallel_map), key=attrgetter("rank"))
+        tasks = [(each.fit.simulation, [each.fit.values]) for each in beam]
+        fits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
+        refitted = [
+            min(each, each.with_fit(fit), key=attrgetter("rank"))
+            for each, fit in zip(beam, fits, strict=True)
+        ]
+        beam = sorted(refitted, key=attrgetter("rank"))
         if beam[0].cost > before - SCORE_TIE:
             break
     return beam, target
@@ -122,9 +124,7 @@ def refit_with_ar_noise(
 def refine_by_swaps(
     hypothesis: Hypothesis,
     target: Target,
-    effects: Sequence[Effect],
-    progress: ProgressCallback,
-    parallel_map: ParallelMap = map,
+    run: DiagnosisRun,
     max_effects: int = MAX_EFFECTS,
 ) -> tuple[Hypothesis, Target]:
     """Refine a hypothesis: remove effects that are not needed, replace effects by better ones, and add more.
@@ -138,22 +138,20 @@ def refine_by_swaps(
         A hypothesis to which no single effect is worth adding, or which has the maximum number of effects.
     """
     complete = hypothesis.effects
-    min_gain = _get_min_further_gain(target, effects)
-    hypothesis = eliminate_backward(hypothesis, target, min_gain, parallel_map)
+    min_gain = _get_min_further_gain(target, run.effects)
+    hypothesis = eliminate_backward(hypothesis, target, min_gain, run)
     while hypothesis.effects:
         alternatives: tuple[Alternatives, ...] = ()
         candidates = []
         if len(hypothesis.effects) > 1:
-            progress("screening alternative causes", 0.7)
-            alternatives = find_alternatives(hypothesis, target, effects, parallel_map)
+            run.progress("screening alternative causes", 0.7)
+            alternatives = find_alternatives(hypothesis, target, run)
             candidates = [
                 with_effect(each.without, screened) for each in alternatives for screened in each.screened[:1]
             ]
         if len(hypothesis.effects) < len(complete) and _count_causes(hypothesis) < max_effects:
-            others = [effect for effect in effects if effect not in hypothesis.effects]
             larger = [
-                with_effect(hypothesis, screened)
-                for screened in screen_effects(hypothesis.fit, target, others, parallel_map)[:1]
+                with_effect(hypothesis, screened) for screened in screen_others(hypothesis, target, run)[:1]
             ]
             candidates += [each for each in larger if each.cost < hypothesis.cost - min_gain]
         best = min(candidates, key=attrgetter("rank"), default=hypothesis)
@@ -164,7 +162,7 @@ def refine_by_swaps(
             refined = replace(hypothesis, fit=best.fit, cost=best.cost, alternatives=alternatives)
             return refined, target
         complete = best.effects
-        best = eliminate_backward(best, target, min_gain, parallel_map)
+        best = eliminate_backward(best, target, min_gain, run)
         (hypothesis,), target = refit_with_ar_noise([best], target)
     return hypothesis, target
 
@@ -183,7 +181,7 @@ def _get_min_further_gain(target: Target, effects: Sequence[Effect]) -> float:
 
 
 def eliminate_backward(
-    hypothesis: Hypothesis, target: Target, min_gain: float, parallel_map: ParallelMap = map
+    hypothesis: Hypothesis, target: Target, min_gain: float, run: DiagnosisRun
 ) -> Hypothesis:
     """Remove effects that are redundant given the others, and sort the rest, the most important first.
 
@@ -191,7 +189,7 @@ def eliminate_backward(
     unnecessary.
     """
     while hypothesis.effects:
-        reduced = remove_each(hypothesis, hypothesis.effects, target, parallel_map)
+        reduced = remove_each(hypothesis, hypothesis.effects, target, run.parallel_map)
         without = {effect.name: each for effect, each in zip(hypothesis.effects, reduced, strict=True)}
         cheapest = min(without.values(), key=attrgetter("rank"))
         threshold = min_gain if len(hypothesis.effects) > 1 else MIN_GAIN

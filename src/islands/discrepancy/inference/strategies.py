@@ -39,9 +39,9 @@ from islands.discrepancy.inference.verdict import (
     validate_out_of_sample,
     withdraw_effects,
 )
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap, memoised_map
-from islands.evolution.progress import ProgressCallback
+from islands.discrepancy.interfaces.parallel import memoised_map
 
 #: Fraction of the misfit that some single effect has to explain before pairs are searched for; no effect
 #: explains as much of noise.
@@ -92,9 +92,7 @@ def search_with_ar_noise(
     base: CalibrationResult,
     screened: Sequence[ScreenedEffect],
     target: Target,
-    effects: Sequence[Effect],
-    progress: ProgressCallback,
-    parallel_map: ParallelMap,
+    run: DiagnosisRun,
 ) -> SearchOutcome:
     """Search for effects under the assumption that the residual is white or autoregressive noise.
 
@@ -106,27 +104,21 @@ def search_with_ar_noise(
     best = best_single(base, screened)
     if best.noise.order:
         # Ordinary least squares would fit the coloured noise as well.
-        progress("the noise is coloured: repeating with whitened residuals", 0.1)
+        run.progress("the noise is coloured: repeating with whitened residuals", 0.1)
         target = whiten_target(target, best)
         base = calibrate(base.simulation, target, base.values)
-        screened = screen_effects(base, target, effects, parallel_map)
-    hypothesis, target = stepwise_search(base, screened, target, effects, progress, parallel_map)
+        screened = screen_effects(base, target, run)
+    hypothesis, target = stepwise_search(base, screened, target, run)
     return make_outcome(base, screened, target, hypothesis)
 
 
-def search_with_model_error(
-    base: CalibrationResult,
-    target: Target,
-    effects: Sequence[Effect],
-    progress: ProgressCallback,
-    parallel_map: ParallelMap,
-) -> SearchOutcome:
+def search_with_model_error(base: CalibrationResult, target: Target, run: DiagnosisRun) -> SearchOutcome:
     """Search for effects under the assumption that the residual is model error."""
-    progress("the residual is model error: repeating with unweighted residuals", 0.4)
+    run.progress("the residual is model error: repeating with unweighted residuals", 0.4)
     screened: Sequence[ScreenedEffect] = ()
     hypothesis = Hypothesis(base, base.score, ())
     # The effective sample size changes the score of a fit, but not the fit: both passes share results.
-    parallel_map = memoised_map(parallel_map, StartsCalibrator, make_task_key)
+    run = replace(run, parallel_map=memoised_map(run.parallel_map, StartsCalibrator, make_task_key))
     for _ in range(2):
         # Model error correlates neighbouring samples: the second pass counts them with the best effects
         # included.
@@ -135,12 +127,12 @@ def search_with_model_error(
             target, effective_samples=estimate_effective_samples(residual, target.fitted_segments)
         )
         base = evaluate_fit(base.simulation, target, base.values)
-        if not hypothesis.effects and not _may_have_causes(base, target, effects):
+        if not hypothesis.effects and not _may_have_causes(base, target, run.effects):
             break
-        screened = screen_effects(base, target, effects, parallel_map)
+        screened = screen_effects(base, target, run)
         if not any(explained_fraction(base, each.fit, 0.0) > MIN_SINGLE_FRACTION for each in screened):
             break
-        hypothesis, _ = stepwise_search(base, screened, target, effects, progress, parallel_map, pairs=True)
+        hypothesis, _ = stepwise_search(base, screened, target, run, pairs=True)
         if not hypothesis.effects:
             break
     return make_outcome(base, screened, target, hypothesis)
@@ -152,18 +144,10 @@ def make_exact_outcome(base: CalibrationResult, target: Target) -> SearchOutcome
     return replace(make_outcome(base, (), target, hypothesis), verdict=Verdict.NOTHING)
 
 
-def assess_evidence(
-    outcome: SearchOutcome, effects: Sequence[Effect], rng: np.random.Generator
-) -> SearchOutcome:
-    """Remove effects that fail on other samples, analyse the residual, and classify the outcome.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-        Effects that were searched for.
-    """
-    base, target = outcome.base, outcome.target
-    hypothesis = remove_chance_effects(outcome.hypothesis, base, target, effects)
+def assess_evidence(outcome: SearchOutcome, run: DiagnosisRun) -> SearchOutcome:
+    """Remove effects that fail on other samples, analyse the residual, and classify the outcome."""
+    base, target, rng = outcome.base, outcome.target, run.rng
+    hypothesis = remove_chance_effects(outcome.hypothesis, base, target, run.effects)
     hypothesis = validate_out_of_sample(hypothesis, base, target, rng)
     rest = analyse_residual(hypothesis.fit, target, rng)
     if rest.is_structured or target.effective_samples is not None:

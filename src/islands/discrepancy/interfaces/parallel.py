@@ -1,9 +1,10 @@
 """Parallel map: a function applied to each of several arguments, with the results in order."""
 
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from typing import Any, Protocol, TypeVar
 
 A = TypeVar("A")
+F = TypeVar("F", bound=Callable[..., Any])
 R = TypeVar("R")
 
 
@@ -17,6 +18,19 @@ class ParallelMap(Protocol):
         """Apply the function to each argument."""
 
 
+def intercepted_map(
+    parallel_map: ParallelMap, kind: type[F], compute: Callable[[F, Sequence[Any]], Iterable[Any]]
+) -> ParallelMap:
+    """Return a map that leaves the calls of functions of one type to ``compute(function, arguments)``."""
+
+    def map_or_compute(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
+        if isinstance(function, kind):
+            return iter(compute(function, list(arguments)))
+        return parallel_map(function, arguments)
+
+    return map_or_compute
+
+
 def memoised_map(parallel_map: ParallelMap, kind: type, key: Callable[[Any, Any], Hashable]) -> ParallelMap:
     """Return a map that caches the results of functions of one type by a key of function and argument.
 
@@ -24,12 +38,10 @@ def memoised_map(parallel_map: ParallelMap, kind: type, key: Callable[[Any, Any]
     """
     results: dict[Hashable, Any] = {}
 
-    def cached_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
-        if not isinstance(function, kind):
-            return parallel_map(function, arguments)
+    def take(function: Callable[[Any], Any], arguments: Sequence[Any]) -> Iterable[Any]:
         keyed = [(key(function, argument), argument) for argument in arguments]
         missing = {each: argument for each, argument in keyed if each not in results}
         results.update(zip(missing, parallel_map(function, missing.values()), strict=True))
         return (results[each] for each, _ in keyed)
 
-    return cached_map
+    return intercepted_map(parallel_map, kind, take)

@@ -15,6 +15,7 @@ from islands.discrepancy.calibration.preparation import select_effects
 from islands.discrepancy.inference.screening import screen_effects
 from islands.discrepancy.inference.verdict import explained_fraction
 from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.simulator import (
     BatchSimulation,
     SimulationRun,
@@ -100,7 +101,7 @@ def explain_record(
         fit = calibrate(simulation, replace(target, prior_std=others), base.values)
         gain = base.score - fit.score - penalty
         causes.append(ChangeCause(name, True, gain, explained_fraction(unchanged, fit, floor), ()))
-    for screened in screen_effects(base, held, effects):
+    for screened in screen_effects(base, held, DiagnosisRun(effects)):
         fit = screened.fit
         causes.append(
             ChangeCause(

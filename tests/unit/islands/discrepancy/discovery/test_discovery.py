@@ -22,6 +22,7 @@ from islands.discrepancy.discovery.candidate_terms import (
 from islands.discrepancy.discovery.term_search import TermSearchResult, search_terms
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.io.diagnosis_json import diagnosis_document
 from islands.io.export.fmu.compiler import find_compiler
@@ -89,7 +90,7 @@ def search(law: Law) -> TermSearchResult | None:
     fitted = count_fitted_samples(record)
     simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
     target = make_target(record, fitted, {})
-    return search_terms(calibrate(simulation, target, simulation.nominal), target)
+    return search_terms(calibrate(simulation, target, simulation.nominal), target, DiagnosisRun())
 
 
 @pytest.mark.ci

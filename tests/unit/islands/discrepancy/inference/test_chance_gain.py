@@ -12,6 +12,7 @@ from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.chance_gain import ForwardSelection, compute_chance_gain, draw_noise
 from islands.discrepancy.inference.screening import bic_penalty, screen_effects
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
@@ -37,7 +38,7 @@ def calibrated(noise: np.ndarray, has_model_error: bool = False):
 def measure_gain(noise: np.ndarray, effect: Effect) -> tuple[float, float]:
     """Return the gain of an effect, and the gain that it reaches by chance."""
     base, target = calibrated(noise)
-    fit = screen_effects(base, target, [effect])[0].fit
+    fit = screen_effects(base, target, DiagnosisRun([effect]))[0].fit
     if target.effective_samples is None:
         target = replace(target, noise=fit.noise)
     surrogates = draw_noise(fit if target.effective_samples is None else base, target)

@@ -10,6 +10,7 @@ from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.confounders import Confounder, find_confounder
 from islands.discrepancy.inference.screening import screen_effects
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator
@@ -61,7 +62,9 @@ def fit_and_find(u: Array, y: Array, name: str, simulator: Simulator = UNIT_GAIN
     simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, u.size))
     target = Target(y, np.ones(u.size, dtype=bool), None, {}, fitted=u.size)
     base = calibrate(simulation, target, simulation.nominal)
-    return find_confounder(screen_effects(base, target, [CATALOGUE[name]])[0].fit, CATALOGUE[name], target)
+    return find_confounder(
+        screen_effects(base, target, DiagnosisRun([CATALOGUE[name]]))[0].fit, CATALOGUE[name], target
+    )
 
 
 def fit_play(fine_u: Array, x: Array, noise: float, seed: int) -> Confounder:

@@ -21,12 +21,12 @@ from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.hypothesis import Hypothesis, without_effect
 from islands.discrepancy.inference.screening import SCORE_TIE, screen_effects
 from islands.discrepancy.inference.stepwise_search import MIN_GAIN, refine_by_swaps, stepwise_search
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
-from islands.evolution.progress import ignore_progress
 from support.built_in_simulators import make_piezo
 from support.simulated_records import DT, made, recorded, wave
 
@@ -72,9 +72,8 @@ def test_screening_does_not_depend_on_the_order_of_evaluation() -> None:
     y = nominal.output + 1e-4 * u**2 + 0.05 * np.random.default_rng(2).standard_normal(u.size)
     base, target = calibrate_to(recorded(u, y), core)
     effects = select_some(select_effects(core, base.simulation.context, {}))
-    forward, backward = (
-        screen_effects(base, target, effects, parallel_map) for parallel_map in (map, backwards)
-    )
+    runs = [DiagnosisRun(effects, parallel_map=parallel_map) for parallel_map in (map, backwards)]
+    forward, backward = (screen_effects(base, target, run) for run in runs)
     assert [each.effect.name for each in forward] == [each.effect.name for each in backward]
     for one, other in zip(forward, backward, strict=True):
         assert np.array_equal(one.fit.values, other.fit.values)
@@ -82,20 +81,12 @@ def test_screening_does_not_depend_on_the_order_of_evaluation() -> None:
     gains = [each.score_gain(base) for each in forward]
     assert all(after < before + SCORE_TIE for before, after in pairwise(gains))
     assert forward[0].effect.name == "even-nonlinearity"
-    selected = [
-        tuple(
-            each.name
-            for each in stepwise_search(base, forward, target, effects, ignore_progress, parallel_map)[
-                0
-            ].effects
-        )
-        for parallel_map in (map, backwards)
-    ]
-    assert selected == [("even-nonlinearity",)] * 2
+    selected = [stepwise_search(base, forward, target, run)[0].effects for run in runs]
+    assert [[each.name for each in found] for found in selected] == [["even-nonlinearity"]] * 2
 
 
 @pytest.fixture
-def masked() -> tuple[CalibrationResult, Target, list]:
+def masked() -> tuple[CalibrationResult, Target, DiagnosisRun]:
     """An offset and a drift that mask each other.
 
     The offset alone explains nothing, since the sum of both is orthogonal to it. The drift alone explains a
@@ -114,25 +105,23 @@ def masked() -> tuple[CalibrationResult, Target, list]:
     size = np.sqrt(np.expm1(gain / samples) * float(noise[:samples] @ noise[:samples]) / power)
     record = recorded(u, u + noise + size * sum_)
     base, target = calibrate_to(record, RecordedOutput("theirs", u))
-    return base, target, [CATALOGUE["offset"], CATALOGUE["linear-drift"]]
+    return base, target, DiagnosisRun([CATALOGUE["offset"], CATALOGUE["linear-drift"]])
 
 
 def test_effects_that_mask_each_other_are_only_found_as_a_pair(masked) -> None:
-    base, target, effects = masked
-    screened = screen_effects(base, target, effects)
+    base, target, run = masked
+    screened = screen_effects(base, target, run)
     assert all(each.score_gain(base) < MIN_GAIN for each in screened)
-    assert stepwise_search(base, screened, target, effects, ignore_progress)[0].effects == ()
-    found, _ = stepwise_search(base, screened, target, effects, ignore_progress, pairs=True)
+    assert stepwise_search(base, screened, target, run)[0].effects == ()
+    found, _ = stepwise_search(base, screened, target, run, pairs=True)
     assert {each.name for each in found.effects} == {"offset", "linear-drift"}
     assert found.cost < base.score - MIN_GAIN
 
 
 def test_hypothesis_without_one_effect_is_refitted(masked) -> None:
-    base, target, effects = masked
-    found, _ = stepwise_search(
-        base, screen_effects(base, target, effects), target, effects, ignore_progress, pairs=True
-    )
-    for effect in effects:
+    base, target, run = masked
+    found, _ = stepwise_search(base, screen_effects(base, target, run), target, run, pairs=True)
+    for effect in run.effects:
         without = without_effect(found, effect, target)
         assert effect not in without.effects
         assert len(without.effects) == 1
@@ -146,9 +135,8 @@ def test_pure_noise_yields_no_pair() -> None:
     core = RecordedOutput("theirs", u)
     base, target = calibrate_to(recorded(u, u + noise), core)
     effects = select_effects(core, base.simulation.context, {})
-    found, _ = stepwise_search(
-        base, screen_effects(base, target, effects), target, effects, ignore_progress, pairs=True
-    )
+    run = DiagnosisRun(effects)
+    found, _ = stepwise_search(base, screen_effects(base, target, run), target, run, pairs=True)
     assert found.effects == ()
     assert found.fit is base
 
@@ -162,14 +150,13 @@ def test_noise_model_is_white_once_both_causes_are_found() -> None:
     core = RecordedOutput("theirs", u)
     base, target = calibrate_to(recorded(u, u + 0.02 * u**2 + 0.3 * (time > 8.0) + noise), core)
     effects = select_some(select_effects(core, base.simulation.context, {}))
-    screened = screen_effects(base, target, effects)
+    run = DiagnosisRun(effects)
+    screened = screen_effects(base, target, run)
     target = whiten_target(target, screened[0].fit)
     assert target.noise is not None
     assert target.noise.order > 0
     base = calibrate(base.simulation, target, base.values)
-    found, target = stepwise_search(
-        base, screen_effects(base, target, effects), target, effects, ignore_progress
-    )
+    found, target = stepwise_search(base, screen_effects(base, target, run), target, run)
     assert {each.name for each in found.effects} == {"even-nonlinearity", "jump"}
     assert target.noise is not None
     assert target.noise.order == 0
@@ -189,8 +176,10 @@ def test_deviation_from_the_prior_is_part_of_the_residual() -> None:
     target = replace(target, prior_std=prior_std)
     effects = select_effects(core, base.simulation.context, prior_std)
     offset = next(each for each in effects if each.name == "offset")
-    with_offset = screen_effects(calibrate(base.simulation, target, base.values), target, [offset])[0].fit
-    gains = [each for each in screen_effects(with_offset, target, effects) if each.effect.is_gain]
+    base = calibrate(base.simulation, target, base.values)
+    with_offset = screen_effects(base, target, DiagnosisRun([offset]))[0].fit
+    screened = screen_effects(with_offset, target, DiagnosisRun(effects))
+    gains = [each for each in screened if each.effect.is_gain]
     assert gains
     assert gains[0].score_gain(with_offset) > MIN_GAIN
 
@@ -205,9 +194,9 @@ def test_refinement_replaces_a_wrong_effect_by_a_better_one() -> None:
     wrong = [next(each for each in effects if each.name == name) for name in ("cubic-stiffness", "jump")]
     fit = base
     for effect in wrong:
-        fit = screen_effects(fit, target, [effect])[0].fit
+        fit = screen_effects(fit, target, DiagnosisRun([effect]))[0].fit
     initial = Hypothesis(fit, fit.score, tuple(wrong))
-    found, _ = refine_by_swaps(initial, target, effects, ignore_progress)
+    found, _ = refine_by_swaps(initial, target, DiagnosisRun(effects))
     assert {each.name for each in found.effects} == {"cubic-stiffness", "even-nonlinearity"}
     assert found.cost < initial.cost
     assert [each.without.effects for each in found.alternatives] == [(found.effects[1],), (found.effects[0],)]
@@ -222,10 +211,10 @@ def test_equivalent_effects_keep_the_catalogue_order(seed: int) -> None:
     noise = 1e-3 * np.random.default_rng(seed).standard_normal(record.samples)
     base, target = calibrate_to(replace(record, y=record.y + 0.01 + noise), core)
     effects = select_effects(core, base.simulation.context, {})
-    one, other = screen_effects(base, target, effects)[:2]
+    one, other = screen_effects(base, target, DiagnosisRun(effects))[:2]
     assert (one.effect.cause, other.effect.cause) == ("offset", "input-offset")
     assert one.score_gain(base) == pytest.approx(other.score_gain(base), abs=SCORE_TIE)
-    found, _ = stepwise_search(base, (one, other), target, effects, ignore_progress)
+    found, _ = stepwise_search(base, (one, other), target, DiagnosisRun(effects))
     assert [each.name for each in found.effects] == ["offset"]
 
 
@@ -262,6 +251,6 @@ def test_effect_that_the_refitted_simulation_does_not_need_is_removed() -> None:
     effects = [CATALOGUE["input-gain"], CATALOGUE["jump"]]
     fit = evaluate_fit(base.simulation.with_effects(effects[:1]), target, np.array([1.0, 0.3]))
     initial = Hypothesis(fit, fit.score, tuple(effects[:1]))
-    found, _ = refine_by_swaps(initial, target, effects, ignore_progress)
+    found, _ = refine_by_swaps(initial, target, DiagnosisRun(effects))
     assert found.effects == ()
     assert found.fit.values == pytest.approx([1.3], rel=1e-3)

@@ -9,8 +9,8 @@ from islands.discrepancy.calibration.preparation import count_fitted_samples, ma
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.strategies import assess_evidence, search_with_model_error
 from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.evolution.progress import ignore_progress
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import PhysicalSpec
 from support.simulated_records import recorded
@@ -58,8 +58,9 @@ def assessed(request):
     target = make_target(record, fitted, {})
     base = calibrate(simulation, target, simulation.nominal)
     effects = [*core.state_effects, *(CATALOGUE[name] for name in request.param)]
-    outcome = search_with_model_error(base, target, effects, ignore_progress, map)
-    return record, fitted, outcome, assess_evidence(outcome, effects, np.random.default_rng(0))
+    run = DiagnosisRun(effects)
+    outcome = search_with_model_error(base, target, run)
+    return record, fitted, outcome, assess_evidence(outcome, run)
 
 
 @pytest.mark.ci

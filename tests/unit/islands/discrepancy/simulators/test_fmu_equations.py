@@ -16,6 +16,7 @@ from islands.discrepancy.discovery.term_search import TermSearchResult, search_t
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.context import Parameter, SimulationContext
+from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import ForceLaw
 from islands.discrepancy.simulators.extended import ExtendedSimulator
@@ -173,7 +174,7 @@ def search(spec: FmuSpec, record: Dataset) -> TermSearchResult | None:
     fitted = count_fitted_samples(record)
     simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
     target = make_target(record, fitted, {})
-    return search_terms(calibrate(simulation, target, simulation.nominal), target)
+    return search_terms(calibrate(simulation, target, simulation.nominal), target, DiagnosisRun())
 
 
 @pytest.mark.ci
