@@ -20,6 +20,9 @@ from islands.estimation.estimator_table import ESTIMATORS as ESTIMATORS
 from islands.evolution.migration.topology import TOPOLOGIES as TOPOLOGIES
 from islands.evolution.presets import PRESETS as PRESETS
 from islands.evolution.settings import Settings as Settings
+from islands.expressions.parsing import parse as parse
+from islands.expressions.primitives import PRIMITIVES as PRIMITIVES
+from islands.expressions.user_primitive import primitive as primitive
 from islands.facade.coupled.coupled_identification import fit_coupled as fit_coupled
 from islands.facade.coupled.coupled_identification import identify_coupled as identify_coupled
 from islands.facade.coupled.coupled_result import CoupledResult as CoupledResult
@@ -57,10 +60,7 @@ from islands.io.records import write_record as write_record
 from islands.model.model import Model as Model
 from islands.model.model import make_model as make_model
 from islands.model.operating_point import static_characteristic as static_characteristic
-from islands.model.parsing import parse as parse
-from islands.model.primitives import PRIMITIVES as PRIMITIVES
 from islands.model.sympy_expression import to_sympy as to_sympy
-from islands.model.user_primitive import primitive as primitive
 from islands.simulation.coupled_model import CoupledModel as CoupledModel
 from islands.simulation.step_response import step_response as step_response
 

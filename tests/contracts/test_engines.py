@@ -19,9 +19,9 @@ from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.hall_of_fame import merge
 from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings
+from islands.expressions.tree import Lagged
 from islands.facade.identify import identify
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
-from islands.model.expression import Lagged
 from islands_service.engines import ENGINES
 from support import own_primitive
 from support.searches import exactly, record

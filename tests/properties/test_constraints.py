@@ -10,12 +10,12 @@ from islands.estimation.constraints.constraint import Constraint
 from islands.estimation.constraints.parts import ClusterSums
 from islands.estimation.least_squares import least_squares
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
+from islands.expressions.parsing import parse
+from islands.expressions.printing import plain
+from islands.expressions.tree import Lagged
 from islands.model.clusters import OUTPUT_AT_REST, steady_state
-from islands.model.expression import Lagged
 from islands.model.model import make_model
-from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.rendering import plain
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run

@@ -17,7 +17,7 @@ from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.island import Island, select_elite
 from islands.evolution.migration.policies import SELECTION_POLICIES
 from islands.evolution.problem import Problem
-from islands.model.expression import Apply, Lagged, height, walk
+from islands.expressions.tree import Apply, Lagged, height, walk
 from islands.simulation.outcome import Status
 from support.migrations import (
     SETTINGS,

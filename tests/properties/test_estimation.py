@@ -18,8 +18,8 @@ from islands.errors import RecordError
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.estimate import estimate
 from islands.estimation.least_squares import least_squares
-from islands.model.expression import Lagged
-from islands.model.parsing import parse
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Lagged
 from islands.model.regressor import regressor
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
@@ -333,9 +333,9 @@ import hashlib
 import numpy as np
 from islands.data.dataset import Dataset
 from islands.estimation.least_squares import factorise, least_squares
-from islands.model.expression import Lagged
+from islands.expressions.tree import Lagged
 from islands.model.regressor import regressor
-from islands.model.parsing import parse
+from islands.expressions.parsing import parse
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix
 
 texts = ["y(k-1)", "y(k-2)", "u(k-1)", "u(k-1)*y(k-1)", "u(k-2)^3", "sign(u(k-1) - u(k-2))"]

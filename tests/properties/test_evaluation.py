@@ -16,8 +16,8 @@ from islands.evolution.gp.individual import Individual
 from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.island import first_generation
 from islands.evolution.settings import Settings
-from islands.model.expression import Constant, Lagged
-from islands.model.parsing import parse
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Constant, Lagged
 from islands.simulation.outcome import Status
 from support.searches import SMALL, evolved, record
 

@@ -15,8 +15,8 @@ from islands.evolution.gp.gene_index import GeneIndex
 from islands.evolution.gp.individual import Individual
 from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.island import first_generation, step
-from islands.model.expression import Lagged
-from islands.model.parsing import parse
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Lagged
 from support.searches import SMALL, evolved, islands_of, record
 
 LIMITS = Limits(pairs=1 << 14, genes=100_000, structures=40_000)

@@ -15,9 +15,9 @@ from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.individual import Individual
 from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.settings import Settings
-from islands.model.expression import Lagged
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Lagged
 from islands.model.model import Model, canonical_order
-from islands.model.parsing import parse
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting

@@ -14,11 +14,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from islands.errors import ModelError
-from islands.model.expression import Apply, Constant, Lagged, Shift, content, lags, remove_shifts, value, walk
-from islands.model.parsing import parse
-from islands.model.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
+from islands.expressions.printing import latex, plain
+from islands.expressions.tree import Apply, Constant, Lagged, Shift, content, lags, remove_shifts, value, walk
 from islands.model.regressor import canonical, regressor
-from islands.model.rendering import latex, plain
 from support.strategies import (
     any_number,
     expressions,
@@ -244,11 +244,11 @@ def test_latex_never_puts_an_exponent_on_an_exponent_or_a_fraction(expression):
 
 DETERMINED = """
 from islands.model.clusters import clusters
-from islands.model.expression import Lagged, content, lags
+from islands.expressions.tree import Lagged, content, lags
 from islands.model.model import make_model
 from islands.model.equations import equation, latex_equation
-from islands.model.parsing import parse
-from islands.model.rendering import at_rest
+from islands.expressions.parsing import parse
+from islands.expressions.printing import at_rest
 terms = ["max(y(k-3), u2(k-1))*tanh(u1(k-2))", "u1(k-1)*sign(u1(k-1) - u1(k-4))^3", "y(k-1)", "3", "u2(k-7)",
          "exp(phi1(u1(k-1), u1(k-2)))*y(k-2)", "sin(y(k-1) + 2*u2(k-3) - u1(k-1)*u2(k-1))", "2*y(k-9)"]
 model = make_model([(parse(text), 0.5) for text in terms], ("u1", "u2"))
@@ -315,8 +315,8 @@ def test_copies_and_pickles_are_equal_and_found_under_the_same_key(expression):
 
 CARRIED = """
 import pickle, sys
-from islands.model.expression import walk
-from islands.model.parsing import parse
+from islands.expressions.tree import walk
+from islands.expressions.parsing import parse
 from islands.model.regressor import regressor
 trees = [parse(text) for text in sys.argv[1:]]
 regressors = [regressor(tree)[1] for tree in trees]

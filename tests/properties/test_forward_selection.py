@@ -13,8 +13,8 @@ import islands
 from islands.data.dataset import Dataset, join
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import forward_selection
+from islands.expressions.printing import plain
 from islands.model.candidate_library import candidates
-from islands.model.rendering import plain
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.physics import cluster_sums
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from islands.data.dataset import Dataset
 from islands.estimation.least_squares import least_squares
 from islands.estimation.structure_selection.froe import froe
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Lagged
 from islands.kernels import err_selection
-from islands.model.expression import Lagged
-from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix
 from support.regressions import problem, seeds, squares

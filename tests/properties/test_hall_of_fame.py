@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from islands.evolution.gp.individual import Individual, make_regressor
 from islands.evolution.hall_of_fame import DEPTH, HallOfFame, merge, pareto_front, with_entries
-from islands.model.expression import Lagged, Shift
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Lagged, Shift
 from islands.model.model import canonical_order
-from islands.model.parsing import parse
 
 #: The leaves give more structures of one size than a hall keeps.
 LEAVES = [Lagged(channel, lag) for channel in (0, 1) for lag in (1, 2, 3, 4, 5, 6)]

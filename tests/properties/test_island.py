@@ -20,9 +20,9 @@ from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.island import _breed_pair, first_generation, select_elite, step
 from islands.evolution.problem import make_problem
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Lagged
 from islands.io.checkpoints import write_checkpoint
-from islands.model.expression import Lagged
-from islands.model.parsing import parse
 from support.repository import ROOT
 from support.searches import SMALL, distinct_genes, evolved, exactly, islands_of, record
 

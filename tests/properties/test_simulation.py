@@ -1,7 +1,7 @@
 """Properties of simulation: one-step-ahead prediction, multiple shooting and free run.
 
 The test oracle is the definition: a recursion over samples in plain floats, with
-`islands.model.expression.value`. The kernel must agree with it to the last bit.
+`islands.expressions.tree.value`. The kernel must agree with it to the last bit.
 """
 
 import pickle
@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset, join
 from islands.errors import RecordError
+from islands.expressions.parsing import parse
+from islands.expressions.tree import value
 from islands.kernels.summation import total
-from islands.model.expression import value
 from islands.model.model import make_model
-from islands.model.parsing import parse
 from islands.simulation.layout import WIDTHS, layout
 from islands.simulation.linked import LinkedModel
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead

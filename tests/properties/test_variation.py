@@ -23,10 +23,10 @@ from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.island import first_generation, step
 from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings
-from islands.model.expression import Apply, Lagged, Shift, children, walk
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
-from islands.model.rendering import plain
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.printing import plain
+from islands.expressions.tree import Apply, Lagged, Shift, children, walk
 from support.searches import SMALL, record
 
 # Independent definition of valid genes.

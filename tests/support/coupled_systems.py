@@ -4,9 +4,9 @@ import numpy as np
 
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
-from islands.model.expression import value
+from islands.expressions.parsing import parse
+from islands.expressions.tree import value
 from islands.model.model import make_model
-from islands.model.parsing import parse
 from islands.simulation.coupled_model import CoupledModel
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.expressions.parsing import parse
 from islands.model.model import Model, make_model
-from islands.model.parsing import parse
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.predictors import free_run
 

@@ -4,7 +4,7 @@ import numpy as np
 
 import islands
 from islands.data.dataset import Dataset
-from islands.model.primitives import PRIMITIVES
+from islands.expressions.primitives import PRIMITIVES
 from islands.systems.published_models import PUBLISHED
 
 SAMPLES = 60

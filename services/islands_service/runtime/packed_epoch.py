@@ -18,8 +18,8 @@ from islands.evolution.engine import Caches
 from islands.evolution.epoch import IslandEpoch
 from islands.evolution.gp.individual import Population
 from islands.evolution.island import Island, StepInfo
-from islands.model.expression import Primitive
-from islands.model.primitives import PRIMITIVES
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Primitive
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from islands.estimation.constrained_least_squares import constrained_least_squar
 from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.constraints.constraint import Constrained
 from islands.estimation.parameter_constraints import constraint
-from islands.model.expression import Lagged
+from islands.expressions.tree import Lagged
 from islands.model.model import Model, canonical_order
 from islands.model.regressor import Regressor
 from islands.program.regressor_matrix import regressor_matrix

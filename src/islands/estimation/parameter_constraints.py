@@ -12,8 +12,8 @@ from islands.errors import SettingsError
 from islands.estimation.constraints.constraint import Constraint
 from islands.estimation.constraints.parser import parse_statements
 from islands.estimation.constraints.parts import ClusterSums, StaticGain, Symmetry
+from islands.expressions.tree import Expression
 from islands.model.clusters import OUTPUT_AT_REST, steady_state
-from islands.model.expression import Expression
 from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
 

@@ -22,7 +22,7 @@ from islands.evolution.gp.individual import Individual, Population, unique_niche
 from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.settings import Settings
-from islands.model.expression import Expression
+from islands.expressions.tree import Expression
 
 #: Quantile of the parents' fitness that defines the abandon threshold.
 _THRESHOLD_QUANTILE = 0.8

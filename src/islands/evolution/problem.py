@@ -15,7 +15,7 @@ from islands.evolution.gp.gene_structure import with_phi
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
 from islands.evolution.progress import Steps
 from islands.evolution.settings import Settings
-from islands.model.expression import Expression, height
+from islands.expressions.tree import Expression, height
 from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
 

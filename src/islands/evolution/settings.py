@@ -20,10 +20,10 @@ from islands.evolution.gp.island_profiles import ISLAND_PROFILES
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.migration.schedule import Schedule, parse_schedule
 from islands.evolution.migration.topology import TOPOLOGIES, parse_topology
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Primitive
+from islands.expressions.user_primitive import primitive_table
 from islands.model.candidate_library import get_library
-from islands.model.expression import Primitive
-from islands.model.primitives import PRIMITIVES
-from islands.model.user_primitive import primitive_table
 
 #: Maximum number of islands, limited by the memory of a coordinator.
 MOST_ISLANDS = 10_000

@@ -36,6 +36,9 @@ from islands.evolution.progress import (
 from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Primitive
+from islands.expressions.user_primitive import get_source
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.engine_choice import Ray, open_engine
@@ -48,9 +51,6 @@ from islands.facade.trials.rate_selection import select_rate
 from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set
-from islands.model.expression import Primitive
-from islands.model.primitives import PRIMITIVES
-from islands.model.user_primitive import get_source
 from islands.program.primitive_functions import row_address
 
 if TYPE_CHECKING:

@@ -7,6 +7,8 @@ from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from islands.errors import ModelError
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Primitive
 from islands.facade.coupled.coupled_result import FittedCoupledModel
 from islands.facade.results.saved_result import SavedModel, SavedResult, make_single_model, read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
@@ -15,8 +17,6 @@ from islands.io.models import read_model
 from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import EXTENDED_FILE, LocalExtendedSpec, parse_spec
-from islands.model.expression import Primitive
-from islands.model.primitives import PRIMITIVES
 from islands.systems.published_models import get_published_model
 
 #: Values of `load`; each has ``simulate`` and ``export``.

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TypedDict
 
-from islands.model.expression import Primitive
+from islands.expressions.tree import Primitive
 
 
 class SettingChanges(TypedDict, total=False):

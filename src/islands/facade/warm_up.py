@@ -19,6 +19,7 @@ from islands.estimation.forward_selection import SelectionProblem, make_selectio
 from islands.estimation.structure_selection.certificate import certify
 from islands.evolution.generation.evaluation import Evaluator, Limits
 from islands.evolution.presets import resolve_settings
+from islands.expressions.tree import Lagged
 from islands.facade.fit import fit
 from islands.facade.identify import identify
 from islands.facade.setting_changes import SettingChanges
@@ -32,7 +33,6 @@ from islands.kernels.population import (
     evaluate_individuals,
     select_terms,
 )
-from islands.model.expression import Lagged
 from islands.model.model import make_model
 from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.coupled_model import CoupledModel

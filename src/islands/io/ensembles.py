@@ -8,12 +8,12 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from islands.errors import ModelError
-from islands.model.expression import Primitive
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.printing import plain
+from islands.expressions.tree import Primitive
 from islands.model.model import Model
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor, regressor
-from islands.model.rendering import plain
 from islands.validation.ensemble import Ensemble, EnsembleStructure
 from islands.validation.prediction_bands import PredictionBands
 

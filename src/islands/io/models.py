@@ -10,15 +10,15 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.printing import plain
+from islands.expressions.tree import Primitive
 from islands.io.document_problems import find_problem
 from islands.io.result_models import read_preprocessing
 from islands.model.equations import equation, latex_equation
-from islands.model.expression import Primitive
 from islands.model.model import Model, canonical_order
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor, regressor
-from islands.model.rendering import plain
 
 SCHEMA: Literal["islands.model/1"] = "islands.model/1"
 

@@ -1,4 +1,4 @@
-"""Expressions, regressors and NARX models, and their text (plain, LaTeX, MathML).
+"""Regressors and NARX models, and their equations as text, LaTeX and MathML.
 
-Read `expression` first, then `regressor` and `model`.
+Read `regressor` first, then `model`.
 """

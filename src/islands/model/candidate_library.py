@@ -9,9 +9,9 @@ from itertools import combinations_with_replacement
 from types import MappingProxyType
 
 from islands.errors import SettingsError, lookup
-from islands.model.expression import Apply, Constant, Expression, Lagged
+from islands.expressions.primitives import MUL, PRIMITIVES, SIGN, SUB
+from islands.expressions.tree import Apply, Constant, Expression, Lagged
 from islands.model.model import canonical_order
-from islands.model.primitives import MUL, PRIMITIVES, SIGN, SUB
 from islands.model.regressor import Regressor, regressor
 
 #: Maximum number of candidates of a library; their Gram matrix takes 128 MB. Use evolution for more.

@@ -9,7 +9,7 @@ the equilibria.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from islands.model.expression import Apply, Expression, Lagged, Shift, content
+from islands.expressions.tree import Apply, Expression, Lagged, Shift, content
 from islands.model.regressor import Regressor, canonical
 
 #: Steady state of y(k-1). Property 1 requires that the parameters of its cluster sum to 1.

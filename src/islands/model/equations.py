@@ -6,10 +6,8 @@ from html import escape, unescape
 from textwrap import wrap
 
 from islands.data.channel_names import parse_channel_name
-from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
-from islands.model.model import Model
-from islands.model.parsing import parse
-from islands.model.rendering import (
+from islands.expressions.parsing import parse
+from islands.expressions.printing import (
     MINUS,
     TIMES,
     latex_factor,
@@ -20,6 +18,8 @@ from islands.model.rendering import (
     plain,
     plain_factor,
 )
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Shift
+from islands.model.model import Model
 from islands.model.signal_statement import describe_signals
 
 #: Maximum number of visible characters of a row of MathML.

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from islands.data.channel_names import parse_channel_name
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
-from islands.model.expression import Apply, Constant, Expression, Lagged, replace_leaves
-from islands.model.primitives import SUB
+from islands.expressions.primitives import SUB
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, replace_leaves
 from islands.model.regressor import Regressor, regressor
 
 

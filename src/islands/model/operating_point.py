@@ -14,9 +14,8 @@ from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import ModelError
-from islands.model.derivatives import differentiate
-from islands.model.equations import expressions_of_record, named_term, signal_names
-from islands.model.expression import (
+from islands.expressions.derivatives import differentiate
+from islands.expressions.tree import (
     Apply,
     Constant,
     Expression,
@@ -26,6 +25,7 @@ from islands.model.expression import (
     value,
     walk,
 )
+from islands.model.equations import expressions_of_record, named_term, signal_names
 from islands.model.model import Model, measured_model
 
 #: Sums of parameters below this fraction of their absolute sum are zero except for rounding.

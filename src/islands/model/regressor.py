@@ -10,7 +10,9 @@ import math
 from dataclasses import dataclass, field
 
 from islands.errors import ModelError
-from islands.model.expression import (
+from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
+from islands.expressions.printing import plain
+from islands.expressions.tree import (
     Apply,
     Constant,
     Expression,
@@ -21,8 +23,6 @@ from islands.model.expression import (
     lags,
     remove_shifts,
 )
-from islands.model.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
-from islands.model.rendering import plain
 
 _ONE = Constant(1.0)
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from islands.distribution import describe_missing_extra
 from islands.errors import ModelError
+from islands.expressions.primitives import LARGEST_EXPONENT
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift
 from islands.model.equations import expressions_of_record, signal_names
-from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, Shift
 from islands.model.model import Model
-from islands.model.primitives import LARGEST_EXPONENT
 
 if TYPE_CHECKING:
     import sympy

@@ -12,8 +12,8 @@ from numba.core.errors import NumbaError
 from numba.extending import register_jitable
 
 from islands.errors import ModelError
+from islands.expressions.tree import Primitive
 from islands.kernels.jit_cache import compile_callback
-from islands.model.expression import Primitive
 
 _ROW = types.CPointer(types.float64)
 _SIGNATURE = types.void(_ROW, _ROW, _ROW, types.int64)

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.expressions.primitives import ADD, MUL, SIGN, SUB
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive
 from islands.kernels import codegen, interpreter
 from islands.kernels.codegen import CONSTANT, LAGGED, NodeArrays
 from islands.kernels.interpreter import CALL, MAX_FACTORS, MULTIPLY, Program
-from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive
-from islands.model.primitives import ADD, MUL, SIGN, SUB
 from islands.model.regressor import Regressor
 from islands.program.primitive_functions import row_address
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
-from islands.model.expression import Apply, Expression, Lagged
+from islands.expressions.tree import Apply, Expression, Lagged
 from islands.model.model import Model, measured_model
 
 

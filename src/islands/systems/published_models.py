@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from islands.errors import lookup
+from islands.expressions.parsing import parse
 from islands.model.model import Model, make_model
-from islands.model.parsing import parse
 
 
 @dataclass(frozen=True, slots=True)

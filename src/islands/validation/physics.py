@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset, join
 from islands.estimation.parameter_constraints import PROPERTY_1
+from islands.expressions import printing
 from islands.kernels.characteristic_roots import converges
-from islands.model import rendering
 from islands.model.clusters import OUTPUT_AT_REST, clusters
 from islands.model.model import Model
 from islands.simulation.predictors import divergence_bound, free_run
@@ -178,7 +178,7 @@ def cluster_sums(model: Model) -> tuple[ClusterSum, ...]:
     """
     sums = {group.steady_state: group.total(model.parameters) for group in clusters(model.regressors)}
     return tuple(
-        ClusterSum(rendering.at_rest(state, model.inputs), total, PROPERTY_1.get(state, 0.0))
+        ClusterSum(printing.at_rest(state, model.inputs), total, PROPERTY_1.get(state, 0.0))
         for state, total in ({OUTPUT_AT_REST: 0.0} | sums).items()
     )
 

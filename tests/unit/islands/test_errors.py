@@ -13,11 +13,11 @@ from islands.discrepancy.monitoring.alarm_rate import parse_alarm_rate
 from islands.errors import IslandsError, suggest
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.presets import resolve_settings
+from islands.expressions.parsing import parse
 from islands.io.export import export
 from islands.io.records.reading_options import ReadingOptions
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import PhysicalSpec, parse_spec
-from islands.model.parsing import parse
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import get_published_model
 

@@ -17,11 +17,11 @@ from islands.discrepancy.interfaces.simulator import (
     simulate_runs,
     split_recordings,
 )
-from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
+from islands.expressions.primitives import MUL, PRIMITIVES, SUB
+from islands.expressions.printing import plain
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Shift
 from islands.model.model import Model
-from islands.model.primitives import MUL, PRIMITIVES, SUB
 from islands.model.regressor import Regressor, regressor
-from islands.model.rendering import plain
 
 #: Name of the effect.
 CORE_SHAPE = "core-shape"

@@ -19,9 +19,9 @@ from islands.estimation.constraints.parts import (
     StaticGain,
     Symmetry,
 )
+from islands.expressions.primitives import ADD, MUL
+from islands.expressions.tree import Apply, Constant, Expression, Lagged
 from islands.model.clusters import clusters
-from islands.model.expression import Apply, Constant, Expression, Lagged
-from islands.model.primitives import ADD, MUL
 from islands.model.regressor import Regressor, canonical
 from islands.simulation.outcome import EvaluationOutcome, Status
 

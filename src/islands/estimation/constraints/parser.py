@@ -12,7 +12,7 @@ from islands.estimation.constraints.parts import (
     Part,
     StaticGain,
 )
-from islands.model.parsing import parse
+from islands.expressions.parsing import parse
 from islands.model.regressor import Regressor, regressor
 
 #: Largest number of statements; the cost of an estimation grows with it.

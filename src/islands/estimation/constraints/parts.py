@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import nan
 
+from islands.expressions.derivatives import differentiate
+from islands.expressions.parity import parity
+from islands.expressions.tree import Expression, value
 from islands.model.clusters import steady_state
-from islands.model.derivatives import differentiate
-from islands.model.expression import Expression, value
-from islands.model.parity import parity
 from islands.model.regressor import Regressor
 
 

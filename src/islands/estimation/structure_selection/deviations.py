@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.estimation.estimate import FittedStructure, estimate
-from islands.model.expression import Apply, Constant, Expression, Lagged
+from islands.expressions.primitives import SUB
+from islands.expressions.tree import Apply, Constant, Expression, Lagged
 from islands.model.model import canonical_order
-from islands.model.primitives import SUB
 from islands.model.regressor import Regressor, regressor
 from islands.simulation.outcome import EvaluationOutcome
 

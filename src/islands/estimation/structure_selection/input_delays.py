@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from islands.errors import SettingsError
-from islands.model.expression import Apply, Expression, Lagged
+from islands.expressions.tree import Apply, Expression, Lagged
 from islands.model.model import canonical_order
 from islands.model.regressor import Regressor, regressor
 

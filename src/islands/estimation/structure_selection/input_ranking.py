@@ -14,8 +14,8 @@ from islands.data.dataset import Dataset, join
 from islands.errors import SettingsError
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.structure_selection.input_delays import delay_inputs, expand_delays
+from islands.expressions.tree import Apply, Expression, Lagged
 from islands.model.candidate_library import candidates, count_inputs, largest_degree
-from islands.model.expression import Apply, Expression, Lagged
 from islands.model.model import canonical_order
 from islands.model.regressor import Regressor, regressor
 from islands.simulation.outcome import EvaluationOutcome

@@ -19,9 +19,9 @@ from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.gene_index import ZERO, GeneIndex
 from islands.evolution.gp.individual import Individual
 from islands.evolution.settings import Settings
+from islands.expressions.tree import Expression, Lagged
 from islands.kernels import population as kernel
 from islands.kernels.pair_table import PLACE_BYTES, clear, complete_pairs, pair_table
-from islands.model.expression import Expression, Lagged
 from islands.model.regressor import Regressor
 from islands.program.regressor_matrix import select_rows
 from islands.simulation.layout import layout

@@ -15,7 +15,7 @@ from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.variation import Genes, with_required_genes
 from islands.evolution.gp.individual import Individual, Population
 from islands.evolution.progress import Steps
-from islands.model.expression import Expression
+from islands.expressions.tree import Expression
 
 #: Smallest relative reduction of the squared error for which an exchange continues.
 _MIN_GAIN = 1e-3

@@ -12,8 +12,8 @@ from islands.evolution.gp.gene_structure import LINEAR_OUTPUT, PHI, STRUCTURES, 
 from islands.evolution.gp.individual import make_regressor
 from islands.evolution.gp.rng import Stream
 from islands.evolution.settings import Settings
-from islands.model.expression import Apply, Expression, Lagged, Primitive, Shift, children, height
-from islands.model.primitives import PRIMITIVES
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Apply, Expression, Lagged, Primitive, Shift, children, height
 
 Genes = tuple[Expression, ...]
 

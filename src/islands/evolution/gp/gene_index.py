@@ -6,9 +6,9 @@ import numpy as np
 
 from islands.estimation.constraints.constraint import Constraint
 from islands.evolution.gp.individual import make_regressor
+from islands.expressions.tree import Expression
 from islands.kernels.codegen import NodeArrays
 from islands.kernels.parameter_reduction import Groups
-from islands.model.expression import Expression
 from islands.model.regressor import Regressor
 from islands.program.term_pool import Term, TermPool
 

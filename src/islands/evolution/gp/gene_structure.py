@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from islands.model.expression import Apply, Expression, Lagged, Shift
-from islands.model.primitives import PRIMITIVES, SIGN, SUB
+from islands.expressions.primitives import PRIMITIVES, SIGN, SUB
+from islands.expressions.tree import Apply, Expression, Lagged, Shift
 
 Structure = Callable[[Expression], Expression]
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 from math import inf, isnan
 
 from islands.errors import ModelError
-from islands.model.expression import Expression
+from islands.expressions.tree import Expression
 from islands.model.regressor import Regressor, regressor
 from islands.simulation.outcome import OK, EvaluationOutcome
 

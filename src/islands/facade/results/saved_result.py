@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Primitive
 from islands.facade.results.assessed_model import AssessedModel
 from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.results.notebook_html import render_html
@@ -17,9 +19,7 @@ from islands.facade.results.ranked_models import RankedModels, write_validation_
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import read_model, terms_document
 from islands.io.result_models import check_single_output, read_shooting_interval
-from islands.model.expression import Primitive
 from islands.model.model import Model
-from islands.model.primitives import PRIMITIVES
 from islands.validation.metrics import Metrics
 from islands.validation.prediction_bands import PredictionBands
 from islands.validation.recommendation import Recommendation

@@ -13,11 +13,11 @@ from islands.evolution.archipelago import Archipelago
 from islands.evolution.gp.individual import Individual
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.island import Island
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Primitive
 from islands.io.checkpoints.json_reader import JsonReader
 from islands.io.checkpoints.writing import SCHEMA
-from islands.model.expression import Primitive
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome, Status
 

@@ -16,7 +16,7 @@ from islands.evolution.archipelago import Archipelago
 from islands.evolution.gp.individual import Individual
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.island import Island
-from islands.model.rendering import plain
+from islands.expressions.printing import plain
 
 SCHEMA = "islands.checkpoint/3"
 HALL_SCHEMA = "islands.hall/1"

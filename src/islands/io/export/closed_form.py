@@ -12,6 +12,8 @@ from types import MappingProxyType
 
 from islands.data.channel_names import AT_ONCE
 from islands.errors import ModelError
+from islands.expressions.primitives import MUL, PRIMITIVES, SUB
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, replace_leaves
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.spec_base import EffectSpec, ScalesSpec
@@ -22,9 +24,7 @@ from islands.io.simulator_spec.specification import (
     ModelSpec,
     SimulationSpec,
 )
-from islands.model.expression import Apply, Constant, Expression, Lagged, replace_leaves
 from islands.model.model import Model, make_model, measured_model
-from islands.model.primitives import MUL, PRIMITIVES, SUB
 
 _Terms = list[tuple[Expression, float]]
 _Values = Mapping[str, float]

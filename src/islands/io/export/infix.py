@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from islands.errors import ModelError
-from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive
 
 #: Primitives that are operators in every language.
 OPERATORS = {"mul": "*", "add": " + ", "sub": " - "}

@@ -2,8 +2,8 @@
 
 import textwrap
 
+from islands.expressions.tree import Primitive
 from islands.io.export.parts import body, functions, heading, signals, terms
-from islands.model.expression import Primitive
 from islands.model.model import Model
 
 _FILE = """\

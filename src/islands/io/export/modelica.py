@@ -5,10 +5,10 @@ from types import MappingProxyType
 
 from islands.data.channel_names import parse_unit
 from islands.errors import ModelError
+from islands.expressions.primitives import LARGEST_EXPONENT
+from islands.expressions.tree import Primitive
 from islands.io.export.sampled_block import SampledBlock, make_block
-from islands.model.expression import Primitive
 from islands.model.model import Model
-from islands.model.primitives import LARGEST_EXPONENT
 from islands.simulation.coupled_model import CoupledModel
 
 _FILE = """\

@@ -7,9 +7,9 @@ import textwrap
 from collections.abc import Callable
 
 from islands.errors import ModelError
+from islands.expressions.tree import Apply, Constant, Primitive, walk
 from islands.io.export.infix import OPERATORS, infix
 from islands.model.equations import equation
-from islands.model.expression import Apply, Constant, Primitive, walk
 from islands.model.model import Model
 from islands.model.signal_statement import describe_values, symbols
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from numbers import Integral, Real
 
 from islands.errors import ModelError
+from islands.expressions.tree import Primitive
 from islands.io.export.parts import description, functions, signals, terms
 from islands.model.equations import equation
-from islands.model.expression import Primitive
 from islands.model.model import Model
 
 _MODULE = '''"""NARX model: {equation}

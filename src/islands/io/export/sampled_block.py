@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from islands.errors import ModelError
+from islands.expressions.tree import Expression, Lagged, Primitive, walk
 from islands.io.export.c import c_name, definition
 from islands.io.export.coupled.coupled_signals import (
     coupled_functions,
@@ -21,7 +22,6 @@ from islands.io.export.coupled.coupled_signals import (
 )
 from islands.io.export.parts import functions, heading, signals, terms
 from islands.model.equations import equation
-from islands.model.expression import Expression, Lagged, Primitive, walk
 from islands.model.model import Model
 from islands.model.signal_statement import describe_values
 from islands.simulation.coupled_model import CoupledModel

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 from islands.errors import ModelError
+from islands.expressions.primitives import SIGN
+from islands.expressions.tree import Expression, Primitive
 from islands.io.export.infix import infix as exported_infix
-from islands.model.expression import Expression, Primitive
-from islands.model.primitives import SIGN
 
 
 def infix(expression: Expression, signal: Callable[[int, int], str]) -> str:

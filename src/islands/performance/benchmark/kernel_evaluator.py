@@ -16,6 +16,7 @@ from islands.errors import ModelError
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.gp.gene_index import GeneIndex
+from islands.expressions.tree import Lagged
 from islands.kernels.err_selection import OUTPUT
 from islands.kernels.gram import gram
 from islands.kernels.interpreter import Program
@@ -23,7 +24,6 @@ from islands.kernels.pair_table import clear, pair_table
 from islands.kernels.population import PopulationContext, SelectedTerms, empty_results, empty_terms, evaluate
 from islands.kernels.regressor_columns import Rows
 from islands.kernels.simulate import COMPLETE, Layout, simulate
-from islands.model.expression import Lagged
 from islands.performance.benchmark.clock import milliseconds
 from islands.performance.benchmark.workload import INTERVAL, WARM_UP, WorkloadModel
 from islands.program.regressor_matrix import select_rows

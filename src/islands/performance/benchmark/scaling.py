@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from islands.data.dataset import Dataset
+from islands.expressions.tree import walk
 from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, finish, house_style, save
-from islands.model.expression import walk
 from islands.performance.benchmark import kernel_evaluator
 from islands.performance.benchmark.full_runs import Run
 from islands.performance.benchmark.workload import WorkloadModel, full_tree, monomial, random_workload

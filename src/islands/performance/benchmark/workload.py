@@ -17,9 +17,9 @@ from islands.evolution.gp.individual import Individual, Population
 from islands.evolution.island import first_generation, step
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
-from islands.model.expression import Apply, Constant, Expression, Lagged
+from islands.expressions.primitives import MUL, SIGN, SUB
+from islands.expressions.tree import Apply, Constant, Expression, Lagged
 from islands.model.model import canonical_order
-from islands.model.primitives import MUL, SIGN, SUB
 from islands.model.regressor import Regressor, regressor
 from islands.systems.catalogue import make_record
 

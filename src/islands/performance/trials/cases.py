@@ -11,10 +11,10 @@ from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import refine
+from islands.expressions.primitives import MUL, PRIMITIVES
+from islands.expressions.tree import Apply, Expression, Lagged
 from islands.io.simulator_spec.factory import make_simulator
-from islands.model.expression import Apply, Expression, Lagged
 from islands.model.model import Model
-from islands.model.primitives import MUL, PRIMITIVES
 from islands.model.regressor import Regressor, regressor
 from islands.performance.trials.injection.measurement import VISIBLE_FRACTION, FaultyRecord
 from islands.performance.trials.injection.oscillator import OSCILLATOR

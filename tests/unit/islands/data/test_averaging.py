@@ -10,8 +10,8 @@ from islands.data.dataset import Dataset
 from islands.data.signal_map import match_rate
 from islands.data.split import Split, average_split
 from islands.errors import RecordError, SettingsError
+from islands.expressions.parsing import parse
 from islands.model.model import make_model
-from islands.model.parsing import parse
 
 
 def ramp(samples=11, **changes):

@@ -6,8 +6,8 @@ import pytest
 from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
+from islands.expressions.parsing import parse
 from islands.model.model import make_model
-from islands.model.parsing import parse
 
 
 def record(*names: str, output: str = "y_um", dt: float = 0.1, **changes: object) -> Dataset:

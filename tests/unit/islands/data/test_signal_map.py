@@ -11,12 +11,12 @@ from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_inputs
 from islands.data.preprocessing import preprocess
 from islands.data.signal_map import map_signals, match_rate
+from islands.expressions.parsing import parse
 from islands.facade.results.model_simulation import predict, simulate
 from islands.io.export import export
 from islands.io.models import model_from_json, model_json
 from islands.model.model import make_model, measured_model
 from islands.model.operating_point import static_characteristic
-from islands.model.parsing import parse
 from islands.model.signal_statement import describe_values
 from islands.simulation.predictors import free_run
 from islands.simulation.step_response import step_response

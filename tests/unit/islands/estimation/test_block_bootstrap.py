@@ -7,7 +7,7 @@ from islands.data.dataset import Dataset
 from islands.estimation.block_bootstrap import draw_parameters
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import refine
-from islands.model.parsing import parse
+from islands.expressions.parsing import parse
 from islands.model.regressor import regressor
 
 

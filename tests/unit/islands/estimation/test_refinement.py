@@ -11,8 +11,8 @@ from islands.estimation.damped_least_squares import normal_equations
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import RefinedModel, refine
 from islands.estimation.shooting_residual import ShootingResidual
+from islands.expressions.parsing import parse
 from islands.model.model import make_model
-from islands.model.parsing import parse
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.physics import cluster_sums

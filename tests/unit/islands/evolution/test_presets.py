@@ -6,9 +6,9 @@ import pytest
 
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
-from islands.model.expression import Apply, height
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Apply, height
 
 #: Sections 6.1 and 6.2 and Appendix A, as printed (the fitness function's sentence is shortened).
 CASE_1 = (

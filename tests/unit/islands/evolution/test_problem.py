@@ -13,11 +13,11 @@ from islands.evolution.gp.individual import make_regressor
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
 from islands.evolution.problem import Problem, make_problem
 from islands.evolution.settings import Settings
+from islands.expressions.parsing import parse
+from islands.expressions.printing import plain
+from islands.expressions.tree import Apply, height, walk
 from islands.model.candidate_library import candidates
-from islands.model.expression import Apply, height, walk
 from islands.model.model import canonical_order
-from islands.model.parsing import parse
-from islands.model.rendering import plain
 from support.searches import distinct_genes
 
 SETTINGS = Settings(library="phi-polynomial", library_degree=3, library_lags=3)

@@ -12,10 +12,10 @@ from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.estimate import estimate
 from islands.estimation.estimators import estimate_with
 from islands.estimation.refinement import refine
+from islands.expressions.parsing import parse
+from islands.expressions.printing import plain
 from islands.model.model import canonical_order
-from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.rendering import plain
 from islands.simulation.predictors import free_run
 from support.identifications import BUDGET, identify, record
 

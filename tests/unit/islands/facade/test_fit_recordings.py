@@ -6,8 +6,8 @@ import pytest
 import islands
 from islands.data.dataset import Dataset, join
 from islands.errors import RecordError
+from islands.expressions.printing import plain
 from islands.io.result_text.summary_text import summary
-from islands.model.rendering import plain
 
 TANK = {"y(k-1)": 0.6, "u(k-1)": 0.5, "u(k-1)^2": -0.2}
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.expressions.parsing import parse
 from islands.figures.hold import draw_holds
 from islands.figures.style import save
 from islands.model.model import Model, make_model
-from islands.model.parsing import parse
 from islands.validation.physics import LEVELS, check_physics
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ import pytest
 
 from islands.data.split import Split
 from islands.evolution.search_result import RankedModel
+from islands.expressions.parsing import parse
 from islands.figures.registry import FIGURES
 from islands.model.model import make_model
-from islands.model.parsing import parse
 from islands.validation.assessment import assess
 from support.searches import record
 

@@ -11,6 +11,7 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
+from islands.expressions.parsing import parse
 from islands.figures.discrepancy import DISCREPANCY_FIGURES
 from islands.figures.free_run import draw_free_run
 from islands.figures.hold import draw_holds
@@ -18,7 +19,6 @@ from islands.figures.hysteresis_loop import draw_loop
 from islands.figures.residuals import draw_residual_correlations
 from islands.figures.style import save
 from islands.model.model import Model, make_model
-from islands.model.parsing import parse
 from islands.validation.residual_tests import residual_tests
 
 pytestmark = pytest.mark.ci

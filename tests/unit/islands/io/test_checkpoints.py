@@ -15,6 +15,10 @@ from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.gp.individual import Individual, make_regressor
 from islands.evolution.hall_of_fame import HallOfFame, merge, with_entries
 from islands.evolution.island import Island
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Apply, Constant
+from islands.expressions.user_primitive import primitive
 from islands.io.checkpoints import (
     HALL_SCHEMA,
     SCHEMA,
@@ -26,11 +30,7 @@ from islands.io.checkpoints import (
     write_checkpoint,
     write_hall,
 )
-from islands.model.expression import Apply, Constant
 from islands.model.model import canonical_order
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
-from islands.model.user_primitive import primitive
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 
 #: Floats that only an exact round trip preserves.

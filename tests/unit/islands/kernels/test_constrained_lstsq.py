@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Lagged
 from islands.kernels import parameter_reduction
 from islands.kernels.constrained_lstsq import (
     ILL_CONDITIONED,
@@ -23,8 +25,6 @@ from islands.kernels.constrained_lstsq import (
     from_gram,
 )
 from islands.kernels.parameter_reduction import expand
-from islands.model.expression import Lagged
-from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.program.regressor_matrix import arrange_rows, gram_matrix, regressor_matrix, select_rows
 from islands.program.term_pool import link

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Lagged
 from islands.kernels.gram import gram, inner_products
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK, dot
-from islands.model.expression import Lagged
-from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.program.regressor_matrix import arrange_rows
 from islands.program.term_pool import link

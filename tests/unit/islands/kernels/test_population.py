@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.structure_selection.froe import froe
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Lagged
 from islands.kernels.err_selection import OUTPUT
 from islands.kernels.pair_table import FREE, Pairs
 from islands.kernels.population import (
@@ -29,9 +31,7 @@ from islands.kernels.population import (
     evaluate,
 )
 from islands.model.clusters import OUTPUT_AT_REST, clusters, steady_state
-from islands.model.expression import Lagged
 from islands.model.model import Model
-from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from islands.program.term_pool import TermPool

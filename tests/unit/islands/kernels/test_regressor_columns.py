@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Constant, Lagged, value
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK
-from islands.model.expression import Constant, Lagged, value
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
 from islands.program.regressor_matrix import arrange_rows
 from islands.program.term_pool import link

@@ -29,9 +29,9 @@ from islands.kernels.population import (
     Groups, PopulationContext, SelectedTerms, empty_results, empty_terms, evaluate,
 )
 from islands.kernels.err_selection import OUTPUT
-from islands.model.expression import Lagged
+from islands.expressions.tree import Lagged
 from islands.model.model import Model
-from islands.model.parsing import parse
+from islands.expressions.parsing import parse
 from islands.model.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from islands.kernels.pair_table import pair_table

@@ -6,11 +6,11 @@ from math import comb
 import pytest
 
 from islands.errors import SettingsError
+from islands.expressions.printing import plain
+from islands.expressions.tree import Apply
 from islands.model.candidate_library import LIBRARIES, MAX_CANDIDATES, candidates, full_set, get_library
 from islands.model.clusters import steady_state
-from islands.model.expression import Apply
 from islands.model.model import canonical_order
-from islands.model.rendering import plain
 
 
 def texts(name, degree, lags, inputs=1):

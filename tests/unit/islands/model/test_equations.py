@@ -6,6 +6,9 @@ from xml.etree import ElementTree
 import pytest
 from hypothesis import given
 
+from islands.expressions.parsing import parse
+from islands.expressions.printing import mathml
+from islands.expressions.tree import Apply, Lagged, Primitive
 from islands.model.equations import (
     equation,
     latex_equation,
@@ -15,10 +18,7 @@ from islands.model.equations import (
     named_term,
     signal_names,
 )
-from islands.model.expression import Apply, Lagged, Primitive
 from islands.model.model import make_model
-from islands.model.parsing import parse
-from islands.model.rendering import mathml
 from support.strategies import models, regressors
 
 U = Lagged(1, 1)

@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given
 
 from islands.errors import ModelError
-from islands.model.expression import Constant
+from islands.expressions.parsing import parse
+from islands.expressions.printing import plain
+from islands.expressions.tree import Constant
 from islands.model.model import Model, canonical_order, make_model
-from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.rendering import plain
 from support.strategies import models
 
 

@@ -3,13 +3,13 @@
 import pytest
 
 from islands.errors import ModelError
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import MUL, PRIMITIVES
+from islands.expressions.printing import plain
+from islands.expressions.tree import Apply, Constant, Lagged
+from islands.expressions.user_primitive import primitive
 from islands.model.clusters import steady_state
-from islands.model.expression import Apply, Constant, Lagged
-from islands.model.parsing import parse
-from islands.model.primitives import MUL, PRIMITIVES
 from islands.model.regressor import canonical, regressor
-from islands.model.rendering import plain
-from islands.model.user_primitive import primitive
 
 
 def canonical_text(text):

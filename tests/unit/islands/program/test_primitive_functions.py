@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from islands.errors import ModelError
-from islands.model.primitives import PRIMITIVES
-from islands.model.user_primitive import primitive
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.user_primitive import primitive
 from islands.program.primitive_functions import row_address
 
 ROW = ctypes.POINTER(ctypes.c_double)

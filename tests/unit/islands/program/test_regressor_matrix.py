@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Constant, Lagged
+from islands.expressions.user_primitive import primitive
 from islands.kernels.summation import CHUNK, dot
-from islands.model.expression import Constant, Lagged
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
-from islands.model.user_primitive import primitive
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from support.oracles import side_by_side
 from support.strategies import INPUTS, nearly, records, regressors, settled_value

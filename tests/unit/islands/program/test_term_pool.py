@@ -7,6 +7,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Constant, Lagged, value
+from islands.expressions.user_primitive import primitive
 from islands.kernels import codegen
 from islands.kernels.codegen import CONSTANT, LAGGED
 from islands.kernels.interpreter import (
@@ -14,11 +18,7 @@ from islands.kernels.interpreter import (
     MAX_FACTORS,
     SIGN,
 )
-from islands.model.expression import Constant, Lagged, value
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
-from islands.model.user_primitive import primitive
 from islands.program.primitive_functions import row_address
 from islands.program.term_pool import TermPool, link
 from support.oracles import NUMBERS

@@ -7,6 +7,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Lagged, value
 from islands.kernels.interpreter import (
     ADD,
     CALL,
@@ -18,9 +21,6 @@ from islands.kernels.interpreter import (
     SUBTRACT,
     TEMPORARY,
 )
-from islands.model.expression import Lagged, value
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
 from islands.program.primitive_functions import row_address
 from islands.program.term_pool import link

@@ -9,9 +9,9 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
-from islands.model.expression import value
+from islands.expressions.parsing import parse
+from islands.expressions.tree import value
 from islands.model.model import make_model
-from islands.model.parsing import parse
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, Status
 from islands.simulation.predictors import BOUND, divergence_bound, free_run, multiple_shooting, one_step_ahead

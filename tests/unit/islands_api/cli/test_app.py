@@ -13,11 +13,11 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.errors import IslandsError, SettingsError
+from islands.expressions.parsing import parse
 from islands.io.models import read_model, write_model
 from islands.io.records import write_record
 from islands.io.records.row_range import parse_rows
 from islands.model.model import make_model
-from islands.model.parsing import parse
 from islands_api.cli import options
 from islands_api.cli.output_folder import check_folder
 from support.command_line import succeed

@@ -9,8 +9,8 @@ from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.epoch import IslandEpoch
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.gp.individual import Individual, make_regressor
-from islands.model.expression import Apply, Lagged
-from islands.model.primitives import PRIMITIVES
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Apply, Lagged
 from islands_service.runtime import packed_epoch
 from islands_service.runtime.packed_epoch import PackedIslands, pack_epoch, unpack_emigrants, unpack_island
 from support.own_primitive import DEAD_ZONE

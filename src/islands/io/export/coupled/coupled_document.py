@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from islands.errors import ModelError
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Primitive
 from islands.io.export.coupled.coupled_equations import coupled_equation, coupled_latex
 from islands.io.models import model_from_json, model_json, write_model_text
-from islands.model.expression import Primitive
-from islands.model.primitives import PRIMITIVES
 from islands.simulation.coupled_model import CoupledModel
 
 COUPLED_SCHEMA = "islands.coupled-model/1"

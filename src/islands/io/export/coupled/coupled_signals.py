@@ -4,9 +4,9 @@ import re
 import textwrap
 from collections.abc import Callable, Sequence
 
+from islands.expressions.tree import Primitive
 from islands.io.export.parts import functions, quote_name, signals, terms
 from islands.model.equations import equation
-from islands.model.expression import Primitive
 from islands.model.signal_statement import describe_values, join_statements
 from islands.simulation.coupled_model import CoupledModel
 

@@ -11,11 +11,11 @@ from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects.model_form import CORE_SHAPE, SLOPE
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.narx import NarxSimulator
+from islands.expressions.parsing import parse
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import simulate_spec
 from islands.model.model import Model, make_model
-from islands.model.parsing import parse
 from islands.performance.trials.cases import CASES
 from islands.performance.trials.injection.measurement import FaultyRecord, inject
 

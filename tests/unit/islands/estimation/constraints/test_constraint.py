@@ -5,10 +5,10 @@ import pytest
 
 from islands.errors import SettingsError
 from islands.estimation.parameter_constraints import constraint, count_free_parameters
+from islands.expressions.parsing import parse
+from islands.expressions.printing import plain
 from islands.model.model import canonical_order
-from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.rendering import plain
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 

@@ -13,7 +13,7 @@ from islands.estimation.constraints.parts import (
     StaticGain,
 )
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
-from islands.model.parsing import parse
+from islands.expressions.parsing import parse
 from islands.model.regressor import regressor
 
 

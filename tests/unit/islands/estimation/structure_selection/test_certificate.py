@@ -16,10 +16,10 @@ from islands.data.dataset import Dataset
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import make_selection_problem, select_forward
 from islands.estimation.structure_selection.certificate import certify, combine_certificates
+from islands.expressions.tree import Lagged
 from islands.io.result_folder import result_document
 from islands.io.result_text.summary_text import method_text
 from islands.model.candidate_library import candidates
-from islands.model.expression import Lagged
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.predictors import multiple_shooting
 

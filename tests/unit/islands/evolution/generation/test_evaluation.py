@@ -12,8 +12,8 @@ from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.gp.individual import Individual, make_regressor
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
-from islands.model.expression import height
-from islands.model.parsing import parse
+from islands.expressions.parsing import parse
+from islands.expressions.tree import height
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import Status
 from islands.simulation.predictors import multiple_shooting

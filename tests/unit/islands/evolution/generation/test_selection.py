@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from islands.evolution.generation.selection import run_tournaments
 from islands.evolution.gp.individual import Individual
 from islands.evolution.gp.rng import Purpose, Stream
-from islands.model.expression import Lagged
+from islands.expressions.tree import Lagged
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 ABANDONED = EvaluationOutcome(Status.ABANDONED, "above the threshold")

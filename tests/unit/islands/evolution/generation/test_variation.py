@@ -16,9 +16,9 @@ from islands.evolution.generation.variation import (
 )
 from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.settings import Settings
-from islands.model.expression import Lagged, height, walk
-from islands.model.parsing import parse
-from islands.model.rendering import plain
+from islands.expressions.parsing import parse
+from islands.expressions.printing import plain
+from islands.expressions.tree import Lagged, height, walk
 
 SETTINGS = Settings(constraints="none", structure="free", max_terms=6, initial_terms=(1, 6))
 SEEDS = range(300)

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 import islands
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.user_primitive import primitive
 from islands.io.export import export
 from islands.io.export.parts import functions
-from islands.model.primitives import PRIMITIVES
-from islands.model.user_primitive import primitive
 from islands.performance.benchmark.compiled_c import compile_model
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED

@@ -6,9 +6,9 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import islands
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.user_primitive import primitive
 from islands.io.export import export
-from islands.model.primitives import PRIMITIVES
-from islands.model.user_primitive import primitive
 from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
 from support.exported_programs import needs_octave, octave, run_matlab

@@ -8,11 +8,11 @@ import pytest
 
 import islands
 from islands.errors import ModelError
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import value
+from islands.expressions.user_primitive import primitive
 from islands.io.export import export
 from islands.io.export.coupled import export_coupled
-from islands.model.expression import value
-from islands.model.primitives import PRIMITIVES
-from islands.model.user_primitive import primitive
 from support.block_cases import OF_STATES
 from support.coupled_systems import PREY, TWO_MASSES
 from support.programs import CASES, model

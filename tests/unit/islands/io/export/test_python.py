@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 import islands
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, SettingsError
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.user_primitive import primitive
 from islands.io.export import export
 from islands.io.models import model_json
 from islands.model.equations import mathml_equation
-from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor
-from islands.model.user_primitive import primitive
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
 from support.programs import CASES, HOSTILE_NAMES, SAMPLES, bits, model, record, record_of

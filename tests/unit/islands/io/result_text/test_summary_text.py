@@ -7,12 +7,12 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
+from islands.expressions.parsing import parse
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.model_table import table
 from islands.io.result_text.summary_text import method_text, summary
 from islands.model.equations import named_equation, named_term
 from islands.model.model import make_model
-from islands.model.parsing import parse
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics

@@ -12,12 +12,12 @@ from islands.data.preprocessing import preprocess
 from islands.discrepancy.calibration.preparation import make_context
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.errors import RecordError
+from islands.expressions.parsing import parse
 from islands.io.models import model_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import ModelSpec
 from islands.model.model import make_model
-from islands.model.parsing import parse
 from islands.simulation.predictors import free_run
 
 DT = 0.01

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.errors import ModelError
-from islands.model.expression import Apply, Constant, Lagged, value
-from islands.model.parsing import parse
-from islands.model.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
+from islands.expressions.tree import Apply, Constant, Lagged, value
 from islands.model.regressor import regressor
 from islands.performance.benchmark.expression_source import infix
 from support.strategies import signals

@@ -8,9 +8,9 @@ import pytest
 from islands.errors import ModelError
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.gp.individual import Individual
-from islands.model.expression import Apply, Lagged, height
+from islands.expressions.parsing import parse
+from islands.expressions.tree import Apply, Lagged, height
 from islands.model.model import Model
-from islands.model.parsing import parse
 from islands.performance.benchmark import workload as module
 from islands.performance.benchmark.workload import (
     INTERVAL,

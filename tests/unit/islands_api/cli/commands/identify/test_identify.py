@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.expressions.parsing import parse
 from islands.io.checkpoints import read_checkpoint, write_hall
 from islands.io.records import write_record
 from islands.model.model import make_model
-from islands.model.parsing import parse
 from islands.simulation.predictors import free_run
 from islands_api.cli.runs import identify_run as command
 from support.identify_runs import COLUMNS, DEEPEST, SMALL, STEPWISE, TWO, models, record, refused

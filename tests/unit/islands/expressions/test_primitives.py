@@ -7,13 +7,13 @@ from dataclasses import replace
 import pytest
 
 from islands.errors import ModelError
-from islands.model.expression import Lagged, Primitive
-from islands.model.parsing import parse
-from islands.model.primitive_checks import check
-from islands.model.primitives import LARGEST_EXPONENT, PRIMITIVES
+from islands.expressions.parsing import parse
+from islands.expressions.primitive_checks import check
+from islands.expressions.primitives import LARGEST_EXPONENT, PRIMITIVES
+from islands.expressions.printing import latex, plain
+from islands.expressions.tree import Lagged, Primitive
+from islands.expressions.user_primitive import primitive
 from islands.model.regressor import canonical
-from islands.model.rendering import latex, plain
-from islands.model.user_primitive import primitive
 
 
 @pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))

@@ -5,10 +5,10 @@ import math
 import pytest
 
 import islands
-from islands.model.derivatives import differentiate
-from islands.model.expression import Apply, Lagged
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES
+from islands.expressions.derivatives import differentiate
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Apply, Lagged
 
 U, Y = 0.7, -1.3
 

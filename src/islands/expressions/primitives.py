@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from islands.model.expression import Apply, Constant, Expression, Primitive
+from islands.expressions.tree import Apply, Constant, Expression, Primitive
 
 #: Arguments of exp are clipped here, so that the bound of a free run detects divergence before an overflow.
 LARGEST_EXPONENT = 50.0

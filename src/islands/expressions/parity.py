@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
-from islands.model.primitives import ADD, MUL, SUB
+from islands.expressions.primitives import ADD, MUL, SUB
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Shift
 
 
 def parity(expression: Expression, is_reversed: Callable[[int], bool]) -> int:

@@ -7,9 +7,9 @@ import textwrap
 from collections.abc import Callable, Iterable, Mapping
 
 from islands.errors import ModelError, SettingsError, lookup
-from islands.model.expression import Primitive
-from islands.model.primitive_checks import check
-from islands.model.primitives import PRIMITIVES
+from islands.expressions.primitive_checks import check
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Primitive
 
 #: Names of signals, time and back-shifts in text.
 _SIGNALS = re.compile(r"y|u\d*|k|q\d+")

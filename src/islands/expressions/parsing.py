@@ -9,9 +9,9 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from islands.errors import ModelError, suggest
-from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, Shift
-from islands.model.primitives import ADD, MUL, PRIMITIVES
-from islands.model.rendering import LARGEST_POWER
+from islands.expressions.primitives import ADD, MUL, PRIMITIVES
+from islands.expressions.printing import LARGEST_POWER
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift
 
 _SIGNAL = re.compile(r"y|u([1-9][0-9]*)?")
 _BACK_SHIFT = re.compile(r"q([0-9]+)")

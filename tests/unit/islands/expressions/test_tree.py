@@ -3,7 +3,9 @@
 import pytest
 
 from islands.errors import ModelError
-from islands.model.expression import (
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SUB
+from islands.expressions.tree import (
     Apply,
     Constant,
     Lagged,
@@ -16,8 +18,6 @@ from islands.model.expression import (
     value,
     walk,
 )
-from islands.model.parsing import parse
-from islands.model.primitives import ADD, MUL, PRIMITIVES, SUB
 from islands.model.regressor import regressor
 
 # Model (13) of the paper, section 7, as genes: q1 .. q5, products of two, phi1 and phi2.

@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, Shift
-from islands.model.primitives import LARGEST_EXPONENT
+from islands.expressions.primitives import LARGEST_EXPONENT
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift
 
 _Partials = tuple[float, ...]
 

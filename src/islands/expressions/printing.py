@@ -2,15 +2,15 @@
 
 Plain text has the form ``u(k-1)*sign(u(k-1) - u(k-2))``: infix operators ``+ - * / ^``, primitives by name,
 leaves ``y(k-1)``, ``u(k-1)`` (``u1(k-1)``, ``u2(k-1)`` .. if there are several inputs) and back-shifts
-``q2(...)``. `islands.model.parsing` parses it.
+``q2(...)``. `islands.expressions.parsing` parses it.
 """
 
 from collections.abc import Iterator, Sequence
 from html import escape
 from itertools import groupby
 
-from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, Shift
-from islands.model.primitives import ADD, MUL, SUB
+from islands.expressions.primitives import ADD, MUL, SUB
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift
 
 #: Largest exponent in text. A larger power is written as a product of powers. The limit prevents untrusted
 #: text from creating millions of factors.

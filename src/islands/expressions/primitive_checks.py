@@ -3,7 +3,7 @@
 import math
 
 from islands.errors import ModelError
-from islands.model.expression import Primitive
+from islands.expressions.tree import Primitive
 
 #: Arguments at which a new primitive is checked.
 _PROBES = (0.0, 1.0, -1.0, 0.3, -0.7, 2.5, -41.0, 1e3, -1e3, 1e-12, 1e6)

@@ -3,10 +3,10 @@
 import pytest
 
 from islands.errors import ModelError
-from islands.model.expression import Apply, Constant, Lagged, Shift
-from islands.model.parsing import parse
-from islands.model.primitives import ADD, MUL, PRIMITIVES, SUB
-from islands.model.rendering import LARGEST_POWER, at_rest, latex, plain
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SUB
+from islands.expressions.printing import LARGEST_POWER, at_rest, latex, plain
+from islands.expressions.tree import Apply, Constant, Lagged, Shift
 
 U = Lagged(1, 1)
 Y = Lagged(0, 1)

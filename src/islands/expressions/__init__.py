@@ -1,0 +1,4 @@
+"""Expressions over signals and named values: tree, functions, parser, printers, derivative.
+
+Read `tree` first, then `primitives`.
+"""
