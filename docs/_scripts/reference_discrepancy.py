@@ -11,9 +11,9 @@ from islands.discrepancy.effects.free_forms import FREE_FORMS
 from islands.discrepancy.inference.noise_detectors import DETECTORS, NoiseDetector
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
+from islands.expressions.parsing import NAMED_FUNCTIONS
+from islands.expressions.primitives import EQUATION_FUNCTIONS
 from islands.io.simulator_spec.specification import SIMULATORS
-from islands.systems.ode.equation_parser import NAMED_FUNCTIONS
-from islands.systems.ode.ode_expression import FUNCTIONS
 
 Entry = Effect | EffectTemplate | NoiseDetector
 
@@ -129,6 +129,6 @@ def simulators() -> str:
 def _functions() -> Iterator[tuple[str, str]]:
     """Return the rows of the functions in equations, without the operators."""
     for name in NAMED_FUNCTIONS:
-        yield code(name), escape(FUNCTIONS[name].summary)
+        yield code(name), escape(EQUATION_FUNCTIONS[name].summary)
     yield code("rate"), "`rate(u)`: slope of the input or of a channel between samples"
     yield code("delay"), "`delay(u, tau)`: input or channel tau seconds ago, interpolated linearly"

@@ -333,7 +333,7 @@ import hashlib
 import numpy as np
 from islands.data.dataset import Dataset
 from islands.estimation.least_squares import factorise, least_squares
-from islands.expressions.tree import Lagged
+from islands.expressions.tree import (Lagged)
 from islands.model.regressor import regressor
 from islands.expressions.parsing import parse
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix

@@ -14,10 +14,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from islands.errors import ModelError
+from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
 from islands.expressions.printing import latex, plain
-from islands.expressions.tree import Apply, Constant, Lagged, Shift, content, lags, remove_shifts, value, walk
+from islands.expressions.tree import Apply, Constant, Lagged, Shift, content, lags, remove_shifts, walk
 from islands.model.regressor import canonical, regressor
 from support.strategies import (
     any_number,
@@ -244,7 +245,7 @@ def test_latex_never_puts_an_exponent_on_an_exponent_or_a_fraction(expression):
 
 DETERMINED = """
 from islands.model.clusters import clusters
-from islands.expressions.tree import Lagged, content, lags
+from islands.expressions.tree import (Lagged, content, lags)
 from islands.model.model import make_model
 from islands.model.equations import equation, latex_equation
 from islands.expressions.parsing import parse
@@ -315,7 +316,7 @@ def test_copies_and_pickles_are_equal_and_found_under_the_same_key(expression):
 
 CARRIED = """
 import pickle, sys
-from islands.expressions.tree import walk
+from islands.expressions.tree import (walk)
 from islands.expressions.parsing import parse
 from islands.model.regressor import regressor
 trees = [parse(text) for text in sys.argv[1:]]

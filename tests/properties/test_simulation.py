@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset, join
 from islands.errors import RecordError
+from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
-from islands.expressions.tree import value
 from islands.kernels.summation import total
 from islands.model.model import make_model
 from islands.simulation.layout import WIDTHS, layout

@@ -4,8 +4,8 @@ import numpy as np
 
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
+from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
-from islands.expressions.tree import value
 from islands.model.model import make_model
 from islands.simulation.coupled_model import CoupledModel
 

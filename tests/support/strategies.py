@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
 from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE
+from islands.expressions.evaluation import value
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES
-from islands.expressions.tree import Apply, Constant, Lagged, Shift, value
+from islands.expressions.tree import Apply, Constant, Lagged, Shift
 from islands.model.model import make_model
 from islands.model.regressor import regressor
 

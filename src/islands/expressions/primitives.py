@@ -1,12 +1,17 @@
-"""Table of primitives: the functions that can be evolved, compiled, written and parsed.
+"""Tables of primitives: functions that can be evolved and compiled, and functions of equations.
 
 The paper uses multiplication, subtraction and sign (its phi1 and phi2) and the back-shifts q1 .. q5. Users
-define further primitives from scalar functions with `primitive`.
+define further primitives from scalar functions with `primitive`. Those of equations follow the mathematical
+definition: a search needs ``sqrt(-4)`` to be finite, in an equation it is a mistake.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from islands.expressions.tree import Apply, Constant, Expression, Primitive
 
@@ -245,3 +250,64 @@ _BUILT_IN = (
 )
 
 PRIMITIVES: Mapping[str, Primitive] = MappingProxyType({entry.name: entry for entry in _BUILT_IN})
+
+
+def _less(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    return np.less(a, b) * 1.0
+
+
+def _less_equal(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    return np.less_equal(a, b) * 1.0
+
+
+def _minimum(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    return np.where(np.less(a, b), a, b)
+
+
+def _maximum(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    return np.where(np.greater(a, b), a, b)
+
+
+def _choose(condition: ArrayLike, a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    return np.where(np.greater(condition, 0.0), a, b)
+
+
+def _equation_function(name: str, arity: int, scalar: Callable[..., Any], summary: str = "") -> Primitive:
+    return Primitive(name, arity, scalar, summary=summary, is_protected=False)
+
+
+DIV = _equation_function("div", 2, np.divide, "`a/b`")
+POW = _equation_function("pow", 2, np.power, "`a**b`; NaN if a is negative and b is not an integer")
+NEG = _equation_function("neg", 1, np.negative, "`-a`")
+LESS = _equation_function("less", 2, _less, "`a < b`: 1 if true, else 0")
+LESS_EQUAL = _equation_function("less_equal", 2, _less_equal, "`a <= b`: 1 if true, else 0")
+
+#: Functions of equations by name. The operators are the first ones.
+EQUATION_FUNCTIONS: Mapping[str, Primitive] = MappingProxyType(
+    {
+        entry.name: entry
+        for entry in (
+            ADD,
+            SUB,
+            MUL,
+            DIV,
+            POW,
+            NEG,
+            LESS,
+            LESS_EQUAL,
+            _equation_function("abs", 1, np.abs, "absolute value"),
+            _equation_function("sqrt", 1, np.sqrt, "square root; NaN if a is negative"),
+            _equation_function("exp", 1, np.exp, "exponential"),
+            _equation_function("log", 1, np.log, "natural logarithm; NaN if a is negative"),
+            _equation_function("sin", 1, np.sin, "sine"),
+            _equation_function("cos", 1, np.cos, "cosine"),
+            _equation_function("tan", 1, np.tan, "tangent"),
+            _equation_function("tanh", 1, np.tanh, "hyperbolic tangent"),
+            _equation_function("atan", 1, np.arctan, "arc tangent"),
+            _equation_function("sign", 1, np.sign, "-1, 0 or 1"),
+            _equation_function("min", 2, _minimum, "the smaller of two or more values"),
+            _equation_function("max", 2, _maximum, "the larger of two or more values"),
+            _equation_function("where", 3, _choose, "`where(x > y, a, b)`: a if the condition holds, else b"),
+        )
+    }
+)

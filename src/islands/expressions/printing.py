@@ -1,73 +1,234 @@
-"""Rendering of expressions as plain text, LaTeX and MathML.
+"""Printers of expressions: plain text of models and of equations, LaTeX, MathML, and programs.
 
-Plain text has the form ``u(k-1)*sign(u(k-1) - u(k-2))``: infix operators ``+ - * / ^``, primitives by name,
-leaves ``y(k-1)``, ``u(k-1)`` (``u1(k-1)``, ``u2(k-1)`` .. if there are several inputs) and back-shifts
-``q2(...)``. `islands.expressions.parsing` parses it.
+Plain text of a model has the form ``u(k-1)*sign(u(k-1) - u(k-2))``: infix operators ``+ - * / ^``,
+primitives by name, leaves ``y(k-1)``, ``u(k-1)`` (``u1(k-1)``, ``u2(k-1)`` .. if there are several inputs)
+and back-shifts ``q2(...)``. That of an equation has the form ``(F - c*v)/m - x**2``.
+`islands.expressions.parsing` parses both. A printer is a table of operators, and writes leaves and calls.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from html import escape
 from itertools import groupby
+from math import copysign
+from typing import ClassVar, NamedTuple
 
-from islands.expressions.primitives import ADD, MUL, SUB
-from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift
+from islands.errors import ModelError
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift, Symbol
 
 #: Largest exponent in text. A larger power is written as a product of powers. The limit prevents untrusted
 #: text from creating millions of factors.
 LARGEST_POWER = 99
 
-# Precedence of the rendered text: a sum needs brackets inside a product, a product inside a power.
-
-#: Precedence of a sum or a negative number.
-_SUM = 0
-
-#: Precedence of a product.
-_PRODUCT = 1
-
-#: Precedence of a leaf, a call or a bracketed expression.
-_ATOM = 2
+#: Precedences of text. An operand with a lower precedence than its operator requires is in brackets. In a
+#: model, a quotient is less than a product, because ``a*b/c`` is parsed as ``(a*b)/c``.
+COMPARISON, SUM, QUOTIENT, PRODUCT, SIGN, POWER, ATOM = range(7)
 
 
-def plain(expression: Expression, inputs: int = 1) -> str:
-    """Write an expression as plain text that `parse` converts back to the same expression."""
-    return _plain(expression, inputs)[0]
+class Operator(NamedTuple):
+    """Infix form of a function.
+
+    Attributes
+    ----------
+    text : str
+    own : int
+        Precedence of the result.
+    first, others : int
+        Least precedence of the first operand and of the others without brackets.
+    """
+
+    text: str
+    own: int
+    first: int
+    others: int
 
 
-def _plain(expression: Expression, inputs: int) -> tuple[str, int]:
-    match expression:
-        case Lagged(channel, lag):
-            return f"{_name(channel, inputs)}(k-{lag})" if lag else f"{_name(channel, inputs)}(k)", _ATOM
-        case Constant(number):
-            return _digits(number), _number_precedence(number)
-        case Shift(samples, argument):
-            return f"q{samples}({plain(argument, inputs)})", _ATOM
-        case Apply(primitive, (_, _, *_) as arguments) if primitive in (ADD, SUB):
-            # A sum inside a sum is written as a call, because infix would be parsed as one flat sum.
-            parts = [_operand(argument, inputs, _PRODUCT, (ADD, SUB)) for argument in arguments]
-            return (" + " if primitive == ADD else " - ").join(parts), _SUM
-        case Apply(primitive, (_, _, *_) as arguments) if primitive == MUL:
-            return _plain_product(arguments, inputs), _PRODUCT
-        case Apply(primitive, (first, second)) if primitive.name == "div":
-            return f"{_operand(first, inputs, _ATOM)}/{_operand(second, inputs, _ATOM)}", _PRODUCT
-        case Apply(primitive, arguments):
-            return _call(primitive, arguments, inputs), _ATOM
+#: Operators of an equation. A sign binds less than a power on its left, and more than one on its right.
+EQUATION_OPERATORS: Mapping[str, Operator] = {
+    "less": Operator(" < ", COMPARISON, SUM, SUM),
+    "less_equal": Operator(" <= ", COMPARISON, SUM, SUM),
+    "add": Operator(" + ", SUM, SUM, PRODUCT),
+    "sub": Operator(" - ", SUM, SUM, PRODUCT),
+    "mul": Operator("*", PRODUCT, PRODUCT, SIGN),
+    "div": Operator("/", PRODUCT, PRODUCT, SIGN),
+    "pow": Operator("**", POWER, ATOM, SIGN),
+}
+
+#: Operators of a model in a program. All languages evaluate equal operators from left to right, as `value`
+#: does. Each operation is in brackets: they keep that order when a parameter multiplies the result, and the
+#: kernels multiply by it last.
+BRACKETED_OPERATORS: Mapping[str, Operator] = {
+    "mul": Operator("*", SUM, ATOM, ATOM),
+    "add": Operator(" + ", SUM, ATOM, ATOM),
+    "sub": Operator(" - ", SUM, ATOM, ATOM),
+}
 
 
-def _plain_product(factors: Sequence[Expression], inputs: int) -> str:
-    parts = []
-    for factor, power in _powers(factors):
-        if power == 1:
-            parts.append(plain_factor(factor, inputs, (MUL,)))
-        else:
-            parts.append(f"{_operand(factor, inputs, _ATOM, (MUL,))}^{power}")
-    return "*".join(parts)
+class Printer:
+    """Printer of the text of an equation, and base of the others."""
+
+    #: Functions that are written between their operands.
+    operators: Mapping[str, Operator] = EQUATION_OPERATORS
+
+    #: Precedence of a negative number, also of minus zero: ``-0**2`` would be parsed as ``-(0**2)``.
+    negative: ClassVar[int] = SIGN
+
+    #: Format string of brackets.
+    brackets: ClassVar[str] = "({})"
+
+    def write(self, expression: Expression) -> str:
+        """Write an expression."""
+        return self._write(expression)[0]
+
+    def write_operand(self, expression: Expression, least: int) -> str:
+        """Write an expression, in brackets if its precedence is lower than ``least``."""
+        text, precedence = self._write(expression)
+        return text if precedence >= least else self.brackets.format(text)
+
+    def _write(self, expression: Expression) -> tuple[str, int]:
+        match expression:
+            case Lagged(channel, lag):
+                return self.signal(channel, lag), ATOM
+            case Symbol(name):
+                return self.symbol(name), ATOM
+            case Constant(number):
+                return self.number(number), self.negative if copysign(1.0, number) < 0.0 else ATOM
+            case Shift(samples, argument):
+                return self.shift(samples, argument)
+            case Apply(Primitive("neg", is_protected=False), (Constant(number),)):
+                return self._write(Constant(-number))
+            case Apply(Primitive("neg", is_protected=False), (operand,)):
+                return f"-{self.write_operand(operand, SIGN)}", SIGN
+            case Apply(primitive, (_, _, *_) as arguments) if primitive.name in self.operators:
+                operator = self.operators[primitive.name]
+                return self.join(operator, arguments), operator.own
+            case Apply(primitive, arguments):
+                return self.call(primitive, [self.write(argument) for argument in arguments]), ATOM
+
+    def signal(self, channel: int, lag: int) -> str:
+        """Write a lagged signal."""
+        raise ModelError(f"{Lagged(channel, lag)!r} cannot be written in an equation")
+
+    def symbol(self, name: str) -> str:
+        """Write a name."""
+        return name
+
+    def number(self, number: float) -> str:
+        """Write a constant."""
+        return _digits(number)
+
+    def shift(self, samples: int, argument: Expression) -> tuple[str, int]:
+        """Write a back-shift; return its precedence too."""
+        raise ModelError(
+            f"{Shift(samples, argument)!r} is not in canonical form: bring it there with `regressor`"
+        )
+
+    def join(self, operator: Operator, arguments: Sequence[Expression]) -> str:
+        """Write an operator between its operands."""
+        first, *others = arguments
+        parts = [self.write_operand(each, operator.others) for each in others]
+        return operator.text.join([self.write_operand(first, operator.first), *parts])
+
+    def call(self, primitive: Primitive, arguments: Sequence[str]) -> str:
+        """Write a function of arguments that are written."""
+        return f"{primitive.name}({', '.join(arguments)})"
 
 
-def plain_factor(expression: Expression, inputs: int, as_call: tuple[Primitive, ...] = ()) -> str:
-    """Write an expression as a factor of a product, in brackets if necessary."""
-    # A quotient has the precedence of a product, and a*b/c is parsed as (a*b)/c.
-    text = _operand(expression, inputs, _PRODUCT, as_call)
-    return f"({text})" if isinstance(expression, Apply) and expression.primitive.name == "div" else text
+class ProgramPrinter(Printer):
+    """Printer of expressions in a programming language.
+
+    Parameters
+    ----------
+    operators : mapping
+    call : callable
+        ``call(primitive, arguments)`` returns the text of a function of written arguments.
+    signal : callable, optional
+        ``signal(channel, lag)`` returns the text of a sample.
+    symbol : callable
+        Returns the text of a name.
+    """
+
+    def __init__(
+        self,
+        operators: Mapping[str, Operator],
+        call: Callable[[Primitive, Sequence[str]], str],
+        signal: Callable[[int, int], str] | None = None,
+        symbol: Callable[[str], str] = str,
+    ) -> None:
+        self.operators = operators
+        self._call, self._signal, self._symbol = call, signal, symbol
+
+    def signal(self, channel: int, lag: int) -> str:
+        """Write a sample."""
+        return super().signal(channel, lag) if self._signal is None else self._signal(channel, lag)
+
+    def symbol(self, name: str) -> str:
+        """Write a name."""
+        return self._symbol(name)
+
+    def number(self, number: float) -> str:
+        """Write a constant as a number with a decimal point."""
+        return repr(float(number))
+
+    def call(self, primitive: Primitive, arguments: Sequence[str]) -> str:
+        """Write a function of arguments that are written."""
+        return self._call(primitive, arguments)
+
+
+class _ModelPrinter(Printer):
+    """Printer of lagged signals; with one input, its name is u."""
+
+    negative = SUM
+
+    def __init__(self, has_one_input: bool) -> None:
+        self._has_one_input = has_one_input
+
+    def name(self, channel: int) -> str:
+        """Return the name of a channel."""
+        if channel == 0:
+            return "y"
+        return "u" if self._has_one_input and channel == 1 else f"u{channel}"
+
+
+class PlainPrinter(_ModelPrinter):
+    """Printer of a model as plain text."""
+
+    operators: Mapping[str, Operator] = {
+        "add": Operator(" + ", SUM, QUOTIENT, QUOTIENT),
+        "sub": Operator(" - ", SUM, QUOTIENT, QUOTIENT),
+        "mul": Operator("*", PRODUCT, PRODUCT, PRODUCT),
+        "div": Operator("/", QUOTIENT, ATOM, ATOM),
+    }
+
+    def signal(self, channel: int, lag: int) -> str:
+        """Write a lagged signal, ``u2(k-1)``."""
+        return f"{self.name(channel)}(k-{lag})" if lag else f"{self.name(channel)}(k)"
+
+    def shift(self, samples: int, argument: Expression) -> tuple[str, int]:
+        """Write a back-shift, ``q2(...)``."""
+        return f"q{samples}({self.write(argument)})", ATOM
+
+    def join(self, operator: Operator, arguments: Sequence[Expression]) -> str:
+        """Write an operator between its operands; equal factors as a power."""
+        if operator.own != PRODUCT:
+            return operator.text.join(self._write_part(each, operator, 1) for each in arguments)
+        return operator.text.join(
+            self._write_part(factor, operator, power) for factor, power in _powers(arguments)
+        )
+
+    def _write_part(self, operand: Expression, operator: Operator, power: int) -> str:
+        match operand:
+            case Apply(primitive, arguments) if self._is_flat(primitive, operator):
+                text = self.call(primitive, [self.write(each) for each in arguments])
+            case _:
+                text = self.write_operand(operand, operator.others if power == 1 else ATOM)
+        return text if power == 1 else f"{text}^{power}"
+
+    def _is_flat(self, primitive: Primitive, outer: Operator) -> bool:
+        # A sum inside a sum is written as a call, because infix would be parsed as one flat sum. So is a
+        # product inside a product.
+        inner = self.operators.get(primitive.name)
+        return inner is not None and inner.own == outer.own != QUOTIENT
 
 
 def _powers(factors: Sequence[Expression]) -> Iterator[tuple[Expression, int]]:
@@ -78,90 +239,51 @@ def _powers(factors: Sequence[Expression]) -> Iterator[tuple[Expression, int]]:
             left -= min(left, LARGEST_POWER)
 
 
-def _digits(number: float) -> str:
-    return repr(float(number)).removesuffix(".0")
+class LatexPrinter(_ModelPrinter):
+    """Printer of a model as LaTeX without dollar signs."""
 
+    operators: Mapping[str, Operator] = {
+        "add": Operator(" + ", SUM, QUOTIENT, QUOTIENT),
+        "sub": Operator(" - ", SUM, QUOTIENT, QUOTIENT),
+        "mul": Operator(" ", PRODUCT, ATOM, ATOM),
+    }
+    brackets = r"\left({}\right)"
 
-def _number_precedence(number: float) -> int:
-    # Minus zero has a sign as well: -0^2 would be parsed as -(0^2).
-    return _SUM if _digits(number).startswith("-") else _ATOM
+    def signal(self, channel: int, lag: int) -> str:
+        """Write a lagged signal, ``u_{2,k-1}``."""
+        name = self.name(channel)
+        index = f"{name[1:]}," if len(name) > 1 else ""
+        return f"{name[0]}_{{{index}k{f'-{lag}' if lag else ''}}}"
 
+    def number(self, number: float) -> str:
+        r"""Write a constant, ``2 \times 10^{-5}``."""
+        return latex_number(_digits(number))
 
-def _operand(expression: Expression, inputs: int, minimum: int, as_call: tuple[Primitive, ...] = ()) -> str:
-    if isinstance(expression, Apply) and expression.primitive in as_call:
-        return _call(expression.primitive, expression.arguments, inputs)
-    text, precedence = _plain(expression, inputs)
-    return text if precedence >= minimum else f"({text})"
+    def shift(self, samples: int, argument: Expression) -> tuple[str, int]:
+        """Write a back-shift, ``q^{-2} ...``."""
+        return f"q^{{-{samples}}} {self.write_operand(argument, ATOM)}", PRODUCT
 
+    def join(self, operator: Operator, arguments: Sequence[Expression]) -> str:
+        """Write an operator between its operands; equal factors as a power."""
+        if operator.own != PRODUCT:
+            return super().join(operator, arguments)
+        parts: list[str] = []
+        for factor, run in groupby(arguments):
+            power = len(list(run))
+            text = self.write_operand(factor, operator.others)
+            # Brackets separate an exponent from an exponent or a fraction, and a number from a preceding
+            # factor.
+            bare = text[0] != "\\" or text[-1] == "}"
+            if (power > 1 and bare and not isinstance(factor, Lagged)) or (
+                parts and isinstance(factor, Constant)
+            ):
+                text = self.brackets.format(text)
+            parts.append(text if power == 1 else f"{text}^{{{power}}}")
+        return operator.text.join(parts)
 
-def _call(primitive: Primitive, arguments: Sequence[Expression], inputs: int) -> str:
-    return f"{primitive.name}({', '.join(plain(argument, inputs) for argument in arguments)})"
-
-
-def _name(channel: int, inputs: int) -> str:
-    if channel == 0:
-        return "y"
-    return "u" if inputs == 1 and channel == 1 else f"u{channel}"
-
-
-def at_rest(expression: Expression, inputs: int = 1) -> str:
-    """Write a steady state (leaves of lag 0): ``y*u`` for ybar ubar, ``1`` for a constant."""
-    return plain(expression, inputs).replace("(k)", "")
-
-
-def latex(expression: Expression, inputs: int = 1) -> str:
-    """Write an expression in LaTeX without dollar signs."""
-    return _latex(expression, inputs)[0]
-
-
-def _latex(expression: Expression, inputs: int) -> tuple[str, int]:
-    match expression:
-        case Lagged(channel, lag):
-            name = _name(channel, inputs)
-            index = f"{name[1:]}," if len(name) > 1 else ""
-            return f"{name[0]}_{{{index}k{f'-{lag}' if lag else ''}}}", _ATOM
-        case Constant(number):
-            return latex_number(_digits(number)), _number_precedence(number)
-        case Shift(samples, argument):
-            return f"q^{{-{samples}}} {_latex_operand(argument, inputs, _ATOM)}", _PRODUCT
-        case Apply(primitive, arguments) if primitive in (ADD, SUB):
-            parts = [_latex_operand(argument, inputs, _PRODUCT) for argument in arguments]
-            return (" + " if primitive == ADD else " - ").join(parts), _SUM
-        case Apply(primitive, arguments) if primitive == MUL:
-            return " ".join(_latex_powers(arguments, inputs)), _PRODUCT
-        case Apply(primitive, arguments):
-            return primitive.latex.format(*(latex(argument, inputs) for argument in arguments)), _ATOM
-
-
-def _latex_powers(factors: Sequence[Expression], inputs: int) -> list[str]:
-    parts: list[str] = []
-    for factor, run in groupby(factors):
-        power = len(list(run))
-        text = _latex_operand(factor, inputs, _ATOM)
-        # Brackets separate an exponent from an exponent or a fraction, and a number from a preceding factor.
-        bare = text[0] != "\\" or text[-1] == "}"
-        if (power > 1 and bare and not isinstance(factor, Lagged)) or (
-            parts and isinstance(factor, Constant)
-        ):
-            text = rf"\left({text}\right)"
-        parts.append(text if power == 1 else f"{text}^{{{power}}}")
-    return parts
-
-
-def _latex_operand(expression: Expression, inputs: int, minimum: int) -> str:
-    text, precedence = _latex(expression, inputs)
-    return text if precedence >= minimum else rf"\left({text}\right)"
-
-
-def latex_factor(expression: Expression, inputs: int) -> str:
-    """Write an expression in LaTeX as a factor of a product, in brackets if necessary."""
-    return _latex_operand(expression, inputs, _PRODUCT)
-
-
-def latex_number(number: str) -> str:
-    """Convert a number from Python's notation to LaTeX."""
-    mantissa, _, exponent = number.partition("e")
-    return mantissa if not exponent else rf"{mantissa} \times 10^{{{int(exponent)}}}"
+    def call(self, primitive: Primitive, arguments: Sequence[str]) -> str:
+        """Write a function by its format string."""
+        return primitive.latex.format(*arguments)
 
 
 #: Minus sign (U+2212).
@@ -184,67 +306,140 @@ _MATHML = {
 }
 
 
+class MathmlPrinter(_ModelPrinter):
+    """Printer of a model as presentation MathML in ASCII; each expression is one element."""
+
+    operators: Mapping[str, Operator] = {
+        "add": Operator("<mo>+</mo>", SUM, QUOTIENT, QUOTIENT),
+        "sub": Operator(MINUS, SUM, QUOTIENT, QUOTIENT),
+        "mul": Operator(TIMES, PRODUCT, ATOM, ATOM),
+    }
+    brackets = "<mrow><mo>(</mo>{}<mo>)</mo></mrow>"
+
+    def signal(self, channel: int, lag: int) -> str:
+        """Write a lagged signal."""
+        name = self.name(channel)
+        index = f"<mn>{name[1:]}</mn><mo>,</mo>" if len(name) > 1 else ""
+        past = f"{MINUS}<mn>{lag}</mn>" if lag else ""
+        return f"<msub><mi>{name[0]}</mi><mrow>{index}<mi>k</mi>{past}</mrow></msub>"
+
+    def number(self, number: float) -> str:
+        """Write a constant."""
+        return mathml_number(_digits(number))
+
+    def shift(self, samples: int, argument: Expression) -> tuple[str, int]:
+        """Write a back-shift."""
+        shift = f"<msup><mi>q</mi><mrow>{MINUS}<mn>{samples}</mn></mrow></msup>"
+        return f"<mrow>{shift}{TIMES}{self.write_operand(argument, ATOM)}</mrow>", PRODUCT
+
+    def join(self, operator: Operator, arguments: Sequence[Expression]) -> str:
+        """Write an operator between its operands; equal factors as a power."""
+        if operator.own != PRODUCT:
+            return f"<mrow>{super().join(operator, arguments)}</mrow>"
+        parts: list[str] = []
+        for factor, run in groupby(arguments):
+            power = len(list(run))
+            # As in LaTeX, brackets separate an exponent from a number or a fraction, and a number from a
+            # preceding factor.
+            text, precedence = self._write(factor)
+            tall = isinstance(factor, Apply) and factor.primitive.name in _MATHML and power > 1
+            if precedence < ATOM or tall or (isinstance(factor, Constant) and (power > 1 or parts)):
+                text = self.brackets.format(text)
+            parts.append(text if power == 1 else f"<msup>{text}<mn>{power}</mn></msup>")
+        return f"<mrow>{operator.text.join(parts)}</mrow>"
+
+    def call(self, primitive: Primitive, arguments: Sequence[str]) -> str:
+        """Write a function by its format string or its name."""
+        if primitive.name == "abs":
+            return _ABSOLUTE.format(*arguments)
+        if primitive.name in _MATHML:
+            return _MATHML[primitive.name].format(*arguments)
+        safe = escape(primitive.name).encode("ascii", "xmlcharrefreplace").decode()
+        return f"<mrow><mi>{safe}</mi>{_APPLY}{self.brackets.format('<mo>,</mo>'.join(arguments))}</mrow>"
+
+
+_EQUATION = Printer()
+
+
+@cache
+def _make_printer(kind: type[_ModelPrinter], has_one_input: bool) -> _ModelPrinter:
+    return kind(has_one_input)
+
+
+def render(expression: Expression) -> str:
+    """Write an expression of an equation as text that `parse_expression` converts back to it."""
+    return _EQUATION.write(expression)
+
+
+def program_text(
+    expression: Expression, signal: Callable[[int, int], str], function: Callable[[Primitive], str]
+) -> str:
+    """Write an expression of a model in a programming language, in brackets if it is an operation.
+
+    Parameters
+    ----------
+    expression : Expression
+        In canonical form, with back-shifts at the leaves.
+    signal : callable
+        ``signal(channel, lag)`` returns the text of a sample.
+    function : callable
+        ``function(primitive)`` returns the name of a primitive's function.
+
+    Raises
+    ------
+    ModelError
+        The expression is not in canonical form.
+    """
+
+    def call(primitive: Primitive, arguments: Sequence[str]) -> str:
+        return f"{function(primitive)}({', '.join(arguments)})"
+
+    return ProgramPrinter(BRACKETED_OPERATORS, call, signal).write_operand(expression, ATOM)
+
+
+def plain(expression: Expression, inputs: int = 1) -> str:
+    """Write an expression as plain text that `parse` converts back to the same expression."""
+    return _make_printer(PlainPrinter, inputs == 1).write(expression)
+
+
+def plain_factor(expression: Expression, inputs: int) -> str:
+    """Write an expression as a factor of a product, in brackets if necessary."""
+    return _make_printer(PlainPrinter, inputs == 1).write_operand(expression, PRODUCT)
+
+
+def at_rest(expression: Expression, inputs: int = 1) -> str:
+    """Write a steady state (leaves of lag 0): ``y*u`` for ybar ubar, ``1`` for a constant."""
+    return plain(expression, inputs).replace("(k)", "")
+
+
+def latex(expression: Expression, inputs: int = 1) -> str:
+    """Write an expression in LaTeX without dollar signs."""
+    return _make_printer(LatexPrinter, inputs == 1).write(expression)
+
+
+def latex_factor(expression: Expression, inputs: int) -> str:
+    """Write an expression in LaTeX as a factor of a product, in brackets if necessary."""
+    return _make_printer(LatexPrinter, inputs == 1).write_operand(expression, PRODUCT)
+
+
 def mathml(expression: Expression, inputs: int = 1) -> str:
     """Write an expression as one element of presentation MathML, in ASCII."""
-    return _mathml(expression, inputs)[0]
-
-
-def _mathml(expression: Expression, inputs: int) -> tuple[str, int]:
-    match expression:
-        case Lagged(channel, lag):
-            name = _name(channel, inputs)
-            index = f"<mn>{name[1:]}</mn><mo>,</mo>" if len(name) > 1 else ""
-            past = f"{MINUS}<mn>{lag}</mn>" if lag else ""
-            return f"<msub><mi>{name[0]}</mi><mrow>{index}<mi>k</mi>{past}</mrow></msub>", _ATOM
-        case Constant(number):
-            return mathml_number(_digits(number)), _number_precedence(number)
-        case Shift(samples, argument):
-            shift = f"<msup><mi>q</mi><mrow>{MINUS}<mn>{samples}</mn></mrow></msup>"
-            return f"<mrow>{shift}{TIMES}{_mathml_operand(argument, inputs, _ATOM)}</mrow>", _PRODUCT
-        case Apply(primitive, arguments) if primitive in (ADD, SUB):
-            parts = [_mathml_operand(argument, inputs, _PRODUCT) for argument in arguments]
-            return f"<mrow>{('<mo>+</mo>' if primitive == ADD else MINUS).join(parts)}</mrow>", _SUM
-        case Apply(primitive, arguments) if primitive == MUL:
-            return f"<mrow>{TIMES.join(_mathml_powers(arguments, inputs))}</mrow>", _PRODUCT
-        case Apply(primitive, arguments):
-            return _mathml_call(primitive.name, [mathml(argument, inputs) for argument in arguments]), _ATOM
-
-
-def _mathml_powers(factors: Sequence[Expression], inputs: int) -> list[str]:
-    parts: list[str] = []
-    for factor, run in groupby(factors):
-        power = len(list(run))
-        text, precedence = _mathml(factor, inputs)
-        # As in LaTeX, brackets separate an exponent from a number or a fraction, and a number from a
-        # preceding factor.
-        tall = isinstance(factor, Apply) and factor.primitive.name in _MATHML and power > 1
-        if precedence < _ATOM or tall or (isinstance(factor, Constant) and (power > 1 or parts)):
-            text = _mathml_brackets(text)
-        parts.append(text if power == 1 else f"<msup>{text}<mn>{power}</mn></msup>")
-    return parts
-
-
-def _mathml_call(name: str, arguments: Sequence[str]) -> str:
-    if name == "abs":
-        return _ABSOLUTE.format(*arguments)
-    if name in _MATHML:
-        return _MATHML[name].format(*arguments)
-    safe = escape(name).encode("ascii", "xmlcharrefreplace").decode()
-    return f"<mrow><mi>{safe}</mi>{_APPLY}{_mathml_brackets('<mo>,</mo>'.join(arguments))}</mrow>"
-
-
-def _mathml_brackets(text: str) -> str:
-    return f"<mrow><mo>(</mo>{text}<mo>)</mo></mrow>"
-
-
-def _mathml_operand(expression: Expression, inputs: int, minimum: int) -> str:
-    text, precedence = _mathml(expression, inputs)
-    return text if precedence >= minimum else _mathml_brackets(text)
+    return _make_printer(MathmlPrinter, inputs == 1).write(expression)
 
 
 def mathml_factor(expression: Expression, inputs: int) -> str:
     """Write an expression in MathML as a factor of a product, in brackets if necessary."""
-    return _mathml_operand(expression, inputs, _PRODUCT)
+    return _make_printer(MathmlPrinter, inputs == 1).write_operand(expression, PRODUCT)
+
+
+def _digits(number: float) -> str:
+    return repr(float(number)).removesuffix(".0")
+
+
+def latex_number(number: str) -> str:
+    """Convert a number from Python's notation to LaTeX."""
+    mantissa, _, exponent = number.partition("e")
+    return mantissa if not exponent else rf"{mantissa} \times 10^{{{int(exponent)}}}"
 
 
 def mathml_number(number: str) -> str:

@@ -1,11 +1,12 @@
-"""Expressions over lagged signals: the genes of evolution and the regressors of a model.
+"""Expressions: the genes of evolution, the regressors of a model, the equations of a simulation.
 
-An expression is an immutable tree with four kinds of node. Channel 0 is the output y, channel i >= 1 is the
-input u_i. A leaf has a lag of one sample by default. A back-shift adds to the lags of all leaves below it, so
-``q5(q5(u1))`` is ``u1(k-11)`` (the paper, section 5.1).
+An expression is an immutable tree with five kinds of node. A leaf is a lagged signal, a constant, or the name
+of a value. Genes and regressors read lagged signals: channel 0 is the output y, channel i >= 1 is the input
+u_i, and the lag is one sample by default. A back-shift adds to the lags of all leaves below it, so
+``q5(q5(u1))`` is ``u1(k-11)`` (the paper, section 5.1). Equations read names.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from islands.errors import ModelError
@@ -16,17 +17,18 @@ class Primitive:
     """A function for use in expressions.
 
     ``scalar`` defines the function. The other attributes declare properties for simplification and export.
-    Two primitives with the same name are equal.
+    Two primitives are equal if they have the same name, and both or neither of them are protected.
 
     Attributes
     ----------
     name : str
         Name in plain text: ``tanh``.
     arity : int
-        1 or 2.
+        1 or 2, or 3 for ``where`` in equations.
     scalar : callable
-        Maps ``arity`` finite floats to a finite float ("protected"). It uses only arithmetic and the
-        functions of ``math``, so that it can be compiled.
+        Maps ``arity`` finite floats to a finite float. It uses only arithmetic and the functions of ``math``,
+        so that it can be compiled. A function that is not protected also maps arrays, and is NaN or infinite
+        outside its domain.
     latex : str
         Format string with ``{0}`` and ``{1}`` for the arguments.
     c, matlab : str
@@ -43,12 +45,15 @@ class Primitive:
         Maps the canonical arguments to an equal, simpler expression, or to None if it finds none.
     summary : str
         One-line description for the reference.
+    is_protected : bool
+        Whether the function is finite everywhere, as a search needs. The functions of equations are not, but
+        sums, differences and products are the same functions in both.
     """
 
     name: str
     arity: int = field(compare=False)
     scalar: Callable[..., float] = field(compare=False)
-    latex: str = field(compare=False)
+    latex: str = field(default="", compare=False)
     c: str = field(default="", compare=False)
     matlab: str = field(default="", compare=False)
     parity: int = field(default=0, compare=False)
@@ -56,6 +61,20 @@ class Primitive:
     commutative: bool = field(default=False, compare=False)
     simplify: "Callable[..., Expression | None] | None" = field(default=None, compare=False)
     summary: str = field(default="", compare=False)
+    is_protected: bool = True
+
+
+def _read_signal(*_: float) -> float:
+    raise ModelError("a rate, a delay and a value of an FMU are given, not computed from numbers")
+
+
+#: Functions of a signal as a whole in equations: its rate and its delay, evaluated before the integration.
+RATE = Primitive("rate", 1, _read_signal, is_protected=False)
+DELAY = Primitive("delay", 2, _read_signal, is_protected=False)
+SIGNAL_FUNCTIONS = (RATE, DELAY)
+
+#: Function of the name of a state or an output: its derivative or its value according to an FMU.
+FMU = Primitive("fmu", 1, _read_signal, is_protected=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +90,13 @@ class Constant:
     """A finite number."""
 
     value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """The name of a value: an input, a channel, a state, a variable, a parameter, ``t`` or ``force``."""
+
+    name: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +137,7 @@ class Apply:
         return Apply, (self.primitive, self.arguments)
 
 
-Expression = Lagged | Constant | Shift | Apply
+Expression = Lagged | Constant | Symbol | Shift | Apply
 
 
 def children(expression: Expression) -> tuple[Expression, ...]:
@@ -146,7 +172,7 @@ def remove_shifts(expression: Expression, samples: int = 0) -> Expression:
             return remove_shifts(argument, samples + more)
         case Apply(primitive, arguments):
             return Apply(primitive, tuple(remove_shifts(argument, samples) for argument in arguments))
-        case Constant():
+        case Constant() | Symbol():
             return expression
 
 
@@ -157,34 +183,17 @@ def lags(expression: Expression) -> frozenset[tuple[int, int]]:
     )
 
 
-def value(expression: Expression, signal: Callable[[int, int], float]) -> float:
-    """Evaluate an expression. This is the reference implementation for the kernels.
+def find_symbols(expression: Expression) -> Iterator[str]:
+    """Yield the names in an expression from left to right, also those of delayed signals and their delays.
 
-    Parameters
-    ----------
-    expression : Expression
-    signal : callable
-        ``signal(channel, lag)`` returns the value of the channel ``lag`` samples back.
-
-    Raises
-    ------
-    ModelError
-        The expression contains an unknown kind of node.
+    What an FMU computes has no names of the equations.
     """
     match expression:
-        case Lagged(channel, lag):
-            return signal(channel, lag)
-        case Constant(number):
-            return number
-        case Shift(samples, argument):
-            return value(argument, lambda channel, lag: signal(channel, lag + samples))
-        case Apply(primitive, arguments):
-            values = [value(argument, signal) for argument in arguments]
-            result = values[0] if len(values) > 1 else primitive.scalar(values[0])
-            for other in values[1:]:
-                result = primitive.scalar(result, other)
-            return result
-    raise ModelError(f"{expression!r} is not an expression: use Lagged, Constant, Shift or Apply")
+        case Symbol(name):
+            yield name
+        case Apply(primitive, arguments) if primitive != FMU:
+            for argument in arguments:
+                yield from find_symbols(argument)
 
 
 def content(expression: Expression) -> tuple[object, ...]:
@@ -198,15 +207,36 @@ def content(expression: Expression) -> tuple[object, ...]:
             return (2, samples, content(argument))
         case Constant(number):
             return (3, number)
+        case Symbol(name):
+            return (4, name)
+
+
+def replace(expression: Expression, find: Callable[[Expression], Expression | None]) -> Expression:
+    """Return an expression in which parts are replaced.
+
+    Parameters
+    ----------
+    expression : Expression
+    find : callable
+        ``find(part)`` returns what replaces a part of the expression; None to look at the parts below it. The
+        first call is with the whole expression.
+    """
+    found = find(expression)
+    if found is not None:
+        return found
+    match expression:
+        case Shift(samples, argument):
+            return Shift(samples, replace(argument, find))
+        case Apply(primitive, arguments):
+            return Apply(primitive, tuple(replace(argument, find) for argument in arguments))
+    return expression
 
 
 def replace_leaves(expression: Expression, transform: Callable[[Lagged], Expression]) -> Expression:
     """Return an expression in which every signal is replaced by what ``transform`` returns for it."""
-    match expression:
-        case Lagged():
-            return transform(expression)
-        case Shift(samples, argument):
-            return Shift(samples, replace_leaves(argument, transform))
-        case Apply(primitive, arguments):
-            return Apply(primitive, tuple(replace_leaves(argument, transform) for argument in arguments))
-    return expression
+    return replace(expression, lambda part: transform(part) if isinstance(part, Lagged) else None)
+
+
+def substitute(expression: Expression, replacements: Mapping[str, Expression]) -> Expression:
+    """Return an expression with names replaced by expressions."""
+    return replace(expression, lambda part: replacements.get(part.name) if isinstance(part, Symbol) else None)

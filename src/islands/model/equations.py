@@ -18,7 +18,7 @@ from islands.expressions.printing import (
     plain,
     plain_factor,
 )
-from islands.expressions.tree import Apply, Constant, Expression, Lagged, Shift
+from islands.expressions.tree import Constant, Expression, Lagged, replace_leaves
 from islands.model.model import Model
 from islands.model.signal_statement import describe_signals
 
@@ -59,14 +59,7 @@ def expressions_of_record(model: Model) -> list[Expression]:
 
 
 def _delay(expression: Expression, leads: Sequence[int]) -> Expression:
-    match expression:
-        case Lagged(channel, lag):
-            return Lagged(channel, lag - leads[channel])
-        case Shift(samples, argument):
-            return Shift(samples, _delay(argument, leads))
-        case Apply(primitive, arguments):
-            return Apply(primitive, tuple(_delay(argument, leads) for argument in arguments))
-    return expression
+    return replace_leaves(expression, lambda leaf: Lagged(leaf.channel, leaf.lag - leads[leaf.channel]))
 
 
 def named_equation(model: Model, digits: int = 6) -> str:

@@ -15,16 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import ModelError
 from islands.expressions.derivatives import differentiate
-from islands.expressions.tree import (
-    Apply,
-    Constant,
-    Expression,
-    Lagged,
-    Primitive,
-    remove_shifts,
-    value,
-    walk,
-)
+from islands.expressions.evaluation import value
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, remove_shifts, walk
 from islands.model.equations import expressions_of_record, named_term, signal_names
 from islands.model.model import Model, measured_model
 

@@ -19,6 +19,7 @@ from islands.expressions.tree import (
     Lagged,
     Primitive,
     Shift,
+    Symbol,
     content,
     lags,
     remove_shifts,
@@ -108,7 +109,7 @@ def canonical(expression: Expression) -> tuple[float, Expression]:
 
 def _canonical(expression: Expression) -> tuple[float, Expression]:
     match expression:
-        case Lagged():
+        case Lagged() | Symbol():
             return 1.0, expression
         case Constant(number):
             return number, _ONE

@@ -11,16 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.discrepancy.discovery.term_unit import divide_units, find_expression_unit, find_factor_unit
-from islands.systems.ode.equation_parser import TIME, parse_expression
-from islands.systems.ode.ode_expression import (
-    FMU,
-    OdeExpression,
-    Operation,
-    Symbol,
-    evaluate,
-    find_symbols,
-    render,
-)
+from islands.expressions.evaluation import evaluate
+from islands.expressions.parsing import parse_expression
+from islands.expressions.printing import render
+from islands.expressions.tree import FMU, Apply, Expression, Symbol, find_symbols, substitute
+from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.ode_system import OUTPUT, OdeSystem
 from islands.systems.ode.system_parts import OdeParameter
 
@@ -137,7 +132,7 @@ def list_candidate_terms(
     """
     states = [name for name, _ in system.derivatives]
     # Only the output can depend on the output of an FMU or of another simulation.
-    outputs = [f"{FMU}({name})" for name in system.of_fmu if name not in states]
+    outputs = [render(Apply(FMU, (Symbol(name),))) for name in system.of_fmu if name not in states]
     outputs += system.simulated
     rate = f"rate({system.input})"
     values, units = {**sizes, TIME: duration}, {**units, TIME: "s"}
@@ -185,19 +180,10 @@ def _list_texts(signals: list[str], rate: str) -> Iterator[str]:
 
 def _insert(form: str, signal: str) -> str:
     """Write a form with a signal in place of ``a``."""
-    return render(_substitute(parse_expression(form), parse_expression(signal)))
+    return render(substitute(parse_expression(form), {"a": parse_expression(signal)}))
 
 
-def _substitute(expression: OdeExpression, replacement: OdeExpression) -> OdeExpression:
-    match expression:
-        case Symbol():
-            return replacement
-        case Operation(function, arguments):
-            return Operation(function, tuple(_substitute(each, replacement) for each in arguments))
-    return expression
-
-
-def _compute_size(expression: OdeExpression, values: Mapping[str, float]) -> float:
+def _compute_size(expression: Expression, values: Mapping[str, float]) -> float:
     """Return the value of an expression at the largest values of its signals."""
     found = abs(float(evaluate(expression, {**dict.fromkeys(find_symbols(expression), 1.0), **values})))
     return found if np.isfinite(found) and found > 0.0 else 1.0

@@ -35,7 +35,7 @@ from islands.discrepancy.interfaces.coordinates import peak_amplitude
 from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.systems.ode.ode_expression import render
+from islands.expressions.printing import render
 from islands.systems.ode.ode_system import OUTPUT, OdeSystem
 from islands.systems.ode.output_system import SYMBOL_MEANINGS
 

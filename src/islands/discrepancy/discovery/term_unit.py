@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from fractions import Fraction
 
-from islands.systems.ode.ode_expression import FMU, Number, OdeExpression, Operation, Symbol
+from islands.expressions.tree import FMU, Apply, Constant, Expression, Primitive, Symbol
 
 #: Powers by the symbol of a unit.
 Powers = dict[str, Fraction]
@@ -19,7 +19,7 @@ _SAME = frozenset({"add", "sub", "neg", "abs", "min", "max"})
 _DIMENSIONLESS = frozenset({"sign", "less", "less_equal", "tanh", "atan", "exp", "log", "sin", "cos", "tan"})
 
 
-def find_factor_unit(unit: str, expression: OdeExpression, units: Mapping[str, str]) -> str:
+def find_factor_unit(unit: str, expression: Expression, units: Mapping[str, str]) -> str:
     """Return the unit of a factor whose product with an expression has a given unit.
 
     Parameters
@@ -38,7 +38,7 @@ def find_factor_unit(unit: str, expression: OdeExpression, units: Mapping[str, s
     return _render_quotient(_parse_powers(unit), _find_powers(expression, units))
 
 
-def find_expression_unit(expression: OdeExpression, units: Mapping[str, str]) -> str:
+def find_expression_unit(expression: Expression, units: Mapping[str, str]) -> str:
     """Return the unit of an expression; empty if it has none, or if the units are not known."""
     return _render_quotient(_find_powers(expression, units), {})
 
@@ -82,32 +82,32 @@ def _combine(powers: Powers, others: Powers, sign: int | Fraction) -> Powers:
     return {name: power for name, power in combined.items() if power}
 
 
-def _find_powers(expression: OdeExpression, units: Mapping[str, str]) -> Powers | None:
+def _find_powers(expression: Expression, units: Mapping[str, str]) -> Powers | None:
     """Return the powers of the unit of an expression; None if it is not known."""
     match expression:
-        case Number():
+        case Constant():
             return {}
         case Symbol(name):
             return _parse_powers(units.get(name, ""))
-        case Operation(function, _) if function in _DIMENSIONLESS:
+        case Apply(function, _) if function.name in _DIMENSIONLESS:
             return {}
-        case Operation("pow", (base, Number(power))):
+        case Apply(Primitive("pow"), (base, Constant(power))):
             return _scale(_find_powers(base, units), Fraction(power))
-        case Operation("sqrt", (base,)):
+        case Apply(Primitive("sqrt"), (base,)):
             return _scale(_find_powers(base, units), Fraction(1, 2))
-        case Operation("rate", (signal,)):
+        case Apply(Primitive("rate"), (signal,)):
             powers = _find_powers(signal, units)
             return None if powers is None else _combine(powers, {"s": Fraction(1)}, -1)
-        case Operation(function, (operand,)) if function == FMU:
+        case Apply(function, (operand,)) if function == FMU:
             return _find_powers(operand, units)
-        case Operation("mul" | "div" as function, (first, second)):
+        case Apply(Primitive("mul" | "div" as name), (first, second)):
             one, other = _find_powers(first, units), _find_powers(second, units)
             if one is None or other is None:
                 return None
-            return _combine(one, other, 1 if function == "mul" else -1)
-        case Operation(function, operands) if function in _SAME:
+            return _combine(one, other, 1 if name == "mul" else -1)
+        case Apply(function, operands) if function.name in _SAME:
             # A number is a limit or an offset in the unit of the others.
-            found = [_find_powers(each, units) for each in operands if not isinstance(each, Number)]
+            found = [_find_powers(each, units) for each in operands if not isinstance(each, Constant)]
             return found[0] if found and all(each == found[0] for each in found) else None
     return None
 

@@ -25,7 +25,7 @@ from islands.discrepancy.planning.planned_input import (
 )
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.ode import OdeSimulator
-from islands.systems.ode.ode_expression import Symbol
+from islands.expressions.tree import Symbol
 
 #: Factors of the duration of a record.
 LENGTH_FACTORS = (2, 4, 8)

@@ -15,12 +15,12 @@ from islands.discrepancy.interfaces.simulator import SimulationRun
 from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.record_channels import find_channel, make_nominal_context
 from islands.errors import RecordError
+from islands.expressions.tree import FMU, Apply, Expression, Symbol
 from islands.systems.fmu.fmi_description import FmiInterface
 from islands.systems.fmu.instance import FmuRun, load_fmu
 from islands.systems.fmu.model import FmuInitialValue, FmuModel
 from islands.systems.fmu.simulation import simulate_fmu
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_expression import FMU, OdeExpression, Operation, Symbol
 from islands.systems.ode.ode_program import OdeProgram, generate_program
 from islands.systems.ode.ode_system import OdeSystem
 
@@ -62,7 +62,7 @@ class FmuSimulator(OdeSimulator):
         make = partial(FmuSimulator, is_continuous_time=self.is_continuous_time, model=self.model)
         return make, arguments
 
-    def run_nominal(self, context: SimulationContext, outputs: tuple[OdeExpression, ...]) -> FmuRun:
+    def run_nominal(self, context: SimulationContext, outputs: tuple[Expression, ...]) -> FmuRun:
         """Simulate expressions of the system at its nominal values; the result says why if it fails."""
         program = generate_program(self.system, outputs)
         run = SimulationRun(np.array([each.nominal for each in self.parameters]), context.u, {}, ())
@@ -120,9 +120,9 @@ def make_fmu_simulator(model: FmuModel, system: OdeSystem, record: Dataset) -> F
     rough = FmuSimulator(system, initial, ones, channels, is_continuous_time=is_continuous_time, model=model)
     context = make_nominal_context(record)
     values = [each.variable.name for each in model.initial if each.place < 0]
-    expressions: list[OdeExpression] = [system.output, *map(Symbol, states)]
+    expressions: list[Expression] = [system.output, *map(Symbol, states)]
     expressions += [right for _, right in system.derivatives]
-    expressions += [Operation(FMU, (Symbol(name),)) for name in (*system.of_fmu, *values)]
+    expressions += [Apply(FMU, (Symbol(name),)) for name in (*system.of_fmu, *values)]
     for steps in STEPS if is_integrated and not system.steps else (system.steps,):
         rough = replace(rough, system=replace(system, steps=steps))
         found = rough.run_nominal(context, tuple(expressions))
@@ -136,7 +136,7 @@ def make_fmu_simulator(model: FmuModel, system: OdeSystem, record: Dataset) -> F
         )
     output, *signals = found.y
     named = [*states, *(f"d{name}/dt" for name in states)]
-    named += [f"{FMU}({name})" for name in system.of_fmu] + values
+    named += [f"{FMU.name}({name})" for name in system.of_fmu] + values
     simulated = dict(zip(named, signals, strict=True))
     peaks = {"input": peak_amplitude(context.u), "output": peak_amplitude(output)}
     sizes = {name: peak_amplitude(signal) for name, signal in simulated.items()}
@@ -151,7 +151,7 @@ def make_fmu_simulator(model: FmuModel, system: OdeSystem, record: Dataset) -> F
 
 def _is_definition(name: str, states: Sequence[str], simulated: Mapping[str, Signal]) -> bool:
     """Return whether the derivative of a state that the FMU computes is another state."""
-    derivative = simulated[f"{FMU}({name})"]
+    derivative = simulated[f"{FMU.name}({name})"]
     others = (simulated[other] for other in states if other != name)
     return bool(derivative.any()) and any(np.array_equal(derivative, other) for other in others)
 

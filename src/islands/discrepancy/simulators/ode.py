@@ -23,10 +23,10 @@ from islands.discrepancy.simulators.ode_effects import (
 )
 from islands.discrepancy.simulators.record_channels import refine_input, sample_channels
 from islands.discrepancy.simulators.shooting import Shots
+from islands.expressions.tree import Expression, Symbol
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.lane_simulation import simulate_lanes
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_expression import OdeExpression, Symbol
 from islands.systems.ode.ode_program import OdeProgram, generate_program
 from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.sampled_signal import SampledSignal, interpolate_linearly, make_time
@@ -159,7 +159,7 @@ class OdeSimulator(BatchSimulation):
         """Whether forces act in an equation, and not on the output."""
         return self.system.force is not None and bool(self.system.force.rate)
 
-    def simulate_nominal(self, context: SimulationContext, outputs: tuple[OdeExpression, ...]) -> Signal:
+    def simulate_nominal(self, context: SimulationContext, outputs: tuple[Expression, ...]) -> Signal:
         """Simulate expressions of the system at its nominal values, shape (expressions, samples)."""
         nominal = np.array([each.nominal for each in self.parameters])
         program = generate_program(self.system, outputs)

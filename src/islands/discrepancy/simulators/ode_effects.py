@@ -15,9 +15,11 @@ from islands.discrepancy.effects.nonlinearity import outflow_law, state_clip
 from islands.discrepancy.effects.time_variation import GAIN_EFFECTS
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Signal, SimulationContext, Site
 from islands.errors import ModelError, suggest
+from islands.expressions.parsing import parse_expression
+from islands.expressions.primitives import ADD
+from islands.expressions.tree import Apply, Expression, Symbol, substitute
 from islands.systems.mechanics import WIDTH
-from islands.systems.ode.equation_parser import FORCE, parse_expression
-from islands.systems.ode.ode_expression import OdeExpression, Operation, Symbol, substitute
+from islands.systems.ode.equation_parser import FORCE
 from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeParameter
 
@@ -109,7 +111,7 @@ def extend_system(
     system: OdeSystem,
     active: Sequence[OdeEffect],
     factor: str = "",
-    laws: Sequence[tuple[Mapping[str, OdeExpression], ForceLaw]] = (),
+    laws: Sequence[tuple[Mapping[str, Expression], ForceLaw]] = (),
     has_others: bool = False,
 ) -> OdeSystem:
     """Return a system with the terms of effects and force laws in its equations.
@@ -133,10 +135,10 @@ def extend_system(
 
 
 def _add_force_laws(
-    system: OdeSystem, laws: Sequence[tuple[Mapping[str, OdeExpression], ForceLaw]], has_others: bool
+    system: OdeSystem, laws: Sequence[tuple[Mapping[str, Expression], ForceLaw]], has_others: bool
 ) -> OdeSystem:
     assert system.force is not None
-    forces: list[OdeExpression] = [Symbol(FORCE)] if has_others else []
+    forces: list[Expression] = [Symbol(FORCE)] if has_others else []
     parameters, states = list(system.parameters), []
     for given, law in laws:
         names = {"x": Symbol(system.force.coordinate), "v": Symbol(system.force.rate), **given}
@@ -152,9 +154,9 @@ def _add_force_laws(
             states.append((state.name, substitute(parse_law(law.state_equation), names)))
     total = forces[0]
     for force in forces[1:]:
-        total = Operation("add", (total, force))
+        total = Apply(ADD, (total, force))
 
-    def insert(right: OdeExpression) -> OdeExpression:
+    def insert(right: Expression) -> Expression:
         return substitute(right, {FORCE: total})
 
     return replace(
@@ -180,9 +182,9 @@ def list_values(
     return numbers, states
 
 
-def number_symbols(number: int) -> dict[str, OdeExpression]:
+def number_symbols(number: int) -> dict[str, Expression]:
     """Return the symbols that a numbered law has in equations, for `extend_system`."""
-    numbers: dict[str, OdeExpression] = {
+    numbers: dict[str, Expression] = {
         f"n{index}": Symbol(_name_number(number, index)) for index in range(WIDTH)
     }
     return {**numbers, LAW_STATE: Symbol(_name_state(number))}

@@ -11,7 +11,7 @@ from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.record_channels import find_channel, make_nominal_context
 from islands.discrepancy.simulators.shooting import make_shots
 from islands.errors import RecordError
-from islands.systems.ode.ode_expression import Symbol
+from islands.expressions.tree import Symbol
 from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.system_document import MAX_STEPS
 from islands.systems.ode.system_parts import OdeState

@@ -15,8 +15,8 @@ from islands.discrepancy.interfaces.simulator import (
 )
 from islands.discrepancy.simulators.intersample import SimulatorWrapper
 from islands.discrepancy.simulators.ode import make_parameter
+from islands.expressions.evaluation import evaluate
 from islands.systems.ode.equation_parser import TIME
-from islands.systems.ode.ode_expression import evaluate
 from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.output_system import INPUT, SIMULATED, make_output_system
 

@@ -15,9 +15,9 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.segments import map_segments
 from islands.errors import RecordError
+from islands.expressions.tree import Symbol
 from islands.systems.ode.interval_simulation import IntervalSimulation
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_expression import Symbol
 from islands.systems.ode.ode_program import OdeProgram
 from islands.systems.ode.ode_system import OdeSystem
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from math import nan
 
 from islands.expressions.derivatives import differentiate
+from islands.expressions.evaluation import value
 from islands.expressions.parity import parity
-from islands.expressions.tree import Expression, value
+from islands.expressions.tree import Expression
 from islands.model.clusters import steady_state
 from islands.model.regressor import Regressor
 

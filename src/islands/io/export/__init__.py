@@ -1,6 +1,6 @@
 """Export of models to text formats, programming languages and blocks of simulators.
 
-Each text format is an entry of `EXPORTS`, each binary one of `FILE_EXPORTS`. Read `parts` and `infix` first:
+Each text format is an entry of `EXPORTS`, each binary one of `FILE_EXPORTS`. Read `parts` first:
 all programs share them.
 """
 

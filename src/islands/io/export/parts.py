@@ -7,8 +7,8 @@ import textwrap
 from collections.abc import Callable
 
 from islands.errors import ModelError
+from islands.expressions.printing import BRACKETED_OPERATORS, program_text
 from islands.expressions.tree import Apply, Constant, Primitive, walk
-from islands.io.export.infix import OPERATORS, infix
 from islands.model.equations import equation
 from islands.model.model import Model
 from islands.model.signal_statement import describe_values, symbols
@@ -34,7 +34,7 @@ def terms(model: Model, sample: Callable[[str, int], str], function: Callable[[P
         ``sample("u", 2)`` returns the text of the sample u(k-2). The lag is 0 only for an input that the
         model reads one sample early (``u_V+1``).
     function : callable
-        As in `infix`.
+        As in `program_text`.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def terms(model: Model, sample: Callable[[str, int], str], function: Callable[[P
             )
         text = repr(float(parameter))
         if item.expression != Constant(1.0):
-            text += "*" + infix(
+            text += "*" + program_text(
                 item.expression, lambda channel, lag: sample(names[channel], lag - leads[channel]), function
             )
         texts.append(text)
@@ -63,7 +63,7 @@ def functions(model: Model) -> list[Primitive]:
         node.primitive.name: node.primitive
         for item in model.regressors
         for node in walk(item.expression)
-        if isinstance(node, Apply) and node.primitive.name not in OPERATORS
+        if isinstance(node, Apply) and node.primitive.name not in BRACKETED_OPERATORS
     }
     return [called[name] for name in sorted(called)]
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from islands.errors import ModelError
 from islands.expressions.primitives import SIGN
+from islands.expressions.printing import program_text
 from islands.expressions.tree import Expression, Primitive
-from islands.io.export.infix import infix as exported_infix
 
 
 def infix(expression: Expression, signal: Callable[[int, int], str]) -> str:
@@ -23,7 +23,7 @@ def infix(expression: Expression, signal: Callable[[int, int], str]) -> str:
     ModelError
         If it contains a function other than products, sums, differences and signs.
     """
-    return exported_infix(expression, signal, _get_sign_name)
+    return program_text(expression, signal, _get_sign_name)
 
 
 def _get_sign_name(primitive: Primitive) -> str:

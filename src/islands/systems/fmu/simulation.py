@@ -4,13 +4,13 @@ import itertools
 
 import numpy as np
 
+from islands.expressions.tree import FMU, Apply, Symbol
 from islands.systems.fmu.fmi_kernel import FmuEquations
 from islands.systems.fmu.instance import FmuInstance, FmuRun
 from islands.systems.fmu.model import FmuModel
 from islands.systems.ode.kernel_arguments import LANES
 from islands.systems.ode.lane_simulation import pack_signals
 from islands.systems.ode.lane_values import LaneInput, LaneValues
-from islands.systems.ode.ode_expression import FMU, Operation, Symbol
 from islands.systems.ode.ode_program import OdeProgram
 
 
@@ -54,9 +54,9 @@ def _pack_equations(model: FmuModel, program: OdeProgram, dt: float, lane: LaneI
     derivatives, values, signals = [], [], []
     for expression, row in rows.items():
         match expression:
-            case Operation(function, (Symbol(name),)) if function == FMU and name in known:
+            case Apply(function, (Symbol(name),)) if function == FMU and name in known:
                 derivatives.append((known[name], row))
-            case Operation(function, (Symbol(name),)) if function == FMU:
+            case Apply(function, (Symbol(name),)) if function == FMU:
                 values.append((references[name], row))
             case _:
                 signals.append(expression)

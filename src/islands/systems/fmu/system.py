@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from islands.errors import ModelError, suggest
+from islands.expressions.printing import render
+from islands.expressions.tree import FMU, Apply, Expression, Symbol, find_symbols, walk
 from islands.systems.fmu.model import FmuModel
 from islands.systems.ode.equation_parser import FORCE, Equation, parse_equations
-from islands.systems.ode.ode_expression import FMU, OdeExpression, Operation, Symbol, find_symbols, render
 from islands.systems.ode.ode_system import OUTPUT, OdeSystem, check_symbols, sort_variables
 from islands.systems.ode.system_parts import OdeForce, OdeParameter, OdeState
 
@@ -88,8 +89,8 @@ def _make_plain_system(model: FmuModel, symbols: Mapping[str, str]) -> OdeSystem
     )
 
 
-def _call_fmu(name: str) -> OdeExpression:
-    return Operation(FMU, (Symbol(name),))
+def _call_fmu(name: str) -> Expression:
+    return Apply(FMU, (Symbol(name),))
 
 
 def _check_target(equation: Equation, system: OdeSystem) -> None:
@@ -105,16 +106,12 @@ def _check_target(equation: Equation, system: OdeSystem) -> None:
         return
     outputs = set(system.of_fmu) - set(states)
     for name in outputs.intersection(_find_fmu_values(equation.expression)):
-        raise ModelError(f"{equation.place}: {FMU}({name}) is possible in the equation of output only")
+        raise ModelError(f"{equation.place}: {FMU.name}({name}) is possible in the equation of output only")
 
 
-def _find_fmu_values(expression: OdeExpression) -> list[str]:
-    match expression:
-        case Operation(function, (Symbol(name),)) if function == FMU:
-            return [name]
-        case Operation(_, arguments):
-            return [name for argument in arguments for name in _find_fmu_values(argument)]
-    return []
+def _find_fmu_values(expression: Expression) -> list[str]:
+    calls = (part for part in walk(expression) if isinstance(part, Apply) and part.primitive == FMU)
+    return [name for part in calls for name in map(render, part.arguments)]
 
 
 def _check_names(

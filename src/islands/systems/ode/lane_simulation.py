@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.expressions.tree import Apply, Constant, Expression, Primitive, Symbol
 from islands.systems.ode.kernel_arguments import LANES, LaneRestarts, LaneSignals
 from islands.systems.ode.lane_values import LaneInput, LaneValues
 from islands.systems.ode.native.native_code import find_native_code
-from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol
 from islands.systems.ode.ode_kernel import integrate
 from islands.systems.ode.ode_program import OdeProgram
 from islands.systems.ode.sampled_signal import SampledSignal, chain_signals, stack_signals
@@ -93,7 +93,7 @@ def integrate_group(
 
 
 def pack_signals(
-    expressions: Sequence[OdeExpression], dt: float, lanes: Sequence[LaneInput]
+    expressions: Sequence[Expression], dt: float, lanes: Sequence[LaneInput]
 ) -> tuple[LaneSignals, NDArray[np.int64]]:
     """Return the signals of up to `LANES` lanes, and the order of shared and own ones among all signals."""
     samples = count_samples(lanes)
@@ -115,7 +115,7 @@ def count_samples(lanes: Sequence[LaneInput]) -> int:
 
 
 def list_signals(
-    expressions: Sequence[OdeExpression], dt: float, lanes: Sequence[LaneInput]
+    expressions: Sequence[Expression], dt: float, lanes: Sequence[LaneInput]
 ) -> tuple[list[SampledSignal], NDArray[np.int64]]:
     """Return the signals of all lanes once each, and their indices, shape (lanes, expressions)."""
     made: dict[tuple[object, ...], SampledSignal] = {}
@@ -127,20 +127,20 @@ def list_signals(
 
 
 def make_signal(
-    expression: OdeExpression, dt: float, lane: LaneInput, made: dict[tuple[object, ...], SampledSignal]
+    expression: Expression, dt: float, lane: LaneInput, made: dict[tuple[object, ...], SampledSignal]
 ) -> SampledSignal:
     """Return a signal of a lane; ``made`` keeps those that are computed, for lanes with the same ones."""
     match expression:
         case Symbol(name):
             return lane.signals[name]
-        case Operation("rate", (Symbol(name),)):
+        case Apply(Primitive("rate"), (Symbol(name),)):
             signal = lane.signals[name]
             key: tuple[object, ...] = "rate", id(signal)
             if key not in made:
                 made[key] = signal.differentiate(dt)
-        case Operation("delay", (Symbol(name), Symbol() | Number() as delay)):
+        case Apply(Primitive("delay"), (Symbol(name), Symbol() | Constant() as delay)):
             signal = lane.signals[name]
-            seconds = delay.value if isinstance(delay, Number) else lane.parameters[delay.name]
+            seconds = delay.value if isinstance(delay, Constant) else lane.parameters[delay.name]
             key = "delay", id(signal), float(seconds)
             if key not in made:
                 made[key] = signal.delay(max(float(seconds), 0.0), dt)

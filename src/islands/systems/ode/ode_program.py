@@ -12,27 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import ModelError
+from islands.expressions.printing import render
+from islands.expressions.tree import FMU, SIGNAL_FUNCTIONS, Apply, Constant, Expression, Primitive, Symbol
 from islands.kernels.interpreter import ADD, MULTIPLY, SIGN, SUBTRACT
 from islands.systems.ode import ode_kernel
 from islands.systems.ode.composite_functions import CompositeFunctions
 from islands.systems.ode.equation_parser import FORCE, TIME
 from islands.systems.ode.kernel_arguments import Instructions
-from islands.systems.ode.ode_expression import (
-    FMU,
-    SIGNAL_FUNCTIONS,
-    Number,
-    OdeExpression,
-    Operation,
-    Symbol,
-    render,
-)
 from islands.systems.ode.ode_system import OdeSystem, sort_variables
 
 #: Largest number of instructions.
 MAX_INSTRUCTIONS = 5000
 
-#: Largest integer exponent that is written as multiplications.
-MAX_MULTIPLIED_POWER = 8
+#: Exponents of powers that are multiplications.
+_MULTIPLIED_POWERS = range(2, 9)
 
 _OPERATIONS: Mapping[str, int] = MappingProxyType(
     {
@@ -85,7 +78,7 @@ class OdeProgram:
     instructions: Instructions
     constants: NDArray[np.float64]
     parameters: tuple[str, ...]
-    signals: tuple[OdeExpression, ...]
+    signals: tuple[Expression, ...]
     states: tuple[str, ...]
 
 
@@ -100,7 +93,7 @@ class _Node:
     uses: int = 0
 
 
-def generate_program(system: OdeSystem, outputs: Sequence[OdeExpression] = (), laws: int = 0) -> OdeProgram:
+def generate_program(system: OdeSystem, outputs: Sequence[Expression] = (), laws: int = 0) -> OdeProgram:
     """Generate the instructions of a system.
 
     Parameters
@@ -123,14 +116,14 @@ class _Generator:
         self.system, self.laws = system, laws
         self.nodes: list[_Node] = []
         self.constants: list[float] = []
-        self.signals: list[OdeExpression] = []
+        self.signals: list[Expression] = []
         self._known: dict[object, int] = {}
         self._named: dict[str, int] = {}
         self._sections: tuple[list[tuple[int, ...]], ...] = ([], [], [], [])
         self._rows = 0
         self._functions = CompositeFunctions(self._operation, self._number)
 
-    def generate(self, outputs: tuple[OdeExpression, ...]) -> OdeProgram:
+    def generate(self, outputs: tuple[Expression, ...]) -> OdeProgram:
         system, laws = self.system, self.laws
         for parameter in system.parameters:
             self._named[parameter.name] = self._leaf(_PARAMETERS)
@@ -194,10 +187,10 @@ class _Generator:
         self.nodes.append(_Node(-1, (), level))
         return len(self.nodes) - 1
 
-    def _make(self, expression: OdeExpression) -> int:
+    def _make(self, expression: Expression) -> int:
         """Return the node of an expression."""
         match expression:
-            case Number(value):
+            case Constant(value):
                 return self._number(value)
             case Symbol(name) if name in self._named:
                 return self._named[name]
@@ -207,18 +200,19 @@ class _Generator:
                 return self._signal(expression)
             case Symbol(name):
                 raise ModelError(f"unknown name {name!r} in an equation")
-            case Operation(function, _) if function in SIGNAL_FUNCTIONS or function == FMU:
-                return self._signal(expression, _STATES if function == FMU else _SIGNALS)
-            case Operation("pow", (base, Number(power))) if power in range(2, MAX_MULTIPLIED_POWER + 1):
+            case Apply(primitive, _) if primitive in (*SIGNAL_FUNCTIONS, FMU):
+                return self._signal(expression, _STATES if primitive == FMU else _SIGNALS)
+            case Apply(Primitive("pow"), (base, Constant(power))) if power in _MULTIPLIED_POWERS:
                 return self._functions.power(self._make(base), int(power))
-            case Operation("tanh", (argument,)):
+            case Apply(Primitive("tanh"), (argument,)):
                 return self._functions.tanh(self._make(argument))
-            case Operation("sin", (argument,)):
+            case Apply(Primitive("sin"), (argument,)):
                 return self._functions.sine(self._make(argument))
-            case Operation("cos", (argument,)):
+            case Apply(Primitive("cos"), (argument,)):
                 return self._functions.cosine(self._make(argument))
-            case Operation(function, arguments):
-                return self._operation(_OPERATIONS[function], *map(self._make, arguments))
+            case Apply(primitive, arguments):
+                return self._operation(_OPERATIONS[primitive.name], *map(self._make, arguments))
+        raise ModelError(f"an equation reads {render(expression)}")
 
     def _number(self, value: float) -> int:
         if ("number", value) not in self._known:
@@ -226,7 +220,7 @@ class _Generator:
             self.constants.append(value)
         return self._known["number", value]
 
-    def _signal(self, expression: OdeExpression, level: int = _SIGNALS) -> int:
+    def _signal(self, expression: Expression, level: int = _SIGNALS) -> int:
         key = "signal", render(expression)
         if key not in self._known:
             self._known[key] = self._leaf(level)

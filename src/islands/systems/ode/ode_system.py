@@ -4,17 +4,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from islands.errors import ModelError, suggest
-from islands.systems.ode.equation_parser import FORCE, TIME, check_name, parse_expression
-from islands.systems.ode.ode_expression import (
+from islands.expressions.parsing import parse_expression
+from islands.expressions.primitives import ADD, MUL
+from islands.expressions.printing import render
+from islands.expressions.tree import (
     FMU,
     SIGNAL_FUNCTIONS,
-    OdeExpression,
-    Operation,
+    Apply,
+    Expression,
     Symbol,
     find_symbols,
-    render,
     substitute,
+    walk,
 )
+from islands.systems.ode.equation_parser import FORCE, TIME, check_name
 from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeForce, OdeParameter, OdeState
 
 #: Target of `OdeSystem.with_term` for a term that is added to the output.
@@ -68,9 +71,9 @@ class OdeSystem:
 
     name: str
     input: str
-    derivatives: tuple[tuple[str, OdeExpression], ...]
-    variables: tuple[tuple[str, OdeExpression], ...]
-    output: OdeExpression
+    derivatives: tuple[tuple[str, Expression], ...]
+    variables: tuple[tuple[str, Expression], ...]
+    output: Expression
     parameters: tuple[OdeParameter, ...]
     states: tuple[OdeState, ...]
     summary: str = ""
@@ -103,7 +106,7 @@ class OdeSystem:
         return (self.input, *self.channels)
 
     def with_term(
-        self, target: str, term: str | OdeExpression, parameters: Sequence[OdeParameter] = ()
+        self, target: str, term: str | Expression, parameters: Sequence[OdeParameter] = ()
     ) -> "OdeSystem":
         """Return the system with one more term in one equation.
 
@@ -145,11 +148,11 @@ class OdeSystem:
 
     def with_factor(self, parameter: str, factor: str) -> "OdeSystem":
         """Return the system with a parameter multiplied by a signal, which is one more channel."""
-        product = Operation("mul", (Symbol(parameter), Symbol(factor)))
+        product = Apply(MUL, (Symbol(parameter), Symbol(factor)))
 
         def multiply(
-            equations: Iterable[tuple[str, OdeExpression]],
-        ) -> tuple[tuple[str, OdeExpression], ...]:
+            equations: Iterable[tuple[str, Expression]],
+        ) -> tuple[tuple[str, Expression], ...]:
             return tuple((name, substitute(right, {parameter: product})) for name, right in equations)
 
         return replace(
@@ -160,17 +163,16 @@ class OdeSystem:
             output=substitute(self.output, {parameter: product}),
         )
 
-    def _add(self, target: str, added: OdeExpression) -> "OdeSystem":
+    def _add(self, target: str, added: Expression) -> "OdeSystem":
         """Return the system with one more term in one equation, without checks."""
 
-        def add(equations: Iterable[tuple[str, OdeExpression]]) -> tuple[tuple[str, OdeExpression], ...]:
+        def add(equations: Iterable[tuple[str, Expression]]) -> tuple[tuple[str, Expression], ...]:
             return tuple(
-                (name, Operation("add", (right, added)) if name == target else right)
-                for name, right in equations
+                (name, Apply(ADD, (right, added)) if name == target else right) for name, right in equations
             )
 
         if target == OUTPUT:
-            return replace(self, output=Operation("add", (self.output, added)))
+            return replace(self, output=Apply(ADD, (self.output, added)))
         return replace(self, derivatives=add(self.derivatives), variables=add(self.variables))
 
     def with_values(self, values: Mapping[str, float]) -> "OdeSystem":
@@ -207,7 +209,7 @@ def sort_variables(system: OdeSystem) -> tuple[str, ...]:
     right_sides = dict(system.variables)
     if system.force is not None and system.force.rate:
         # The forces are computed from the coordinate and its rate.
-        right_sides[FORCE] = Operation("add", (Symbol(system.force.coordinate), Symbol(system.force.rate)))
+        right_sides[FORCE] = Apply(ADD, (Symbol(system.force.coordinate), Symbol(system.force.rate)))
     ordered: dict[str, None] = {}
     open_names: list[str] = []
 
@@ -230,7 +232,7 @@ def sort_variables(system: OdeSystem) -> tuple[str, ...]:
     return tuple(name for name in ordered if name != FORCE)
 
 
-def check_symbols(expression: OdeExpression, system: OdeSystem, place: str) -> None:
+def check_symbols(expression: Expression, system: OdeSystem, place: str) -> None:
     """Raise `ModelError` if an expression has an unknown name, or a rate or delay of what is not measured."""
     known = system.find_names()
     for name in find_symbols(expression):
@@ -241,24 +243,26 @@ def check_symbols(expression: OdeExpression, system: OdeSystem, place: str) -> N
     _check_signals(expression, system, place)
 
 
-def _check_signals(expression: OdeExpression, system: OdeSystem, place: str) -> None:
-    match expression:
-        case Operation(function, (Symbol(name), *others)) if function in SIGNAL_FUNCTIONS:
+def _check_signals(expression: Expression, system: OdeSystem, place: str) -> None:
+    for part in walk(expression):
+        _check_signal(part, system, place)
+
+
+def _check_signal(part: Expression, system: OdeSystem, place: str) -> None:
+    match part:
+        case Apply(function, (Symbol(name), *others)) if function in SIGNAL_FUNCTIONS:
             if name not in system.signals:
                 raise ModelError(
-                    f"{place}: {function}({name}) is not possible, since {name} is not measured: take the "
-                    f"input or a channel ({', '.join(system.signals)})"
+                    f"{place}: {function.name}({name}) is not possible, since {name} is not measured: "
+                    f"take the input or a channel ({', '.join(system.signals)})"
                 )
             for other in others:
                 if isinstance(other, Symbol) and system.find_names()[other.name] != "a parameter":
                     raise ModelError(f"{place}: the delay {other.name} has to be a parameter or a number")
-        case Operation(function, (Symbol(name),)) if function == FMU:
+        case Apply(function, (Symbol(name),)) if function == FMU:
             if name not in system.of_fmu:
                 known = ", ".join(system.of_fmu) or "none here, since the simulation is no FMU"
                 raise ModelError(f"{place}: an FMU does not compute {name}: take one of {known}")
-        case Operation(_, arguments):
-            for argument in arguments:
-                _check_signals(argument, system, place)
 
 
 def _list_known(name: str, known: Mapping[str, str]) -> str:

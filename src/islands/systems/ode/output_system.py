@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from islands.systems.ode.equation_parser import parse_expression
+from islands.expressions.parsing import parse_expression
 from islands.systems.ode.ode_system import OdeSystem, check_symbols
 from islands.systems.ode.system_document import make_parameter
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import inf
 
-from islands.systems.ode.ode_expression import OdeExpression
+from islands.expressions.tree import Expression
 
 #: Name of the value of an effect in its term.
 EFFECT_VALUE = "value"
@@ -86,7 +86,7 @@ class OdeForce:
     coordinate: str
     rate: str
     unit: str
-    drive: OdeExpression
+    drive: Expression
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,4 +105,4 @@ class OdeEffect:
 
     name: str
     equation: str = ""
-    term: OdeExpression | None = None
+    term: Expression | None = None

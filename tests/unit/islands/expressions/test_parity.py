@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from islands.expressions.evaluation import value
 from islands.expressions.parity import parity
 from islands.expressions.parsing import parse
-from islands.expressions.tree import value
 
 ODD = [
     "u(k-1)",

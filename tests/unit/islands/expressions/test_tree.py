@@ -1,21 +1,23 @@
-"""Expressions: value, height, lags and canonical order."""
+"""Expressions: height, lags and canonical order."""
 
 import pytest
 
-from islands.errors import ModelError
-from islands.expressions.parsing import parse
+from islands.expressions.parsing import parse, parse_expression
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SUB
 from islands.expressions.tree import (
     Apply,
     Constant,
     Lagged,
     Shift,
+    Symbol,
     children,
     content,
     height,
     lags,
     remove_shifts,
-    value,
+    replace,
+    replace_leaves,
+    substitute,
     walk,
 )
 from islands.model.regressor import regressor
@@ -83,20 +85,6 @@ def test_walk_yields_nodes_in_pre_order():
     ]
 
 
-def test_value_of_an_expression_matches_a_hand_calculation():
-    def signal(channel, lag):
-        return 10.0 * channel + lag
-
-    assert value(parse("y(k-2) - 2*u1(k-3)*u2(k-1)"), signal) == 2.0 - 2.0 * 13.0 * 21.0
-    assert value(parse("q4(u(k-1)/y(k-1)) + sign(y(k-1) - u(k-1))"), signal) == 15.0 / 5.0 - 1.0
-    assert value(Apply(MUL, (Constant(2.0),) * 10), signal) == 1024.0
-
-
-def test_value_of_an_unknown_node_is_refused():
-    with pytest.raises(ModelError, match="'u' is not an expression: use Lagged, Constant, Shift or Apply"):
-        value("u", lambda *_: 0.0)
-
-
 def test_content_orders_signals_functions_back_shifts_numbers():
     rising = [
         Lagged(0, 1),
@@ -114,3 +102,20 @@ def test_content_orders_signals_functions_back_shifts_numbers():
     keys = [content(expression) for expression in rising]
     assert keys == sorted(keys)
     assert len(set(keys)) == len(keys)
+
+
+def test_functions_of_equations_are_not_protected_primitives_but_share_the_arithmetic():
+    assert Apply(PRIMITIVES["div"], (Symbol("a"), Symbol("b"))) != parse_expression("a/b")
+    assert Apply(MUL, (Symbol("a"), Symbol("b"))) == parse_expression("a*b")
+
+
+def test_parts_of_an_expression_are_replaced_from_the_root_down():
+    expression = Shift(1, Apply(ADD, (Apply(MUL, (Lagged(1), Lagged(2))), Lagged(1))))
+    found = replace(
+        expression, lambda part: Lagged(3) if part == Apply(MUL, (Lagged(1), Lagged(2))) else None
+    )
+    assert found == Shift(1, Apply(ADD, (Lagged(3), Lagged(1))))
+    assert replace_leaves(expression, lambda leaf: Lagged(0, leaf.lag)) == Shift(
+        1, Apply(ADD, (Apply(MUL, (Lagged(0), Lagged(0))), Lagged(0)))
+    )
+    assert substitute(parse_expression("x*rate(x)"), {"x": Symbol("F")}) == parse_expression("F*rate(F)")

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Constant, Lagged, value
+from islands.expressions.tree import Constant, Lagged
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK
 from islands.model.regressor import regressor

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
+from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
-from islands.expressions.tree import value
 from islands.kernels.simulate import ABANDONED, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
 from islands.kernels.summation import total
 from islands.model.model import make_model

@@ -29,7 +29,7 @@ from islands.kernels.population import (
     Groups, PopulationContext, SelectedTerms, empty_results, empty_terms, evaluate,
 )
 from islands.kernels.err_selection import OUTPUT
-from islands.expressions.tree import Lagged
+from islands.expressions.tree import (Lagged)
 from islands.model.model import Model
 from islands.expressions.parsing import parse
 from islands.model.regressor import regressor

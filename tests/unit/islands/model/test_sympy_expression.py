@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import islands
+from islands.expressions.evaluation import value
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import value
 from islands.model.sympy_expression import to_sympy
 
 pytestmark = pytest.mark.ci

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Constant, Lagged, value
+from islands.expressions.tree import Constant, Lagged
 from islands.expressions.user_primitive import primitive
 from islands.kernels import codegen
 from islands.kernels.codegen import CONSTANT, LAGGED

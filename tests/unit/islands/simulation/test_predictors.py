@@ -9,8 +9,8 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
+from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
-from islands.expressions.tree import value
 from islands.model.model import make_model
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, Status

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from islands.expressions.evaluation import evaluate
+from islands.expressions.parsing import parse_expression
 from islands.systems.curve import VALUES, interpolate_curve, write_curve
-from islands.systems.ode.equation_parser import parse_expression
-from islands.systems.ode.ode_expression import evaluate
 
 PLACES = np.linspace(-1.0, 1.0, VALUES + 2)
 

@@ -1,17 +1,17 @@
 """Common parts of expressions: parts that occur repeatedly are computed once."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from islands.systems.ode.ode_expression import OdeExpression, Operation, Symbol
+from islands.expressions.tree import Apply, Expression, Symbol, replace, walk
 
 #: Least number of operations of a part that gets a name.
 _MIN_OPERATIONS = 4
 
 
 def take_common_parts(
-    expressions: Sequence[OdeExpression], prefix: str
-) -> tuple[list[tuple[str, OdeExpression]], list[OdeExpression]]:
+    expressions: Sequence[Expression], prefix: str
+) -> tuple[list[tuple[str, Expression]], list[Expression]]:
     """Give names to the parts that occur repeatedly in expressions.
 
     Returns
@@ -21,7 +21,7 @@ def take_common_parts(
     list of expression
         The expressions with these names.
     """
-    parts: list[tuple[str, OdeExpression]] = []
+    parts: list[tuple[str, Expression]] = []
     remaining = list(expressions)
     while True:
         counts = Counter(each for one in [*remaining, *(part for _, part in parts)] for each in _walk(one))
@@ -35,21 +35,13 @@ def take_common_parts(
         parts.append((name, largest))
 
 
-def _walk(expression: OdeExpression) -> Iterator[OdeExpression]:
-    if isinstance(expression, Operation):
-        yield expression
-        for argument in expression.arguments:
-            yield from _walk(argument)
+def _walk(expression: Expression) -> list[Expression]:
+    return [part for part in walk(expression) if isinstance(part, Apply)]
 
 
-def _count(expression: OdeExpression) -> int:
-    return sum(1 for _ in _walk(expression))
+def _count(expression: Expression) -> int:
+    return len(_walk(expression))
 
 
-def _replace(expression: OdeExpression, part: OdeExpression, by: OdeExpression) -> OdeExpression:
-    if expression == part:
-        return by
-    if isinstance(expression, Operation):
-        arguments = tuple(_replace(each, part, by) for each in expression.arguments)
-        return Operation(expression.function, arguments)
-    return expression
+def _replace(expression: Expression, part: Expression, name: Symbol) -> Expression:
+    return replace(expression, lambda each: name if each == part else None)

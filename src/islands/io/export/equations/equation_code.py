@@ -6,21 +6,23 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from islands.expressions.primitives import POW
+from islands.expressions.printing import EQUATION_OPERATORS, ProgramPrinter, render
+from islands.expressions.tree import (
+    SIGNAL_FUNCTIONS,
+    Apply,
+    Expression,
+    Primitive,
+    Symbol,
+    find_symbols,
+    replace,
+    substitute,
+)
 from islands.io.export.equations.common_parts import take_common_parts
 from islands.io.export.equations.extended_equations import ExtendedEquations
 from islands.io.export.equations.identifiers import make_identifiers
 from islands.io.export.parts import quote_name
 from islands.systems.ode.equation_parser import TIME
-from islands.systems.ode.ode_expression import (
-    SIGNAL_FUNCTIONS,
-    Notation,
-    OdeExpression,
-    Operation,
-    Symbol,
-    find_symbols,
-    render,
-    substitute,
-)
 from islands.systems.ode.ode_system import sort_variables
 from islands.systems.ode.output_system import SIMULATED
 
@@ -33,6 +35,9 @@ DEFINED = {
     "max": "maximum",
     "where": "choose",
 }
+
+#: Functions that are operators in every language.
+_OPERATORS = {name: EQUATION_OPERATORS[name] for name in ("add", "sub", "mul", "div")}
 
 #: Columns of a line.
 _WIDTH = 108
@@ -65,18 +70,18 @@ class EquationCode:
     power: Callable[[str, str], str]
 
     @cached_property
-    def signals(self) -> tuple[OdeExpression, ...]:
+    def signals(self) -> tuple[Expression, ...]:
         """Signals that the equations read: input, channels, time, gain, their rates and delays."""
         system = self.equations.system
         needed = [right for _, right in (*system.derivatives, *system.variables)]
-        found: dict[str, OdeExpression] = {}
+        found: dict[str, Expression] = {}
         for right in (*needed, system.output):
             for each in _find_signals(right, {*system.signals, TIME}):
                 found.setdefault(render(each), each)
         return tuple(found.values())
 
     @property
-    def read_signals(self) -> tuple[OdeExpression, ...]:
+    def read_signals(self) -> tuple[Expression, ...]:
         """Signals that are read from the record: all but the simulated output."""
         is_sampled = self.equations.core is not None
         return tuple(each for each in self.signals if not (is_sampled and each == Symbol(SIMULATED)))
@@ -97,24 +102,20 @@ class EquationCode:
         members |= {name: f"w.{own[name]}" for name, _ in given.system.variables}
         return members | {render(each): f"in{self.member}{own[render(each)]}" for each in self.signals}
 
-    def write(self, expression: OdeExpression, local: Mapping[str, str] | None = None) -> str:
+    def write(self, expression: Expression, local: Mapping[str, str] | None = None) -> str:
         """Write an expression; ``local`` has the texts of further names."""
         texts = {**self._members, **(local or {})}
-        notation = Notation(
-            symbol=lambda name: texts.get(name, name),
-            number=lambda value: repr(float(value)),
-            operators=frozenset(("add", "sub", "mul", "div")),
-            call=self._call,
-        )
-        return render(_name_signals(expression), notation)
+        printer = ProgramPrinter(_OPERATORS, self._call, symbol=lambda name: texts.get(name, name))
+        return printer.write(_name_signals(expression))
 
-    def _call(self, function: str, arguments: tuple[str, ...]) -> str:
-        if function == "pow":
+    def _call(self, function: Primitive, arguments: Sequence[str]) -> str:
+        if function == POW:
             return self.power(*arguments)
-        return f"{self.functions.get(function, DEFINED.get(function, function))}({', '.join(arguments)})"
+        name = function.name
+        return f"{self.functions.get(name, DEFINED.get(name, name))}({', '.join(arguments)})"
 
     def assign(
-        self, targets: Sequence[tuple[str, OdeExpression]], local: Mapping[str, str] | None = None
+        self, targets: Sequence[tuple[str, Expression]], local: Mapping[str, str] | None = None
     ) -> list[str]:
         """Write statements that assign expressions to targets; common parts are computed before."""
         lines = []
@@ -132,7 +133,7 @@ class EquationCode:
         )
         return [f"{each}{self.continuation}" for each in found[:-1]] + found[-1:]
 
-    def assign_variables(self, readers: Iterable[OdeExpression]) -> list[str]:
+    def assign_variables(self, readers: Iterable[Expression]) -> list[str]:
         """Write the variables that expressions read, each after those that it reads."""
         system = self.equations.system
         right_sides = dict(system.variables)
@@ -155,7 +156,7 @@ class EquationCode:
     def describe(self) -> list[str]:
         """Return the equations and the settings of the integration as lines of a comment, in ASCII."""
         given, own = self.equations, self.identifiers
-        symbols: dict[str, OdeExpression] = {name: Symbol(text) for name, text in own.items()}
+        symbols: dict[str, Expression] = {name: Symbol(text) for name, text in own.items()}
         system, core = given.system, given.core
         renamed = [(own[name], substitute(right, symbols)) for name, right in system.derivatives]
         lines = [f"Extended simulation: {system.name}, {quote_name(given.output)} from"]
@@ -228,22 +229,23 @@ def _to_ascii(text: str) -> str:
     return re.sub(r"[^ -~]", lambda found: f"\\u{ord(found[0]):04x}", plain)
 
 
-def _find_signals(expression: OdeExpression, names: set[str]) -> Iterator[OdeExpression]:
+def _find_signals(expression: Expression, names: set[str]) -> Iterator[Expression]:
     match expression:
         case Symbol(name) if name in names:
             yield expression
-        case Operation(function, _) if function in SIGNAL_FUNCTIONS:
+        case Apply(primitive, _) if primitive in SIGNAL_FUNCTIONS:
             yield expression
-        case Operation(_, arguments):
+        case Apply(_, arguments):
             for argument in arguments:
                 yield from _find_signals(argument, names)
 
 
-def _name_signals(expression: OdeExpression) -> OdeExpression:
+def _name_signals(expression: Expression) -> Expression:
     """Return an expression in which rates and delays are names."""
-    match expression:
-        case Operation(function, _) if function in SIGNAL_FUNCTIONS:
-            return Symbol(render(expression))
-        case Operation(function, arguments):
-            return Operation(function, tuple(map(_name_signals, arguments)))
-    return expression
+
+    def find(part: Expression) -> Symbol | None:
+        return (
+            Symbol(render(part)) if isinstance(part, Apply) and part.primitive in SIGNAL_FUNCTIONS else None
+        )
+
+    return replace(expression, find)

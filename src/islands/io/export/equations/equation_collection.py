@@ -20,6 +20,8 @@ from islands.discrepancy.simulators.ode_effects import (
     parse_law,
 )
 from islands.errors import ModelError
+from islands.expressions.primitives import EQUATION_FUNCTIONS, NEG
+from islands.expressions.tree import Apply, Constant, Expression, Primitive, Symbol, substitute
 from islands.io.export.equations.extended_equations import (
     ExtendedEquations,
     NamedValue,
@@ -33,7 +35,6 @@ from islands.io.export.equations.sampled_core import read_core, read_output_syst
 from islands.io.simulator_spec.document import read_scales
 from islands.io.simulator_spec.spec_base import EffectSpec
 from islands.io.simulator_spec.specification import ExtendedSpec
-from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol, substitute
 from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.system_parts import OdeEffect
 
@@ -75,9 +76,9 @@ class _Collection:
     columns: dict[str, str] = field(default_factory=dict)
     terms: list[OdeEffect] = field(default_factory=list)
     clips: set[str] = field(default_factory=set)
-    laws: list[tuple[str, Mapping[str, OdeExpression], ForceLaw]] = field(default_factory=list)
-    characteristic: OdeExpression | None = None
-    gain: OdeExpression | None = None
+    laws: list[tuple[str, Mapping[str, Expression], ForceLaw]] = field(default_factory=list)
+    characteristic: Expression | None = None
+    gain: Expression | None = None
 
     def collect(self) -> ExtendedEquations:
         core, system = self.levels[-1], self.system
@@ -155,13 +156,13 @@ class _Collection:
 
     def _name_values(
         self, given: EffectSpec, effect: Effect | None, context: SimulationContext
-    ) -> dict[str, OdeExpression]:
+    ) -> dict[str, Expression]:
         """Give names to the values of an effect; return what is written for ``n0``, ``n1``, ..."""
         names = list(given.parameters)
         # The parameter of an effect of a channel has a unit of that channel, which the document has not.
         if effect is not None and len(names) > 1:
             names = [each.name for each in effect.parameters(context)]
-        symbols: dict[str, OdeExpression] = {}
+        symbols: dict[str, Expression] = {}
         for index, name in enumerate(names):
             if name not in given.parameters:
                 raise ModelError(f"effect {given.name} has no value for {name}: diagnose again")
@@ -172,7 +173,7 @@ class _Collection:
         return symbols
 
     def _make_map(
-        self, effect: Effect, symbols: Mapping[str, OdeExpression], context: SimulationContext
+        self, effect: Effect, symbols: Mapping[str, Expression], context: SimulationContext
     ) -> SignalMap:
         if effect.equation is None:
             raise refuse(f"the effect {effect.name}")
@@ -208,7 +209,7 @@ class _Collection:
         self.columns[name] = column
         return name
 
-    def _add_law(self, effect: Effect, given: EffectSpec, symbols: dict[str, OdeExpression]) -> None:
+    def _add_law(self, effect: Effect, given: EffectSpec, symbols: dict[str, Expression]) -> None:
         law = effect.form
         assert isinstance(law, ForceLaw)
         if not is_term(law) or (self.system.force is None and self.core is None):
@@ -217,7 +218,7 @@ class _Collection:
         times = core.times
         context = read_scales(core.scales, np.zeros(2), core.scales.dt / times, ("", ""))
         constants = {
-            f"n{len(symbols) + index}": Number(float(value))
+            f"n{len(symbols) + index}": Constant(float(value))
             for index, value in enumerate(law.constants(context))
         }
         state = f"{effect.name} {LAW_STATE}"
@@ -233,26 +234,26 @@ class _Collection:
             del self.values[initial.name]
         self.laws.append((effect.name, {**symbols, **constants, LAW_STATE: Symbol(state)}, law))
 
-    def _make_force(self, name: str, symbols: Mapping[str, OdeExpression], law: ForceLaw) -> OutputForce:
+    def _make_force(self, name: str, symbols: Mapping[str, Expression], law: ForceLaw) -> OutputForce:
         force = substitute(parse_law(law.equation), symbols)
         if law.is_dissipative and self.levels[-1].scales.frame.sense < 0.0:
-            force = Operation("neg", (force,))
+            force = Apply(NEG, (force,))
         if not law.state_equation:
             return OutputForce(name, force)
         state = symbols[LAW_STATE]
         assert isinstance(state, Symbol)
         return OutputForce(name, force, state.name, substitute(parse_law(law.state_equation), symbols))
 
-    def _add_gain(self, effect: Effect, symbols: Mapping[str, OdeExpression]) -> None:
+    def _add_gain(self, effect: Effect, symbols: Mapping[str, Expression]) -> None:
         core = self.levels[-1]
         context = read_scales(core.scales, np.zeros(2), core.scales.dt / core.times, ("", ""))
         assert effect.equation is not None
         written = parse_law(effect.equation(context).equation)
         match written:
-            case Operation("mul", (Symbol("x"), factor)) if self.gain is None:
+            case Apply(Primitive("mul"), (Symbol("x"), factor)) if self.gain is None:
                 self.gain = substitute(factor, symbols)
             case _:
-                self.gain = substitute(written, {**symbols, "x": self.gain or Number(1.0)})
+                self.gain = substitute(written, {**symbols, "x": self.gain or Constant(1.0)})
 
     def _add_term(self, given: EffectSpec) -> None:
         listed = {each.name: each for each in list_terms(self.system)}
@@ -267,18 +268,18 @@ class _Collection:
         limits = {}
         for state in self.system.states:
             label = f"state-clip:{state.name}"
-            lower: OdeExpression | None = None if isinf(state.lower) else Number(state.lower)
-            upper: OdeExpression | None = None if isinf(state.upper) else Number(state.upper)
-            caught: OdeExpression | None = None
+            lower: Expression | None = None if isinf(state.lower) else Constant(state.lower)
+            upper: Expression | None = None if isinf(state.upper) else Constant(state.upper)
+            caught: Expression | None = None
             if label in self.clips:
                 level = Symbol(label)
                 upper = _choose("min", upper, level)
-                lower = _choose("max", lower, Operation("neg", (level,)))
+                lower = _choose("max", lower, Apply(NEG, (level,)))
                 caught = Symbol(f"{label} caught") if f"{label} caught" in self.values else None
             if (lower, upper) != (None, None):
                 limits[state.name] = StateLimit(lower, upper, state.spills_into if caught else "", caught)
         return limits
 
 
-def _choose(function: str, given: OdeExpression | None, other: OdeExpression) -> OdeExpression:
-    return other if given is None else Operation(function, (given, other))
+def _choose(function: str, given: Expression | None, other: Expression) -> Expression:
+    return other if given is None else Apply(EQUATION_FUNCTIONS[function], (given, other))

@@ -7,8 +7,8 @@ and the equations of maps.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from islands.expressions.tree import Expression
 from islands.model.model import Model
-from islands.systems.ode.ode_expression import OdeExpression
 from islands.systems.ode.ode_system import OdeSystem
 
 
@@ -36,8 +36,8 @@ class SignalMap:
 
     effect: str
     summary: str
-    equation: OdeExpression
-    operators: tuple[tuple[str, tuple[OdeExpression, ...]], ...]
+    equation: Expression
+    operators: tuple[tuple[str, tuple[Expression, ...]], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,19 +56,19 @@ class OutputForce:
     """
 
     effect: str
-    force: OdeExpression
+    force: Expression
     state: str = ""
-    slope: OdeExpression | None = None
+    slope: Expression | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class StateLimit:
     """Limits of a state; None for none. ``caught`` of what the upper one cuts off goes to ``receiver``."""
 
-    lower: OdeExpression | None
-    upper: OdeExpression | None
+    lower: Expression | None
+    upper: Expression | None
     receiver: str = ""
-    caught: OdeExpression | None = None
+    caught: Expression | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +97,9 @@ class SampledCore:
     """
 
     summary: str
-    before: tuple[tuple[str, OdeExpression], ...] = ()
-    output: OdeExpression | None = None
-    after: tuple[tuple[str, OdeExpression], ...] = ()
+    before: tuple[tuple[str, Expression], ...] = ()
+    output: Expression | None = None
+    after: tuple[tuple[str, Expression], ...] = ()
     delay: int = 0
     model: Model | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -162,9 +162,9 @@ class ExtendedEquations:
     limits: Mapping[str, StateLimit] = field(default_factory=dict)
     input_maps: tuple[SignalMap, ...] = ()
     output_maps: tuple[SignalMap, ...] = ()
-    characteristic: OdeExpression | None = None
+    characteristic: Expression | None = None
     forces: tuple[OutputForce, ...] = ()
-    gain: OdeExpression | None = None
+    gain: Expression | None = None
     gain_signal: str = ""
     effects: tuple[str, ...] = ()
     core: SampledCore | None = None

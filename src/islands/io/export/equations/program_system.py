@@ -5,10 +5,11 @@ from dataclasses import replace
 from islands.data.channel_names import parse_channel_name
 from islands.discrepancy.simulators.ode_preparation import fill_units
 from islands.errors import ModelError
+from islands.expressions.primitives import ADD, SUB
+from islands.expressions.tree import Apply, Constant, Expression, Symbol
 from islands.io.simulator_spec.ode_spec import OdeSpec, read_built_in
 from islands.io.simulator_spec.specification import SIMULATORS, ExtendedSpec, PhysicalSpec
 from islands.systems.ode.equation_parser import FORCE
-from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol
 from islands.systems.ode.ode_system import OdeSystem
 
 
@@ -47,15 +48,15 @@ def read_system(spec: ExtendedSpec) -> OdeSystem:
 def drop_force(system: OdeSystem) -> OdeSystem:
     """Return a system without the sum of forces where no law contributes to it."""
 
-    def drop(expression: OdeExpression) -> OdeExpression:
+    def drop(expression: Expression) -> Expression:
         match expression:
             case Symbol(name) if name == FORCE:
-                return Number(0.0)
-            case Operation(function, arguments):
+                return Constant(0.0)
+            case Apply(primitive, arguments):
                 first, *others = (drop(each) for each in arguments)
-                if function in ("add", "sub") and others == [Number(0.0)] and arguments[1] == Symbol(FORCE):
+                if primitive in (ADD, SUB) and others == [Constant(0.0)] and arguments[1] == Symbol(FORCE):
                     return first
-                return Operation(function, (first, *others))
+                return Apply(primitive, (first, *others))
         return expression
 
     return replace(

@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from islands.discrepancy.simulators.linear import LinearSimulator
+from islands.expressions.primitives import ADD, MUL, SUB
+from islands.expressions.tree import Apply, Constant, Expression, Symbol
 from islands.io.export.equations.extended_equations import NamedValue, SampledCore
 from islands.io.export.equations.program_system import refuse
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.specification import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
 from islands.model.equations import equation
 from islands.model.model import measured_model
-from islands.systems.ode.ode_expression import Number, OdeExpression, Operation, Symbol
 from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.output_system import INPUT, SIMULATED, make_output_system
 
@@ -70,18 +71,18 @@ def _make_filter(spec: LinearSpec) -> SampledCore:
         "level": spec.level,
         "reference": spec.reference_input,
     }
-    x, y = Operation("sub", (Symbol("x"), _name("reference"))), Symbol("y")
+    x, y = Apply(SUB, (Symbol("x"), _name("reference"))), Symbol("y")
     memory = [f"z{place}" for place in range(1, spec.order + 1)]
-    at_rest = map(Number, linear.state_at_rest.tolist())
+    at_rest = map(Constant, linear.state_at_rest.tolist())
     after = []
     for lag, name in enumerate(memory, start=1):
-        fed = _add(_multiply(f"b{lag}", x), _multiply(f"a{lag}", Operation("sub", (y, _name("level")))))
+        fed = _add(_multiply(f"b{lag}", x), _multiply(f"a{lag}", Apply(SUB, (y, _name("level")))))
         after.append((name, fed if lag == spec.order else _add(fed, Symbol(memory[lag]))))
     through = _multiply("b0", x)
     return SampledCore(
         f"linear filter of order {spec.order}; the input acts {spec.delay} samples late",
         before=tuple(
-            (name, _add(_name(f"state {place}"), Operation("mul", (each, x))))
+            (name, _add(_name(f"state {place}"), Apply(MUL, (each, x))))
             for place, (name, each) in enumerate(zip(memory, at_rest, strict=True), start=1)
         ),
         output=_add(_name("level"), _add(through, Symbol(memory[0])) if memory else through),
@@ -96,9 +97,9 @@ def _name(name: str) -> Symbol:
     return Symbol(f"linear {name}")
 
 
-def _multiply(name: str, factor: OdeExpression) -> OdeExpression:
-    return Operation("mul", (_name(name), factor))
+def _multiply(name: str, factor: Expression) -> Expression:
+    return Apply(MUL, (_name(name), factor))
 
 
-def _add(first: OdeExpression, second: OdeExpression) -> OdeExpression:
-    return Operation("add", (first, second))
+def _add(first: Expression, second: Expression) -> Expression:
+    return Apply(ADD, (first, second))

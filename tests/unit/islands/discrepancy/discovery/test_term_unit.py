@@ -3,7 +3,7 @@
 import pytest
 
 from islands.discrepancy.discovery.term_unit import divide_units, find_expression_unit, find_factor_unit
-from islands.systems.ode.equation_parser import parse_expression
+from islands.expressions.parsing import parse_expression
 
 UNITS = {"x": "m", "v": "m/s", "u": "N", "w": "N s/m", "t": "s", "p": "1", "unknown": "", "q": "m/(s K)"}
 

@@ -15,9 +15,9 @@ from islands.discrepancy.effects.timing import RESONANCE
 from islands.discrepancy.interfaces.effect import Effect, SimulationContext, Site
 from islands.discrepancy.interfaces.map_equation import OPERATORS
 from islands.discrepancy.interfaces.segments import is_resting
+from islands.expressions.evaluation import evaluate
+from islands.expressions.parsing import parse_expression
 from islands.systems.memory_operators import lag_unevenly, limit_rate, play_from, slider
-from islands.systems.ode.equation_parser import parse_expression
-from islands.systems.ode.ode_expression import evaluate
 
 Array = NDArray[np.float64]
 

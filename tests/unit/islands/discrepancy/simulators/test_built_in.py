@@ -16,12 +16,12 @@ from islands.discrepancy.simulators.intersample import InterSample, ResampledSim
 from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.ode_preparation import make_ode_simulator
 from islands.errors import ModelError
+from islands.expressions.tree import Symbol
 from islands.io.simulator_spec.document import describe_extension
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.io.simulator_spec.specification import SIMULATORS, LocalExtendedSpec, PhysicalSpec
 from islands.systems.bouc_wen import BoucWenPiezo
 from islands.systems.bouc_wen import simulate as simulate_piezo
-from islands.systems.ode.ode_expression import Symbol
 from islands.systems.ode.system_parts import OdeEffect
 from support.built_in_simulators import make_oscillator, make_piezo, make_tanks
 from support.simulated_records import made, recorded, simulate_oscillator, wave

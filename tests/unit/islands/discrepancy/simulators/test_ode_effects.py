@@ -9,10 +9,10 @@ from islands.discrepancy.calibration.preparation import make_context
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.expressions.evaluation import evaluate
+from islands.expressions.parsing import parse_expression
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import PhysicalSpec
-from islands.systems.ode.equation_parser import parse_expression
-from islands.systems.ode.ode_expression import evaluate
 from support.simulated_records import recorded, wave
 
 LAWS = [

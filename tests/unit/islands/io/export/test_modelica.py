@@ -8,8 +8,8 @@ import pytest
 
 import islands
 from islands.errors import ModelError
+from islands.expressions.evaluation import value
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import value
 from islands.expressions.user_primitive import primitive
 from islands.io.export import export
 from islands.io.export.coupled import export_coupled

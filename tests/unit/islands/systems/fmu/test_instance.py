@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.errors import ModelError
+from islands.expressions.tree import FMU, Apply, Symbol
 from islands.io.export.fmu.compiler import find_compiler
 from islands.systems.fmu.fmi_description import FmiInterface, read_description
 from islands.systems.fmu.instance import FmuInstance, FmuRun, load_fmu
@@ -18,7 +19,6 @@ from islands.systems.fmu.model import FmuParameterChoice, choose_variables
 from islands.systems.fmu.simulation import simulate_fmu
 from islands.systems.fmu.system import make_fmu_system
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_expression import FMU, Operation, Symbol
 from islands.systems.ode.ode_program import generate_program
 from islands.systems.ode.sampled_signal import interpolate_linearly
 from support.oscillator_fmus import write_oscillator
@@ -43,7 +43,7 @@ def run(
     """Simulate x and v."""
     chosen = {name: FmuParameterChoice(value, fixed=True) for name, value in values.items()}
     model = choose_variables(fmu.description, parameters=chosen)
-    computed = [Operation(FMU, (Symbol(name),)) for name in ("x", "v")]
+    computed = [Apply(FMU, (Symbol(name),)) for name in ("x", "v")]
     is_exchange = fmu.description.interface == FmiInterface.MODEL_EXCHANGE
     program = generate_program(
         make_fmu_system(model), (Symbol("x"), Symbol("v")) if is_exchange else tuple(computed)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from islands.expressions.evaluation import evaluate
+from islands.expressions.tree import Symbol
 from islands.systems.ode.lane_simulation import simulate_lanes
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_expression import Symbol, evaluate
 from islands.systems.ode.ode_program import generate_program
 from islands.systems.ode.ode_system import OdeSystem, sort_variables
 from islands.systems.ode.sampled_signal import SampledSignal, interpolate_linearly, make_time

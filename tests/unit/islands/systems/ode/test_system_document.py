@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from islands.errors import ModelError
-from islands.systems.ode.ode_expression import render
+from islands.expressions.printing import render
 from islands.systems.ode.system_document import describe_system, make_system, render_equations
 from islands.systems.ode.system_parts import OdeParameter
 

@@ -3,6 +3,8 @@
 import re
 
 from islands.discrepancy.interfaces.segments import MAX_RANGE_AT_REST
+from islands.expressions.printing import render
+from islands.expressions.tree import Symbol
 from islands.io.export.equations.c.c_core import write_c_core
 from islands.io.export.equations.c.c_operators import C_OPERATORS
 from islands.io.export.equations.c.c_signals import find_unused, write_signals
@@ -25,7 +27,6 @@ from islands.io.export.equations.c.c_templates import (
 from islands.io.export.equations.equation_code import EquationCode, make_step
 from islands.io.export.equations.equation_collection import CHANNEL_OPERATORS
 from islands.io.export.equations.extended_equations import ExtendedEquations, SignalMap
-from islands.systems.ode.ode_expression import Symbol, render
 from islands.systems.ode.output_system import SIMULATED
 
 

@@ -5,10 +5,11 @@ import textwrap
 from collections.abc import Sequence
 
 from islands.discrepancy.simulators.intersample import REACH, design_low_pass
+from islands.expressions.printing import render
+from islands.expressions.tree import RATE, Apply, Expression, Symbol
 from islands.io.export.equations.equation_code import EquationCode
 from islands.io.export.equations.extended_equations import ExtendedEquations
 from islands.systems.ode.equation_parser import TIME
-from islands.systems.ode.ode_expression import OdeExpression, Operation, Symbol, render
 
 _INTERPOLATE = """\
 /* Return a signal that is linear between its samples, a part of a step after the start of the step. */
@@ -197,7 +198,7 @@ def write_signals(given: ExtendedEquations, code: EquationCode) -> str:
     unused = find_unused(lines, "p", "r", "step", "part")
     signals = _SIGNALS.format(lines="\n    ".join([*unused, *lines]))
     pointed = "".join(section for name, section in _POINTED if f" {name}" in signals)
-    sources = {each.arguments[0] for each in code.signals if isinstance(each, Operation)}
+    sources = {each.arguments[0] for each in code.signals if isinstance(each, Apply)}
     read = [name for name in given.columns if Symbol(name) in {*code.signals, *sources}]
     if given.forces and given.system.input not in read:
         read.insert(0, given.system.input)
@@ -233,14 +234,14 @@ def _write_reader(name: str, given: ExtendedEquations, code: EquationCode) -> st
     return _READER.format(name=code.identifiers[name], lines="\n    ".join(lines))
 
 
-def _write_signal(source: OdeExpression, given: ExtendedEquations, code: EquationCode) -> str:
+def _write_signal(source: Expression, given: ExtendedEquations, code: EquationCode) -> str:
     assert isinstance(source, Symbol)
     value = _write_value(source, given, code)
     unused = "".join(f"{each}\n    " for each in find_unused([value], "p"))
     return _SIGNAL.format(name=code.identifiers[source.name], unused=unused, value=value)
 
 
-def _write_value(signal: OdeExpression, given: ExtendedEquations, code: EquationCode) -> str:
+def _write_value(signal: Expression, given: ExtendedEquations, code: EquationCode) -> str:
     """Write the value of a signal at the part ``part`` of the step ``step``."""
     match signal:
         case Symbol(name) if name == TIME:
@@ -251,12 +252,12 @@ def _write_value(signal: OdeExpression, given: ExtendedEquations, code: Equation
             value = f"read_{code.identifiers[name]}(p, r, step, part)"
             is_multiplied = name == given.system.input and given.gain is not None and not given.gain_signal
             return f"read_gain(p, step/PART_STEPS)*{value}" if is_multiplied else value
-        case Operation(function, (Symbol(name), *others)):
+        case Apply(function, (Symbol(name), *others)):
             is_held = name == given.system.input and given.hold == "zero-order"
             arguments = f"signal_{code.identifiers[name]}, p, r, step"
-            if function == "rate" and given.core is not None:
+            if function == RATE and given.core is not None:
                 return f"find_central_rate({arguments})"
-            if function == "rate":
+            if function == RATE:
                 return f"find_held_rate({arguments})" if is_held else f"find_rate({arguments}, part)"
             tau = code.write(others[0])
             return f"delay_held({arguments}, {tau})" if is_held else f"delay({arguments}, part, {tau})"

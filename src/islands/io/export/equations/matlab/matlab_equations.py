@@ -3,6 +3,7 @@
 import re
 
 from islands.discrepancy.interfaces.segments import MAX_RANGE_AT_REST
+from islands.expressions.tree import Symbol
 from islands.io.export.equations.equation_code import EquationCode, make_step
 from islands.io.export.equations.equation_collection import CHANNEL_OPERATORS
 from islands.io.export.equations.extended_equations import ExtendedEquations, SignalMap
@@ -21,7 +22,6 @@ from islands.io.export.equations.matlab.matlab_templates import (
     MOVE,
     SAMPLED_LOOP,
 )
-from islands.systems.ode.ode_expression import Symbol
 from islands.systems.ode.output_system import SIMULATED
 
 #: Functions that are complex outside the domain of real numbers.

@@ -1,10 +1,11 @@
 """Signals between the samples in MATLAB: the input, its gain, channels, their rates and delays."""
 
 from islands.discrepancy.simulators.intersample import REACH, design_low_pass
+from islands.expressions.printing import render
+from islands.expressions.tree import RATE, Apply, Expression, Symbol
 from islands.io.export.equations.equation_code import EquationCode
 from islands.io.export.equations.extended_equations import ExtendedEquations
 from islands.systems.ode.equation_parser import TIME
-from islands.systems.ode.ode_expression import OdeExpression, Operation, Symbol, render
 
 _INTERPOLATE = """\
 function value = interpolate(x, step, part, c)
@@ -191,7 +192,7 @@ def _write_reader(name: str, given: ExtendedEquations, code: EquationCode) -> st
     return _READER.format(name=code.identifiers[name], lines="\n  ".join(lines))
 
 
-def _write_value(signal: OdeExpression, given: ExtendedEquations, code: EquationCode) -> str:
+def _write_value(signal: Expression, given: ExtendedEquations, code: EquationCode) -> str:
     """Write the value of a signal at the part ``part`` of the step ``step``."""
     match signal:
         case Symbol(name) if name == TIME:
@@ -202,12 +203,12 @@ def _write_value(signal: OdeExpression, given: ExtendedEquations, code: Equation
             value = f"read_{code.identifiers[name]}(p, r, step, part, c)"
             is_multiplied = name == given.system.input and given.gain is not None and not given.gain_signal
             return f"read_gain(p, floor(step/c.part_steps), c)*{value}" if is_multiplied else value
-        case Operation(function, (Symbol(name) as source, *others)):
+        case Apply(function, (Symbol(name) as source, *others)):
             read = f"@(step, part) {_write_value(source, given, code)}"
             is_held = name == given.system.input and given.hold == "zero-order"
-            if function == "rate" and given.core is not None:
+            if function == RATE and given.core is not None:
                 return f"find_central_rate({read}, r, step, c)"
-            if function == "rate":
+            if function == RATE:
                 return (
                     f"find_held_rate({read}, r, step, c)" if is_held else f"find_rate({read}, step, part, c)"
                 )

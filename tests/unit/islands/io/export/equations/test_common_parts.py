@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from islands.expressions.evaluation import evaluate
+from islands.expressions.parsing import parse_expression
+from islands.expressions.printing import render
 from islands.io.export.equations.common_parts import take_common_parts
 from islands.systems.curve import VALUES, write_curve
-from islands.systems.ode.equation_parser import parse_expression
-from islands.systems.ode.ode_expression import evaluate, render
 
 
 def test_a_part_that_occurs_twice_is_computed_once():
