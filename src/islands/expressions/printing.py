@@ -184,13 +184,12 @@ class _ModelPrinter(Printer):
         self._has_one_input = has_one_input
 
     def name(self, channel: int) -> str:
-        """Return the name of a channel."""
         if channel == 0:
             return "y"
         return "u" if self._has_one_input and channel == 1 else f"u{channel}"
 
 
-class PlainPrinter(_ModelPrinter):
+class _PlainPrinter(_ModelPrinter):
     """Printer of a model as plain text."""
 
     operators: Mapping[str, Operator] = {
@@ -201,15 +200,12 @@ class PlainPrinter(_ModelPrinter):
     }
 
     def signal(self, channel: int, lag: int) -> str:
-        """Write a lagged signal, ``u2(k-1)``."""
         return f"{self.name(channel)}(k-{lag})" if lag else f"{self.name(channel)}(k)"
 
     def shift(self, samples: int, argument: Expression) -> tuple[str, int]:
-        """Write a back-shift, ``q2(...)``."""
         return f"q{samples}({self.write(argument)})", ATOM
 
     def join(self, operator: Operator, arguments: Sequence[Expression]) -> str:
-        """Write an operator between its operands; equal factors as a power."""
         if operator.own != PRODUCT:
             return operator.text.join(self._write_part(each, operator, 1) for each in arguments)
         return operator.text.join(
@@ -239,7 +235,7 @@ def _powers(factors: Sequence[Expression]) -> Iterator[tuple[Expression, int]]:
             left -= min(left, LARGEST_POWER)
 
 
-class LatexPrinter(_ModelPrinter):
+class _LatexPrinter(_ModelPrinter):
     """Printer of a model as LaTeX without dollar signs."""
 
     operators: Mapping[str, Operator] = {
@@ -250,21 +246,17 @@ class LatexPrinter(_ModelPrinter):
     brackets = r"\left({}\right)"
 
     def signal(self, channel: int, lag: int) -> str:
-        """Write a lagged signal, ``u_{2,k-1}``."""
         name = self.name(channel)
         index = f"{name[1:]}," if len(name) > 1 else ""
         return f"{name[0]}_{{{index}k{f'-{lag}' if lag else ''}}}"
 
     def number(self, number: float) -> str:
-        r"""Write a constant, ``2 \times 10^{-5}``."""
         return latex_number(_digits(number))
 
     def shift(self, samples: int, argument: Expression) -> tuple[str, int]:
-        """Write a back-shift, ``q^{-2} ...``."""
         return f"q^{{-{samples}}} {self.write_operand(argument, ATOM)}", PRODUCT
 
     def join(self, operator: Operator, arguments: Sequence[Expression]) -> str:
-        """Write an operator between its operands; equal factors as a power."""
         if operator.own != PRODUCT:
             return super().join(operator, arguments)
         parts: list[str] = []
@@ -282,7 +274,6 @@ class LatexPrinter(_ModelPrinter):
         return operator.text.join(parts)
 
     def call(self, primitive: Primitive, arguments: Sequence[str]) -> str:
-        """Write a function by its format string."""
         return primitive.latex.format(*arguments)
 
 
@@ -306,7 +297,7 @@ _MATHML = {
 }
 
 
-class MathmlPrinter(_ModelPrinter):
+class _MathmlPrinter(_ModelPrinter):
     """Printer of a model as presentation MathML in ASCII; each expression is one element."""
 
     operators: Mapping[str, Operator] = {
@@ -317,23 +308,19 @@ class MathmlPrinter(_ModelPrinter):
     brackets = "<mrow><mo>(</mo>{}<mo>)</mo></mrow>"
 
     def signal(self, channel: int, lag: int) -> str:
-        """Write a lagged signal."""
         name = self.name(channel)
         index = f"<mn>{name[1:]}</mn><mo>,</mo>" if len(name) > 1 else ""
         past = f"{MINUS}<mn>{lag}</mn>" if lag else ""
         return f"<msub><mi>{name[0]}</mi><mrow>{index}<mi>k</mi>{past}</mrow></msub>"
 
     def number(self, number: float) -> str:
-        """Write a constant."""
         return mathml_number(_digits(number))
 
     def shift(self, samples: int, argument: Expression) -> tuple[str, int]:
-        """Write a back-shift."""
         shift = f"<msup><mi>q</mi><mrow>{MINUS}<mn>{samples}</mn></mrow></msup>"
         return f"<mrow>{shift}{TIMES}{self.write_operand(argument, ATOM)}</mrow>", PRODUCT
 
     def join(self, operator: Operator, arguments: Sequence[Expression]) -> str:
-        """Write an operator between its operands; equal factors as a power."""
         if operator.own != PRODUCT:
             return f"<mrow>{super().join(operator, arguments)}</mrow>"
         parts: list[str] = []
@@ -349,7 +336,6 @@ class MathmlPrinter(_ModelPrinter):
         return f"<mrow>{operator.text.join(parts)}</mrow>"
 
     def call(self, primitive: Primitive, arguments: Sequence[str]) -> str:
-        """Write a function by its format string or its name."""
         if primitive.name == "abs":
             return _ABSOLUTE.format(*arguments)
         if primitive.name in _MATHML:
@@ -399,12 +385,12 @@ def program_text(
 
 def plain(expression: Expression, inputs: int = 1) -> str:
     """Write an expression as plain text that `parse` converts back to the same expression."""
-    return _make_printer(PlainPrinter, inputs == 1).write(expression)
+    return _make_printer(_PlainPrinter, inputs == 1).write(expression)
 
 
 def plain_factor(expression: Expression, inputs: int) -> str:
     """Write an expression as a factor of a product, in brackets if necessary."""
-    return _make_printer(PlainPrinter, inputs == 1).write_operand(expression, PRODUCT)
+    return _make_printer(_PlainPrinter, inputs == 1).write_operand(expression, PRODUCT)
 
 
 def at_rest(expression: Expression, inputs: int = 1) -> str:
@@ -414,22 +400,22 @@ def at_rest(expression: Expression, inputs: int = 1) -> str:
 
 def latex(expression: Expression, inputs: int = 1) -> str:
     """Write an expression in LaTeX without dollar signs."""
-    return _make_printer(LatexPrinter, inputs == 1).write(expression)
+    return _make_printer(_LatexPrinter, inputs == 1).write(expression)
 
 
 def latex_factor(expression: Expression, inputs: int) -> str:
     """Write an expression in LaTeX as a factor of a product, in brackets if necessary."""
-    return _make_printer(LatexPrinter, inputs == 1).write_operand(expression, PRODUCT)
+    return _make_printer(_LatexPrinter, inputs == 1).write_operand(expression, PRODUCT)
 
 
 def mathml(expression: Expression, inputs: int = 1) -> str:
     """Write an expression as one element of presentation MathML, in ASCII."""
-    return _make_printer(MathmlPrinter, inputs == 1).write(expression)
+    return _make_printer(_MathmlPrinter, inputs == 1).write(expression)
 
 
 def mathml_factor(expression: Expression, inputs: int) -> str:
     """Write an expression in MathML as a factor of a product, in brackets if necessary."""
-    return _make_printer(MathmlPrinter, inputs == 1).write_operand(expression, PRODUCT)
+    return _make_printer(_MathmlPrinter, inputs == 1).write_operand(expression, PRODUCT)
 
 
 def _digits(number: float) -> str:

@@ -6,7 +6,7 @@ from islands.errors import ModelError
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import MUL
-from islands.expressions.tree import Apply, Constant
+from islands.expressions.tree import Apply, Constant, Symbol
 
 
 def test_value_of_an_expression_matches_a_hand_calculation():
@@ -18,6 +18,7 @@ def test_value_of_an_expression_matches_a_hand_calculation():
     assert value(Apply(MUL, (Constant(2.0),) * 10), signal) == 1024.0
 
 
-def test_value_of_an_unknown_node_is_refused():
-    with pytest.raises(ModelError, match="'u' is not an expression: use Lagged, Constant, Shift or Apply"):
-        value("u", lambda *_: 0.0)
+@pytest.mark.parametrize("node", ["u", Symbol("u")])
+def test_value_of_a_node_without_a_lag_is_refused(node):
+    with pytest.raises(ModelError, match=r"'u'.* is not an expression: use Lagged, Constant, Shift or Apply"):
+        value(node, lambda *_: 0.0)
