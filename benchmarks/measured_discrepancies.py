@@ -183,7 +183,7 @@ def errors(case: Case, record: islands.Dataset, found) -> dict[str, list[float]]
     return rows
 
 
-def probes(case: Case, found: islands.Diagnosis, clean: int, injected: int) -> dict:
+def probes(case: Case, found: islands.DiagnosisResult, clean: int, injected: int) -> dict:
     """Return the diagnoses of surrogates of a record, without and with an injected effect.
 
     Effects are injected in random order, with a misfit of one to four standard deviations of the residual of

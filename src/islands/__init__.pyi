@@ -6,7 +6,6 @@ from islands.data.preprocessing import preprocess as preprocess
 from islands.data.split import Split as Split
 from islands.data.split import split as split
 from islands.discrepancy.detectability import self_test as self_test
-from islands.discrepancy.diagnosis_result import Diagnosis as Diagnosis
 from islands.discrepancy.effects import EFFECTS as EFFECTS
 from islands.discrepancy.interfaces.context import Parameter as Parameter
 from islands.discrepancy.interfaces.effect import Effect as Effect
@@ -38,6 +37,7 @@ from islands.facade.inspect_record import inspect_record as inspect_record
 from islands.facade.load import load as load
 from islands.facade.record_monitor import create_monitor as create_monitor
 from islands.facade.record_monitor import monitor_record as monitor_record
+from islands.facade.results.complete_diagnosis import DiagnosisResult as DiagnosisResult
 from islands.facade.results.fitted_model import FittedModel as FittedModel
 from islands.facade.results.model_analysis import linearise as linearise
 from islands.facade.results.model_simulation import simulate as simulate

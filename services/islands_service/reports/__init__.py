@@ -1,1 +1,1 @@
-"""HTML reports, and the process that renders figures. Read `identification_report` first."""
+"""The process that renders figures of jobs."""

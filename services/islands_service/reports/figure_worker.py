@@ -26,12 +26,12 @@ from islands.io.checkpoints import history_from_document
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import model_from_json
 from islands.io.result_models import read_shooting_interval
+from islands.reports.identification_report import identification_report
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands_service.domain.job import REPORT, Job
 from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
-from islands_service.reports.identification_report import identification_report
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.store.backends.cached_blobs import open_blobs

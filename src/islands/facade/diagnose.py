@@ -8,7 +8,6 @@ from threadpoolctl import threadpool_limits
 from islands.data.dataset import Dataset
 from islands.data.split import hold_out
 from islands.discrepancy.diagnosis import diagnose as diagnose_simulator
-from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
@@ -17,6 +16,7 @@ from islands.discrepancy.planning.experiment_plan import DecisiveLimits, Experim
 from islands.discrepancy.planning.experiment_plan import plan_experiment as plan_with_simulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.data_frames import as_record
 from islands.io.simulator_spec.factory import make_model_simulator, make_simulator
 from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
@@ -40,7 +40,7 @@ def diagnose(
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
     parallel_map: ParallelMap = map,
-) -> Diagnosis:
+) -> DiagnosisResult:
     """Find which effects explain the difference between a simulation and a record, and how much they explain.
 
     Parameters
@@ -75,6 +75,12 @@ def diagnose(
     parallel_map : ParallelMap
         Function like `map` that calibrates the effects, possibly in parallel. It does not affect the result.
 
+    Returns
+    -------
+    DiagnosisResult
+        Verdict, effects and gain; ``summary`` has them as sentences, ``save`` writes a folder, and
+        ``simulate`` runs the extended simulation on another record.
+
     Raises
     ------
     RecordError
@@ -90,7 +96,8 @@ def diagnose(
     simulator = _as_simulator(simulation, record, columns)
     # The matrices are small: several threads take twice the CPU time.
     with threadpool_limits(1, user_api="blas"):
-        return diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)
+        found = diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)
+    return DiagnosisResult.from_diagnosis(found)
 
 
 def plan_experiment(

@@ -24,12 +24,12 @@ from islands.discrepancy.planning.experiment_plan import plan_experiment
 from islands.errors import SettingsError
 from islands.evolution.progress import Steps, StoppedError
 from islands.facade.explain_residual import FORMULA, explain_residual
-from islands.io.diagnosis_json import as_json, diagnosis_document
+from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, REPORT_FILE, DiagnosisResult
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.result_text.diagnosis_text import summarise_self_test
 from islands.io.result_text.text_layout import wrap
-from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import EXTENDED_FILE, ColumnSpec, innermost, parse_spec
+from islands.io.simulator_spec.specification import ColumnSpec, innermost, parse_spec
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
@@ -46,13 +46,6 @@ from islands_api.cli.runs.plan_run import (
 )
 from islands_api.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands_service.process.process_pool import process_pool
-from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
-
-#: File of the result document.
-RESULT = "discrepancy.json"
-
-#: File of the report.
-REPORT = "report.html"
 
 #: Name of a step without which a diagnosis is complete.
 SELF_TEST = "self-test"
@@ -100,29 +93,13 @@ def diagnose(
         compile_kernels()
         columns_of_input = [options.single_input(options.columns(inputs)), *(channels or [])]
         data = read_input(records or [], columns_of_input, output_column, dt, rows, reading, planning)
-        simulator = make_simulator(parse_spec(simulated), data)
-        with progress("plan") as show, stop_requests() as stop:
-            steps = Steps(show, stop)
-            with process_pool(workers, check=partial(steps.check, "comparison of the causes")) as parallel:
-                plan = plan_experiment(
-                    *(
-                        data,
-                        simulator,
-                        planning.noise_std,
-                        options.tolerances(tolerance or []),
-                        planning.pair,
-                    ),
-                    *(planning.limits, seed, parallel, steps),
-                )
-            show("figure", 1.0)
-            write_plan(plan, out)
-        show_plan(plan, out)
-        stop.end(out, plan.left_out, REPEAT)
+        tolerances = options.tolerances(tolerance or [])
+        _plan(data, simulated, tolerances, planning, out, seed, workers)
         return
     planning.check_unused()
     if not records or output_column is None:
         raise SettingsError("a diagnosis needs a record and --output: give both, or --plan before any data")
-    check_folder(out, force, RESULT)
+    check_folder(out, force, DIAGNOSIS_FILE)
     compile_kernels()
     with progress("diagnose") as show:
         show("reading", 0.0)
@@ -146,16 +123,41 @@ def diagnose(
             limits = None
             if tested and diagnosis.verdict != Verdict.GROSS_ERROR:
                 limits = _run_self_test(diagnosis, simulator, tolerances, seed, workers, steps)
-            show(REPORT, 0.9)
-            write(diagnosis, out, ", ".join(path.name for path in records), wall, limits, formula, steps)
+            show(REPORT_FILE, 0.9)
+            found = DiagnosisResult.from_diagnosis(diagnosis, formula, limits, wall)
+            found.save(out, ", ".join(path.name for path in records), steps)
             if steps.left_out:
                 write_fits(out, fits)
-    for paragraph in summarise(diagnosis, formula).splitlines():
+    for paragraph in found.summary.splitlines():
         output.print("\n".join(wrap(paragraph, "    ")), markup=False)
     if limits is not None:
         output.print(summarise_self_test(limits), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
     stop.end(out, (*diagnosis.left_out, *steps.left_out), explain_continuation(out))
+
+
+def _plan(
+    data: Dataset,
+    simulated: str,
+    tolerances: Mapping[str, float],
+    planning: PlanOptions,
+    out: Path,
+    seed: int,
+    workers: int | None,
+) -> None:
+    """Compare the causes that an experiment can tell apart, write the plan and print it."""
+    simulator = make_simulator(parse_spec(simulated), data)
+    with progress("plan") as show, stop_requests() as stop:
+        steps = Steps(show, stop)
+        with process_pool(workers, check=partial(steps.check, "comparison of the causes")) as parallel:
+            plan = plan_experiment(
+                *(data, simulator, planning.noise_std, tolerances, planning.pair),
+                *(planning.limits, seed, parallel, steps),
+            )
+        show("figure", 1.0)
+        write_plan(plan, out)
+    show_plan(plan, out)
+    stop.end(out, plan.left_out, REPEAT)
 
 
 def _diagnose_until_stopped(
@@ -189,32 +191,6 @@ def _find_formula(diagnosis: Diagnosis, seed: int, steps: Steps) -> ResidualForm
     with suppress(StoppedError):
         return explain_residual(diagnosis, seed, stop=partial(steps.skip, FORMULA))
     return None
-
-
-def write(
-    diagnosis: Diagnosis,
-    folder: Path,
-    name: str,
-    wall_s: float,
-    tested: SelfTest | None = None,
-    formula: ResidualFormula | None = None,
-    steps: Steps | None = None,
-) -> None:
-    """Write a diagnosis into a folder. The document is written last: if it exists, the folder is complete.
-
-    The report is an optional step.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in (folder / EXTENDED_FILE, folder / RESULT, folder / REPORT):
-        path.unlink(missing_ok=True)
-    if steps is None or not steps.skip(REPORT):
-        (folder / REPORT).write_bytes(diagnosis_report(name, diagnosis, tested, formula))
-    if diagnosis.gain is not None:
-        (folder / EXTENDED_FILE).write_text(extended_json(diagnosis.best, diagnosis.record))
-    if steps is not None:
-        diagnosis = replace(diagnosis, left_out=(*diagnosis.left_out, *steps.left_out))
-    document = diagnosis_document(diagnosis, wall_s, tested, formula)
-    (folder / RESULT).write_text(as_json(document))
 
 
 def _run_self_test(

@@ -1,4 +1,4 @@
-"""HTML of a model in a notebook: sentences, the equation and a figure."""
+"""HTML of a result in a notebook: the equation of a model, sentences and a figure."""
 
 from collections.abc import Iterable
 from html import escape
@@ -13,10 +13,17 @@ if TYPE_CHECKING:
 
 def render_html(model: Model, sentences: Iterable[str], figure: "Figure | None" = None) -> str:
     """Return the equation of a model in MathML, sentences as paragraphs, and a figure as an image."""
+    return render_sentences(sentences, figure, "free run and measurement", mathml_equation(model))
+
+
+def render_sentences(
+    sentences: Iterable[str], figure: "Figure | None", alternative: str, heading: str = ""
+) -> str:
+    """Return HTML, sentences as paragraphs, and a figure as an image with an alternative text."""
     paragraphs = "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
     image = ""
     if figure is not None:
         from islands.figures.style import image_html  # noqa: PLC0415 - matplotlib takes half a second
 
-        image = image_html(figure, "free run and measurement")
-    return f"<div>{mathml_equation(model)}{paragraphs}{image}</div>"
+        image = image_html(figure, alternative)
+    return f"<div>{heading}{paragraphs}{image}</div>"

@@ -38,7 +38,7 @@ ESSENTIAL = (("exponential-creep", 50.0), ("exponential-creep", 0.0))
 
 
 @pytest.fixture(scope="module")
-def crept() -> islands.Diagnosis:
+def crept() -> islands.DiagnosisResult:
     """Diagnosis of a creep test with a free gain."""
     return islands.diagnose(rest(50.0, CREEP), islands.function_simulator(static))
 
@@ -69,7 +69,7 @@ def test_resting_output_without_motion_has_no_discrepancy() -> None:
 
 
 @pytest.mark.ci
-def test_effects_that_are_offsets_at_rest_are_not_searched_for(crept: islands.Diagnosis) -> None:
+def test_effects_that_are_offsets_at_rest_are_not_searched_for(crept: islands.DiagnosisResult) -> None:
     assert {each.name for each in crept.candidates} >= {"exponential-creep", "linear-drift", "jump"}
     assert not {each.name for each in crept.candidates} & {"even-nonlinearity", "backlash", "gain-step"}
 
@@ -89,7 +89,7 @@ def test_extended_simulation_of_a_creep_test_repeats_the_creep() -> None:
 
 
 @pytest.mark.ci
-def test_figures_show_a_resting_record(crept: islands.Diagnosis) -> None:
+def test_figures_show_a_resting_record(crept: islands.DiagnosisResult) -> None:
     assert all(draw(crept).axes for draw in DISCREPANCY_FIGURES.values())
 
 

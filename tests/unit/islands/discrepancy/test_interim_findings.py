@@ -24,7 +24,7 @@ from islands.discrepancy.interim_findings import (
 )
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.io.diagnosis_json import as_json, diagnosis_document
-from islands_service.reports.diagnosis_report import summarise
+from islands.io.result_text.diagnosis_text import summarise_diagnosis
 from support.simulated_records import recorded, wave
 
 pytestmark = pytest.mark.ci
@@ -100,6 +100,6 @@ def test_document_and_summary_state_what_was_left_out(stopped: list[Diagnosis]) 
     for each in stopped:
         assert as_json(diagnosis_document(each))
         assert diagnosis_document(each)["left_out"] == list(each.left_out)
-        words = summarise(each)
+        words = summarise_diagnosis(each)
         assert all(step in words for step in each.left_out)
         assert ("was stopped, without" in words) == bool(each.left_out)

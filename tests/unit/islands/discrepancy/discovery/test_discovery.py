@@ -26,11 +26,12 @@ from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.io.diagnosis_json import diagnosis_document
 from islands.io.export.fmu.compiler import find_compiler
+from islands.io.result_text.diagnosis_text import summarise_diagnosis
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import LocalExtendedSpec
-from islands_service.reports.diagnosis_report import diagnosis_report, summarise
+from islands.reports.diagnosis_report import diagnosis_report
 from support.equation_programs import run_c
 
 DT = 0.01
@@ -190,7 +191,7 @@ def test_discovered_equations_are_the_diagnosis_if_no_effect_explains_as_much() 
     assert value.ci95[0] < -0.5 < value.ci95[1]
     document = diagnosis_document(found)
     assert document["discovered"]["equations"].startswith("dv/dt = ")
-    assert found.discovery.equations in summarise(found)
+    assert found.discovery.equations in summarise_diagnosis(found)
     assert b"x*F" in diagnosis_report("record", found)
 
 

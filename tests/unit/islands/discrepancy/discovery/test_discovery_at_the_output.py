@@ -18,10 +18,10 @@ from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.io.export.extension import export_extended
+from islands.io.result_text.diagnosis_text import summarise_diagnosis
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import simulate_spec
 from islands.io.simulator_spec.specification import LocalExtendedSpec
-from islands_service.reports.diagnosis_report import summarise
 
 DT = 0.01
 
@@ -116,7 +116,7 @@ def test_document_and_text_contain_the_terms() -> None:
     assert "u**5" in export_extended(spec, "plain")
     assert json.loads(export_extended(spec, "json")) == document
     assert "pow(in->u, 5.0)" in export_extended(spec, "c")
-    assert "u**5" in summarise(found)
+    assert "u**5" in summarise_diagnosis(found)
 
 
 def test_extended_simulation_is_right_in_a_second_diagnosis() -> None:

@@ -24,7 +24,7 @@ THEIRS = low_pass(U, 0.05, 0.01)
 NOISE = 0.01 * np.random.default_rng(4).standard_normal(U.size)
 
 
-def diagnose(y: np.ndarray, names: Sequence[str] = tuple(CATALOGUE)) -> islands.Diagnosis:
+def diagnose(y: np.ndarray, names: Sequence[str] = tuple(CATALOGUE)) -> islands.DiagnosisResult:
     return islands.diagnose(
         recorded(U, y + NOISE),
         "column:theirs",
@@ -94,7 +94,7 @@ def lag_unevenly(signal: np.ndarray, falling: float, rising: float) -> np.ndarra
     return np.array(lagged)[::fine]
 
 
-def assert_uneven_lag(found: islands.Diagnosis, name: str, falling: float, rising: float) -> None:
+def assert_uneven_lag(found: islands.DiagnosisResult, name: str, falling: float, rising: float) -> None:
     assert str(found.verdict) == "family"
     (form,) = found.causes
     assert (form.name, form.family) == (name, "timing")

@@ -1,21 +1,24 @@
-"""HTML report of an identification in a single file with embedded figures."""
+"""HTML report of an identification ."""
 
 import base64
 from collections.abc import Mapping
+from io import BytesIO
 from math import nan
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from islands.evolution.search_result import SearchResult
+from islands.figures.style import save
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.model_table import LEGEND, columns, number, rows
 from islands.model.equations import mathml_equation, named_term
 
 #: Environment of the HTML templates.
 TEMPLATES = Environment(
-    loader=PackageLoader("islands_service", "templates"),
+    loader=PackageLoader("islands.reports", "templates"),
     autoescape=select_autoescape(),
     trim_blocks=True,
     undefined=StrictUndefined,
@@ -86,6 +89,13 @@ def _terms(found: SearchResult) -> list[tuple[str, str, str, str]]:
 
 def _settings(found: SearchResult) -> list[tuple[str, Any]]:
     return [(name, value) for name, value in found.settings.items() if not isinstance(value, Mapping)]
+
+
+def inline_figure(figure: Figure) -> str:
+    """Return a figure as the address of an embedded image."""
+    stream = BytesIO()
+    save(figure, stream)
+    return _inline(stream.getvalue())
 
 
 def _inline(svg: bytes) -> str:

@@ -13,7 +13,8 @@ from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.discovery.discovery import Discovery
 from islands.discrepancy.inference.finding import Value
 from islands.discrepancy.inference.verdict import Verdict
-from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
+from islands.io.result_text.diagnosis_text import summarise_diagnosis, summarise_self_test
+from islands.reports.diagnosis_report import diagnosis_report
 
 EQUATIONS = Discovery("dx/dt = -x + a1*x**3; a1 = 0.2", ("jump",), ("cubic-stiffness",), 2.0)
 
@@ -38,7 +39,7 @@ def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis
     as_equivalent = replace(diagnosis, verdict=Verdict.NAMED, discovery=EQUATIONS)
     given = as_cause, as_equivalent, replace(diagnosis, discovery=None)
     for texts in (
-        [summarise(each) for each in given],
+        [summarise_diagnosis(each) for each in given],
         [diagnosis_report("record", each).decode() for each in given],
     ):
         assert ["a1*x**3" in text for text in texts] == [True, True, False]
@@ -50,14 +51,14 @@ def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis
 @pytest.mark.ci
 def test_errors_have_the_unit_of_the_output_if_it_has_one(diagnosis: Diagnosis) -> None:
     named = replace(diagnosis, record=replace(diagnosis.record, output_unit="um"))
-    assert re.search(r"to 0\.\d+, by", summarise(diagnosis))
-    assert re.search(r"to 0\.\d+ um, by .* floor is 0\.\d+ um,", summarise(named))
+    assert re.search(r"to 0\.\d+, by", summarise_diagnosis(diagnosis))
+    assert re.search(r"to 0\.\d+ um, by .* floor is 0\.\d+ um,", summarise_diagnosis(named))
 
 
 @pytest.mark.ci
 def test_report_says_which_effects_are_not_claimed_as_causes(diagnosis: Diagnosis) -> None:
     effects = (diagnosis.effects[0], replace(diagnosis.effects[0], name="jump", is_claimed=False))
-    lines = summarise(replace(diagnosis, effects=effects)).splitlines()
+    lines = summarise_diagnosis(replace(diagnosis, effects=effects)).splitlines()
     assert ["not claimed as a cause" in line for line in lines if line.startswith("  ")] == [False, True]
 
 
@@ -68,9 +69,9 @@ def test_noise_alone_is_no_discrepancy_and_no_cause(diagnosis: Diagnosis) -> Non
     both = replace(diagnosis, effects=(cause, noise))
     assert (both.causes, both.noise) == ((cause,), (noise,))
     alone = replace(diagnosis, verdict=Verdict.NOTHING, effects=(noise,))
-    assert summarise(alone).startswith("No significant discrepancy: ")
-    assert "whose kind was identified" in summarise(alone)
-    assert "whose kind was identified" not in summarise(replace(alone, effects=()))
+    assert summarise_diagnosis(alone).startswith("No significant discrepancy: ")
+    assert "whose kind was identified" in summarise_diagnosis(alone)
+    assert "whose kind was identified" not in summarise_diagnosis(replace(alone, effects=()))
 
 
 @pytest.mark.ci
@@ -88,4 +89,6 @@ def test_a_value_has_the_digits_that_its_interval_needs(
     diagnosis: Diagnosis, value: Value, written: str
 ) -> None:
     finding = replace(diagnosis.effects[0], parameters={"a": value})
-    assert f"a = {written};" in summarise(replace(diagnosis, effects=(finding,))).replace("\n    ", " ")
+    assert f"a = {written};" in summarise_diagnosis(replace(diagnosis, effects=(finding,))).replace(
+        "\n    ", " "
+    )

@@ -1,20 +1,13 @@
-"""HTML report of a diagnosis in a single file: sentences, numbers and figures."""
+"""Sentences of a diagnosis: verdict, causes, gain, and what the record could reveal."""
 
-import base64
-import io
 from math import ceil, log10
-from typing import Any
 
-from islands.discrepancy.detectability import NOTHING, SelfTest
+from islands.discrepancy.detectability import SelfTest
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.finding import Finding, Value
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.surrogates import STRENGTHS
-from islands.figures.discrepancy import DISCREPANCY_FIGURES
-from islands.figures.form_values import draw_effect_shape, draw_free_forms, list_free_forms
-from islands.figures.style import save
-from islands_service.reports.identification_report import TEMPLATES
 
 #: Sentence for each verdict.
 _VERDICTS = {
@@ -28,23 +21,14 @@ _VERDICTS = {
     Verdict.GROSS_ERROR: "Record and simulation do not match as they are: correct the record first.",
 }
 
-#: Captions of the figures, in the order of the report.
-_CAPTIONS = {
-    "over-time": "Measured, simulated and extended output, and the residuals",
-    "loops": "Output over input, and the residual over the input",
-    "residual": "Structure of the residual before and after",
-    "ladder": "Gain of each effect alone",
-}
-
-
 #: Sentence for "nothing" if properties of the noise were found.
 _NOISE = "No significant discrepancy: the simulation is correct within the noise, whose kind was identified."
 
 
-def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
+def summarise_diagnosis(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     """Summarise a diagnosis as plain text."""
-    lines = [_verdict(found)]
-    lines += [f"  {_finding(finding)}" for finding in found.effects]
+    lines = [describe_verdict(found)]
+    lines += [f"  {describe_finding(finding)}" for finding in found.effects]
     lines += [f"Record: {each.text}" for each in found.record_findings]
     if (discovery := found.discovery) is not None and found.verdict == Verdict.DISCOVERED:
         lines.append(f"Equations: {discovery.equations}")
@@ -64,7 +48,7 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
         lines.append(
             f"On held-out data the RMSE falls from {gain.before.rmse:.3g} to "
             f"{gain.after.rmse:.3g}{unit}, by {gain.reduction_percent:.1f} % ({low:.1f} to {high:.1f}); "
-            f"the noise floor is {gain.noise_floor.rmse:.3g}{unit}, {_floor(found)}."
+            f"the noise floor is {gain.noise_floor.rmse:.3g}{unit}, {describe_noise_floor(found)}."
         )
     if found.suggested_experiment:
         lines.append(f"Suggested experiment to separate confounded effects: {found.suggested_experiment}.")
@@ -88,11 +72,12 @@ def describe_left_out(found: Diagnosis) -> str:
     )
 
 
-def _verdict(found: Diagnosis) -> str:
+def describe_verdict(found: Diagnosis) -> str:
+    """Return the verdict as a sentence."""
     return _NOISE if found.verdict == Verdict.NOTHING and found.noise else _VERDICTS[found.verdict]
 
 
-def _floor(found: Diagnosis) -> str:
+def describe_noise_floor(found: Diagnosis) -> str:
     """Say how the noise floor was determined."""
     return (
         "measured from repeated periods"
@@ -113,7 +98,8 @@ def _write_value(given: Value) -> str:
     return f"{given.value:.{digits}g}{unit} ({low:.{digits}g} to {high:.{digits}g})"
 
 
-def _finding(finding: Finding) -> str:
+def describe_finding(finding: Finding) -> str:
+    """Describe an effect: values, confidence, share of the misfit, and equivalent effects."""
     values = ", ".join(f"{name} = {_write_value(each)}" for name, each in finding.parameters.items())
     share = (
         ""
@@ -142,74 +128,3 @@ def summarise_self_test(tested: SelfTest) -> str:
         f"Of {len(limits)} effects, {shown} can be detected on this record, up to a misfit of "
         f"{STRENGTHS[-1]:g} times the noise."
     )
-
-
-def _limits(tested: SelfTest) -> list[tuple[str, str, str]]:
-    """Return for each effect its name, the smallest detected strength, and the misfit at this strength."""
-    return [
-        (name, f"not up to {STRENGTHS[-1]:g} times the noise", "")
-        if limit is None
-        else (name, _amount(limit.strength, limit.unit), f"{limit.misfit:.2g} times the noise")
-        for name, limit in tested.detection_limits.items()
-    ]
-
-
-def _amount(value: float, unit: str) -> str:
-    """Format a strength with its unit; one without a unit is a fraction, shown in per cent."""
-    return f"{value:.3g} {unit.replace('/', ' per ')}" if unit else f"{100 * value:.3g} %"
-
-
-def _mistaken(tested: SelfTest) -> list[tuple[str, str, int]]:
-    """Return injected effect, named effect and count of each confusion, without missed effects."""
-    return [
-        (injected, named, count)
-        for (injected, named), count in tested.confusion.items()
-        if named not in (injected, NOTHING)
-    ]
-
-
-def diagnosis_report(
-    name: str, found: Diagnosis, tested: SelfTest | None = None, proposal: ResidualFormula | None = None
-) -> bytes:
-    """Write the report of a diagnosis.
-
-    Parameters
-    ----------
-    name : str
-        Name of the record.
-    tested : SelfTest, optional
-        Detection limits and false-alarm rate on the record.
-    proposal : ResidualFormula, optional
-        Formula for the unexplained residual.
-    """
-    figures = [
-        (_CAPTIONS[each], _inline(draw(found)))
-        for each, draw in DISCREPANCY_FIGURES.items()
-        if found.candidates or each != "ladder"
-    ]
-    if list_free_forms(found):
-        figures.insert(1, ("Shape of the missing effect", _inline(draw_free_forms(found))))
-    if found.shape is not None:
-        caption = "Shape of the effect, and of a free curve in its place"
-        figures.insert(1, (caption, _inline(draw_effect_shape(found.shape))))
-    text = TEMPLATES.get_template("diagnosis.html").render(
-        name=name,
-        found=found,
-        verdict=_verdict(found),
-        left_out=describe_left_out(found),
-        findings=[_finding(finding) for finding in found.effects],
-        proposal=proposal,
-        floor=_floor(found),
-        figures=figures,
-        tested=None if tested is None else summarise_self_test(tested),
-        strengths=STRENGTHS,
-        limits=[] if tested is None else _limits(tested),
-        mistaken=[] if tested is None else _mistaken(tested),
-    )
-    return text.encode()
-
-
-def _inline(figure: Any) -> str:
-    stream = io.BytesIO()
-    save(figure, stream)
-    return f"data:image/svg+xml;base64,{base64.b64encode(stream.getvalue()).decode()}"

@@ -1,0 +1,162 @@
+"""`DiagnosisResult`: sentences, files, figures and extended simulation of a diagnosis."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from islands.discrepancy.detectability import SelfTest
+from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.discrepancy.findings import ResidualFormula
+from islands.errors import ModelError, lookup
+from islands.evolution.progress import Steps
+from islands.facade.results.notebook_html import render_sentences
+from islands.facade.results.saved_simulation import SavedSimulation
+from islands.io.diagnosis_json import as_json, diagnosis_document
+from islands.io.result_text.diagnosis_text import summarise_diagnosis
+from islands.io.simulator_spec.document import extended_json
+from islands.io.simulator_spec.specification import EXTENDED_FILE, LocalExtendedSpec
+from islands.simulation.predictors import Simulation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from islands.io.data_frames import RecordLike
+
+#: Files of a folder besides `EXTENDED_FILE`: the document, which is written last, and the report.
+DIAGNOSIS_FILE, REPORT_FILE = "discrepancy.json", "report.html"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class DiagnosisResult(Diagnosis):
+    """Result of `diagnose`: a `Diagnosis` and what was computed after it.
+
+    Attributes
+    ----------
+    formula : ResidualFormula or None
+        Formula of the unexplained residual; see `explain_residual`.
+    tested : SelfTest or None
+        Detection limits and false-alarm rate on the record; see `self_test`.
+    wall_s : float or None
+        Duration in seconds; None if it was not measured.
+    """
+
+    formula: ResidualFormula | None = None
+    tested: SelfTest | None = None
+    wall_s: float | None = None
+
+    @classmethod
+    def from_diagnosis(
+        cls,
+        found: Diagnosis,
+        formula: ResidualFormula | None = None,
+        tested: SelfTest | None = None,
+        wall_s: float | None = None,
+        left_out: Sequence[str] = (),
+    ) -> "DiagnosisResult":
+        """Return the result of a diagnosis; ``left_out`` are steps after it that were left out."""
+        values = {each.name: getattr(found, each.name) for each in fields(Diagnosis)}
+        values["left_out"] = (*found.left_out, *left_out)
+        return cls(**values, formula=formula, tested=tested, wall_s=wall_s)
+
+    @property
+    def summary(self) -> str:
+        """Verdict, causes, gain and next experiment as sentences."""
+        return summarise_diagnosis(self, self.formula)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """Content of ``discrepancy.json``."""
+        return diagnosis_document(self, self.wall_s, self.tested, self.formula)
+
+    @property
+    def extended_document(self) -> str | None:
+        """Text of ``extended.json``, the extended simulation; None if no effect was added."""
+        return None if self.gain is None else extended_json(self.best, self.record)
+
+    def write_report(self, name: str) -> bytes:
+        """Return ``report.html``, with the name of the record: sentences, numbers and figures."""
+        # matplotlib takes half a second to import.
+        from islands.reports.diagnosis_report import diagnosis_report  # noqa: PLC0415
+
+        return diagnosis_report(name, self, self.tested, self.formula)
+
+    def save(self, folder: str | Path, name: str = "record", steps: Steps | None = None) -> Path:
+        """Write ``report.html``, ``extended.json`` if an effect was added, and, last, ``discrepancy.json``.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Files of an earlier diagnosis in it are replaced; `islands.load` opens it.
+        name : str
+            Name of the record in the report.
+        steps : Steps, optional
+            The report is an optional step, which a stop request leaves out. The document names all steps
+            that were left out.
+        """
+        folder, steps = Path(folder), steps or Steps()
+        folder.mkdir(parents=True, exist_ok=True)
+        for file in (EXTENDED_FILE, DIAGNOSIS_FILE, REPORT_FILE):
+            (folder / file).unlink(missing_ok=True)
+        if not steps.skip(REPORT_FILE):
+            (folder / REPORT_FILE).write_bytes(self.write_report(name))
+        if (extended := self.extended_document) is not None:
+            (folder / EXTENDED_FILE).write_text(extended, encoding="utf-8")
+        complete = replace(self, left_out=(*self.left_out, *steps.left_out))
+        (folder / DIAGNOSIS_FILE).write_text(as_json(complete.document), encoding="utf-8")
+        return folder
+
+    def plot(self, kind: str = "over-time") -> "Figure":
+        """Draw a figure of the report.
+
+        Parameters
+        ----------
+        kind : str
+            A key of ``islands.figures.discrepancy.DISCREPANCY_FIGURES``: ``over-time``, ``loops``,
+            ``residual`` or ``ladder``.
+
+        Raises
+        ------
+        SettingsError
+            There is no such figure.
+        """
+        from islands.figures.discrepancy import DISCREPANCY_FIGURES  # noqa: PLC0415 - matplotlib
+
+        return lookup(DISCREPANCY_FIGURES, kind, "figure")(self)
+
+    @property
+    def extension(self) -> SavedSimulation:
+        """The extended simulation.
+
+        Raises
+        ------
+        ModelError
+            The diagnosis added no effect to the simulation.
+        """
+        if self.extended_document is None:
+            raise ModelError(
+                f"there is no extended simulation, because the verdict of the diagnosis is "
+                f"{str(self.verdict)!r}: simulate what was diagnosed, {self.base.simulation.simulator.name}"
+            )
+        return SavedSimulation(LocalExtendedSpec.model_validate(json.loads(self.extended_document)))
+
+    def simulate(self, record: "RecordLike", columns: Mapping[str, NDArray[Any]] | None = None) -> Simulation:
+        """Simulate a record with the extended simulation; see `SavedSimulation.simulate`."""
+        return self.extension.simulate(record, columns)
+
+    def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
+        """Return the extended simulation as text, or write it; see `SavedSimulation.export`."""
+        return self.extension.export(kind, path)
+
+    def __str__(self) -> str:
+        return self.summary
+
+    def __repr__(self) -> str:
+        effects = ", ".join(each.name for each in self.effects) or "no effects"
+        return f"<DiagnosisResult {str(self.verdict)!r}: {effects}>"
+
+    def _repr_html_(self) -> str:
+        return render_sentences(self.summary.splitlines(), self.plot(), "measured and simulated output")

@@ -1,0 +1,1 @@
+"""HTML reports of identifications and diagnoses, each a single file with embedded figures."""

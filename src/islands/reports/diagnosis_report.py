@@ -1,0 +1,89 @@
+"""HTML report of a diagnosis: sentences, numbers and figures."""
+
+from islands.discrepancy.detectability import NOTHING, SelfTest
+from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.discrepancy.findings import ResidualFormula
+from islands.discrepancy.surrogates import STRENGTHS
+from islands.figures.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.form_values import draw_effect_shape, draw_free_forms, list_free_forms
+from islands.io.result_text.diagnosis_text import (
+    describe_finding,
+    describe_left_out,
+    describe_noise_floor,
+    describe_verdict,
+    summarise_self_test,
+)
+from islands.reports.identification_report import TEMPLATES, inline_figure
+
+#: Captions of the figures, in the order of the report.
+_CAPTIONS = {
+    "over-time": "Measured, simulated and extended output, and the residuals",
+    "loops": "Output over input, and the residual over the input",
+    "residual": "Structure of the residual before and after",
+    "ladder": "Gain of each effect alone",
+}
+
+
+def _limits(tested: SelfTest) -> list[tuple[str, str, str]]:
+    """Return for each effect its name, the smallest detected strength, and the misfit at this strength."""
+    return [
+        (name, f"not up to {STRENGTHS[-1]:g} times the noise", "")
+        if limit is None
+        else (name, _amount(limit.strength, limit.unit), f"{limit.misfit:.2g} times the noise")
+        for name, limit in tested.detection_limits.items()
+    ]
+
+
+def _amount(value: float, unit: str) -> str:
+    """Format a strength with its unit; one without a unit is a fraction, shown in per cent."""
+    return f"{value:.3g} {unit.replace('/', ' per ')}" if unit else f"{100 * value:.3g} %"
+
+
+def _mistaken(tested: SelfTest) -> list[tuple[str, str, int]]:
+    """Return injected effect, named effect and count of each confusion, without missed effects."""
+    return [
+        (injected, named, count)
+        for (injected, named), count in tested.confusion.items()
+        if named not in (injected, NOTHING)
+    ]
+
+
+def diagnosis_report(
+    name: str, found: Diagnosis, tested: SelfTest | None = None, proposal: ResidualFormula | None = None
+) -> bytes:
+    """Write the report of a diagnosis.
+
+    Parameters
+    ----------
+    name : str
+        Name of the record.
+    tested : SelfTest, optional
+        Detection limits and false-alarm rate on the record.
+    proposal : ResidualFormula, optional
+        Formula for the unexplained residual.
+    """
+    figures = [
+        (_CAPTIONS[each], inline_figure(draw(found)))
+        for each, draw in DISCREPANCY_FIGURES.items()
+        if found.candidates or each != "ladder"
+    ]
+    if list_free_forms(found):
+        figures.insert(1, ("Shape of the missing effect", inline_figure(draw_free_forms(found))))
+    if found.shape is not None:
+        caption = "Shape of the effect, and of a free curve in its place"
+        figures.insert(1, (caption, inline_figure(draw_effect_shape(found.shape))))
+    text = TEMPLATES.get_template("diagnosis.html").render(
+        name=name,
+        found=found,
+        verdict=describe_verdict(found),
+        left_out=describe_left_out(found),
+        findings=[describe_finding(finding) for finding in found.effects],
+        proposal=proposal,
+        floor=describe_noise_floor(found),
+        figures=figures,
+        tested=None if tested is None else summarise_self_test(tested),
+        strengths=STRENGTHS,
+        limits=[] if tested is None else _limits(tested),
+        mistaken=[] if tested is None else _mistaken(tested),
+    )
+    return text.encode()

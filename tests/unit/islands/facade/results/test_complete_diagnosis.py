@@ -1,0 +1,90 @@
+"""A diagnosis as sentences, files, figures and a simulation; the command writes the same files."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import islands
+from islands.discrepancy.inference.verdict import Verdict
+from islands.io.records import write_record
+from support.command_line import succeed
+
+pytestmark = pytest.mark.ci
+
+
+def made(delay=3):
+    """Return a record of a linear system with a dead time."""
+    rng = np.random.default_rng(0)
+    u = lfilter([0.1], [1.0, -0.9], rng.standard_normal(600))
+    y = lfilter([0.3], [1.0, -0.7], np.roll(u, delay)) + 0.02 * rng.standard_normal(600)
+    return islands.Dataset(u[:, None], y, 0.01, ("u_V",), "y_um")
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Folder with a record, and the diagnosis of a simulation without the dead time by the command."""
+    folder = tmp_path_factory.mktemp("diagnosis")
+    write_record(made(), folder / "r.csv")
+    columns = ("--input", "u_V", "--output", "y_um", "--simulation", "linear:1")
+    printed = succeed("diagnose", folder / "r.csv", *columns, "--out", folder / "command")
+    (folder / "printed.txt").write_text(printed)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(files):
+    return islands.diagnose(islands.read_record(files / "r.csv", "u_V", "y_um"), "linear:1")
+
+
+def test_the_files_are_those_of_the_command(files, found, tmp_path):
+    folder = found.save(tmp_path / "saved", name="r.csv")
+    names = ["discrepancy.json", "extended.json", "report.html"]
+    assert [path.name for path in sorted(folder.iterdir())] == names
+    for name in names[1:]:
+        assert (folder / name).read_bytes() == (files / "command" / name).read_bytes()
+    documents = [json.loads((each / names[0]).read_text()) for each in (folder, files / "command")]
+    assert [document.pop("wall_s") is None for document in documents] == [True, False]
+    assert documents[0] == documents[1]
+
+
+def test_the_sentences_are_those_of_the_command(files, found):
+    assert str(found) == found.summary
+    assert " ".join(found.summary.split()) in " ".join((files / "printed.txt").read_text().split())
+    assert repr(found) == "<DiagnosisResult 'named': delay>"
+
+
+def test_the_extended_simulation_is_that_of_the_folder(found, tmp_path):
+    folder, other = found.save(tmp_path / "saved"), made()[:300]
+    np.testing.assert_array_equal(found.simulate(other).y, islands.load(folder).simulate(other).y)
+    assert found.export("json", tmp_path / "exported.json") is None
+    assert (tmp_path / "exported.json").read_bytes() == (folder / "extended.json").read_bytes()
+
+
+def test_a_notebook_shows_the_sentences_and_a_figure(found):
+    html = found._repr_html_()
+    assert "<p>The simulation lacks known effects, which explain the discrepancy.</p>" in html
+    assert 'alt="measured and simulated output"' in html
+    assert found.plot("residual").axes
+    with pytest.raises(islands.SettingsError, match="unknown figure 'loop'"):
+        found.plot("loop")
+
+
+def test_a_diagnosis_without_an_effect_has_no_simulation(found, tmp_path):
+    nothing = replace(found, verdict=Verdict.NOTHING, effects=(), gain=None)
+    with pytest.raises(islands.ModelError, match=r"no extended simulation, because .* 'nothing'"):
+        nothing.simulate(made())
+    (tmp_path / "extended.json").write_text("of an earlier diagnosis")
+    assert [path.name for path in sorted(nothing.save(tmp_path).iterdir())] == [
+        "discrepancy.json",
+        "report.html",
+    ]
+    assert islands.load(tmp_path).verdict == "nothing"
+
+
+def test_a_formula_and_steps_that_were_left_out_are_in_every_text(found):
+    complete = islands.DiagnosisResult.from_diagnosis(found, left_out=("a formula",))
+    assert "was stopped, without: a formula" in complete.summary
+    assert complete.document["left_out"] == ["a formula"]
