@@ -46,7 +46,7 @@ _PUBLIC = {
     "facade.results.model_analysis": ("linearise",),
     "facade.results.model_simulation": ("simulate",),
     "facade.results.result": ("Result",),
-    "facade.results.saved_result": ("SavedModel", "SavedResult", "read_result"),
+    "facade.results.saved_result": ("read_result",),
     "facade.results.saved_simulation": ("SavedDiagnosis", "SavedSimulation"),
     "io.checkpoints.monitor_state": ("SavedMonitor", "read_monitor", "write_monitor"),
     "io.data_frames": ("as_record",),

@@ -42,8 +42,6 @@ from islands.facade.results.fitted_model import FittedModel as FittedModel
 from islands.facade.results.model_analysis import linearise as linearise
 from islands.facade.results.model_simulation import simulate as simulate
 from islands.facade.results.result import Result as Result
-from islands.facade.results.saved_result import SavedModel as SavedModel
-from islands.facade.results.saved_result import SavedResult as SavedResult
 from islands.facade.results.saved_result import read_result as read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis as SavedDiagnosis
 from islands.facade.results.saved_simulation import SavedSimulation as SavedSimulation

@@ -141,7 +141,7 @@ def _identify(
         try:
             preset = choose_preset(record, validation, spec.changes, reporter.report_stage, stop)
         except StoppedChoiceError as stopped:
-            return Result(stopped.found).with_wall_time(reporter.spent).search_result
+            return Result.from_search(stopped.found).with_wall_time(reporter.spent).search_result
     reporter.choice = preset if isinstance(preset, Choice) else None
     result = identify(
         record,

@@ -133,4 +133,4 @@ def fit(
     except StoppedChoiceError as stopped:
         found = stopped.found
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
-    return Result(replace(found, settings={**found.settings, "validation": held_out}))
+    return Result.from_search(replace(found, settings={**found.settings, "validation": held_out}))

@@ -146,7 +146,7 @@ def identify(
         try:
             preset = choose_preset(record, validation, changes, stage, stop)
         except StoppedChoiceError as stopped:
-            return Result(stopped.found)
+            return Result.from_search(stopped.found)
     if isinstance(preset, Choice):
         settings = resolve_kind(preset.kind, preset.delays, with_tuples(changes))
     else:
@@ -192,7 +192,7 @@ def identify(
     statistics = _make_statistics(state, hall_of_fame, search_problem)
     found = SearchResult(record, split, seed, described, statistics, models)
     banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag, steps)
-    return Result(with_average(banded, count))
+    return Result.from_search(with_average(banded, count))
 
 
 def _evolve(

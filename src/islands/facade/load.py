@@ -10,7 +10,9 @@ from islands.errors import ModelError
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.facade.coupled.coupled_result import FittedCoupledModel
-from islands.facade.results.saved_result import SavedModel, SavedResult, make_single_model, read_result
+from islands.facade.results.fitted_model import FittedModel
+from islands.facade.results.result import Result
+from islands.facade.results.saved_result import read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
 from islands.io.export.coupled.coupled_document import read_coupled_model
 from islands.io.models import read_model
@@ -20,7 +22,7 @@ from islands.io.simulator_spec.specification import EXTENDED_FILE, LocalExtended
 from islands.systems.published_models import get_published_model
 
 #: Values of `load`; each has ``simulate`` and ``export``.
-Loaded: TypeAlias = SavedResult | SavedModel | FittedCoupledModel | SavedSimulation | SavedDiagnosis
+Loaded: TypeAlias = Result | FittedModel | FittedCoupledModel | SavedSimulation | SavedDiagnosis
 
 #: Files and folders that can be loaded, for messages.
 KINDS = (
@@ -48,7 +50,7 @@ def load(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> 
 
     Returns
     -------
-    SavedResult, SavedModel, FittedCoupledModel, SavedDiagnosis or SavedSimulation
+    Result, FittedModel, FittedCoupledModel, SavedDiagnosis or SavedSimulation
         Each has ``simulate(record)`` and ``export(kind, path)``. A model file of a result folder has the
         errors, the warm-up and the prediction bands of the result.
 
@@ -59,7 +61,7 @@ def load(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> 
     """
     kind, _, rest = str(path).partition(":")
     if kind == "published":
-        return make_single_model(get_published_model(rest).model)
+        return FittedModel.from_model(get_published_model(rest).model)
     if kind in ("ode", "fmu"):
         return SavedSimulation(_read_equations(str(path)))
     file = _find_document(Path(path))
@@ -100,18 +102,18 @@ def _read_equations(text: str) -> OdeSpec | FmuSpec:
     return found
 
 
-def _load_result(file: Path, primitives: Mapping[str, Primitive]) -> SavedResult:
+def _load_result(file: Path, primitives: Mapping[str, Primitive]) -> Result:
     return read_result(file.parent, primitives)
 
 
-def _load_model(file: Path, primitives: Mapping[str, Primitive]) -> SavedModel:
+def _load_model(file: Path, primitives: Mapping[str, Primitive]) -> FittedModel:
     """Read a model file; a model of a result folder has the errors and the bands of the result."""
     folder = file.absolute().parent.parent
     if file.absolute().parent.name == "models" and (folder / "result.json").is_file():
         for each in read_result(folder, primitives).models:
             if f"{each.rank:02d}.json" == file.name:
                 return each
-    return make_single_model(read_model(file, primitives))
+    return FittedModel.from_model(read_model(file, primitives))
 
 
 def _load_coupled(file: Path, primitives: Mapping[str, Primitive]) -> FittedCoupledModel:

@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from islands.facade.load import load
-from islands.facade.results.saved_result import SavedModel, SavedResult
+from islands.facade.results.fitted_model import FittedModel
+from islands.facade.results.result import Result
 from islands.io.export import EXPORTS, FILE_EXPORTS
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.model.equations import named_signals
@@ -36,8 +37,8 @@ def show(
     model, a model of several outputs as one program or block.
     """
     loaded = load(model)
-    if kind is None and out is None and isinstance(loaded, SavedResult | SavedModel):
-        found = loaded.best.model if isinstance(loaded, SavedResult) else loaded.model
+    if kind is None and out is None and isinstance(loaded, Result | FittedModel):
+        found = loaded.best.model if isinstance(loaded, Result) else loaded.model
         stated = named_signals(found)
         typer.echo("\n".join([*term_table(found), *(wrap(f"where {stated}") if stated else [])]))
         return

@@ -17,8 +17,9 @@ from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
 from islands.facade.coupled.coupled_result import FittedCoupledModel
 from islands.facade.load import load
+from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.model_simulation import SHOOTING
-from islands.facade.results.saved_result import SavedModel, SavedResult
+from islands.facade.results.result import Result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
 from islands.io.export.coupled.coupled_equations import coupled_signals
 from islands.io.records import read_dataset, write_simulation
@@ -127,9 +128,9 @@ def simulate(
         *(parse_rows(rows), reading, detrend, shooting, warm_up, bands),
     )
     match load(model):
-        case SavedResult() as result:
+        case Result() as result:
             _simulate_model(result.best, request)
-        case SavedModel() as single:
+        case FittedModel() as single:
             _simulate_model(single, request)
         case FittedCoupledModel() as coupled:
             _simulate_outputs(coupled, request)
@@ -139,7 +140,7 @@ def simulate(
             _simulate_system(simulation, request)
 
 
-def _simulate_model(found: SavedModel, request: _Request) -> None:
+def _simulate_model(found: FittedModel, request: _Request) -> None:
     model, mode = found.model, request.mode
     if request.bands is not None and mode != "free-run":
         raise SettingsError("--bands are for free runs of models of a result folder")

@@ -174,7 +174,7 @@ def _choose_preset(
     try:
         return choose_preset(data, held_out, changes, show, stop)
     except StoppedChoiceError as stopped:
-        result, drawing = islands.Result(stopped.found), Steps(stop=stop)
+        result, drawing = islands.Result.from_search(stopped.found), Steps(stop=stop)
         result.save(folder, drawing)
         show_result(result, folder)
         stop.end(folder, (*result.left_out, "the search", *drawing.left_out), REPEAT)

@@ -274,7 +274,7 @@ def _couple(
     )
     warm_up = max(entry.ranked_model.assessment.warm_up for result in results for entry in result.models)
     ranked = [[entry.model for entry in result.models] for result in results]
-    best = [result.best.rank for result in results]
+    best = [result.recommendation.rank for result in results]
     choice = choose_equations(ranked, best, validation, warm_up, partial(steps.skip, _CHOICE))
     model = CoupledModel(tuple(models[rank - 1] for models, rank in zip(ranked, choice.ranks, strict=True)))
     refined = None

@@ -1,1 +1,1 @@
-"""Results of a search and their models, as objects of a run or of a result folder. Read `result` first."""
+"""Results of searches and diagnoses and their models, new or read from a folder. Read `result` first."""

@@ -1,84 +1,217 @@
-"""One model of a `Result`."""
+"""`FittedModel`: one model of a result, new or read from a folder, or of a model file."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from islands.data.dataset import Dataset
+from islands.data.signal_map import match_rate
 from islands.errors import ModelError, lookup
 from islands.estimation.constraints.checks import ConstraintCheck
 from islands.estimation.estimators import least_squares_bias
 from islands.evolution.search_result import RankedModel, SearchResult
-from islands.facade.results.assessed_model import AssessedModel
+from islands.facade.results.model_analysis import linearise
+from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
+from islands.facade.results.notebook_html import render_html
+from islands.io.export import export, write_export
+from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
+from islands.model.operating_point import static_characteristic
+from islands.model.signal_statement import describe_signals
+from islands.model.sympy_expression import to_sympy
 from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.predictors import Simulation
+from islands.simulation.step_response import StepResponse, step_response
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure
-from islands.validation.prediction_bands import PredictionBands
+from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands
 from islands.validation.residual_tests import ResidualTests
 
 if TYPE_CHECKING:
+    import control
+    import sympy
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from narwhals.typing import IntoSeries
+
+    from islands.io.data_frames import RecordLike
+
+#: Content of a mapping that nothing was read for.
+_EMPTY: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class FittedModel(AssessedModel):
-    """One model of a result.
+class FittedModel:
+    """A model with its rank, its errors, and the settings of the simulations that measured them.
 
     Attributes
     ----------
-    rank : int
-        Rank of the model; 1 has the least validation error.
-    ranked_model : RankedModel
-        Model with its errors, residual tests and physics checks.
-    search_result : SearchResult
-        Result that the model belongs to.
+    model : Model
+        Regressors, parameters, standard errors.
+    rank : int or None
+        Rank of the model; 1 has the least validation error. None for a model file outside of a result folder.
+    metrics : mapping
+        Errors by part and prediction, for example ``metrics["validation"]["free_run"].mape``; empty outside
+        of a result folder.
+    warm_up : int
+        Number of samples before the first prediction of the simulations of ``metrics``; the largest lag
+        outside of a result folder.
+    shooting_interval : int
+        Steps of the model in each interval of multiple shooting.
+    prediction_bands : PredictionBands or None
+        Prediction bands of every level. None if the free run of the model diverged, the search was stopped
+        before them, or outside of a result folder.
+    output_unit : str
+        Unit of the output; empty if unknown.
+    document : mapping
+        Entry of the model in the ``result.json`` of the folder that it was read from: also physics checks,
+        residual tests and constraints. Empty for a new result.
     """
 
-    rank: int
-    ranked_model: RankedModel
-    search_result: SearchResult
+    model: Model
+    rank: int | None
+    metrics: Mapping[str, Mapping[str, Metrics]]
+    warm_up: int
+    shooting_interval: int
+    prediction_bands: PredictionBands | None
+    output_unit: str
+    document: Mapping[str, Any] = field(default_factory=lambda: _EMPTY)
+    _ranked_model: RankedModel | None = None
+    _search_result: SearchResult | None = None
+
+    @classmethod
+    def from_search(cls, rank: int, entry: RankedModel, found: SearchResult) -> "FittedModel":
+        """Return a model of a search result."""
+        assessment = entry.assessment
+        return cls(
+            *(entry.model, rank, assessment.metrics, assessment.warm_up, found.shooting_interval),
+            *(entry.bands, found.record.output_unit, _EMPTY, entry, found),
+        )
+
+    @classmethod
+    def from_model(cls, model: Model) -> "FittedModel":
+        """Return a model outside of a result."""
+        return cls(model, None, _EMPTY, model.maximum_lag, SHOOTING, None, "")
 
     @property
-    def model(self) -> Model:
-        """Model: regressors, parameters, standard errors."""
-        return self.ranked_model.model
+    def ranked_model(self) -> RankedModel:
+        """Model with its errors, residual tests and physics checks.
+
+        Raises
+        ------
+        ModelError
+            The model was read from a file or a folder.
+        """
+        if self._ranked_model is None:
+            raise _missing_search()
+        return self._ranked_model
 
     @property
-    def metrics(self) -> Mapping[str, Mapping[str, Metrics]]:
-        """Errors by part and prediction, for example ``metrics["validation"]["free_run"].mape``."""
-        return self.ranked_model.assessment.metrics
+    def search_result(self) -> SearchResult:
+        """Result of the search that the model belongs to.
 
-    @property
-    def warm_up(self) -> int:
-        """Number of samples before the first prediction of the simulations of `metrics`."""
-        return self.ranked_model.assessment.warm_up
-
-    @property
-    def shooting_interval(self) -> int:
-        """Steps of the model in each interval of multiple shooting."""
-        return self.search_result.shooting_interval
-
-    @property
-    def prediction_bands(self) -> PredictionBands | None:
-        """Prediction bands of every level; None if the free run of the model diverged."""
-        return self.ranked_model.bands
-
-    @property
-    def output_unit(self) -> str:
-        """Unit of the output; empty if unknown."""
-        return self.search_result.record.output_unit
+        Raises
+        ------
+        ModelError
+            The model was read from a file or a folder.
+        """
+        if self._search_result is None:
+            raise _missing_search()
+        return self._search_result
 
     @property
     def validation(self) -> Dataset:
-        """Validation data of the search."""
+        """Validation data of the search.
+
+        Raises
+        ------
+        ModelError
+            The model was read from a file or a folder, which have no data.
+        """
         return self.search_result.split.validation
 
-    def _draw(self, kind: str) -> "Figure":
-        from islands.figures.registry import FIGURES  # noqa: PLC0415 - as in `AssessedModel.plot`
+    @property
+    def equation(self) -> str:
+        """Equation as plain text."""
+        return equation(self.model)
 
-        return lookup(FIGURES, kind, "figure")(self.ranked_model, self.search_result.split)
+    @property
+    def latex(self) -> str:
+        """Equation in LaTeX."""
+        return latex_equation(self.model)
+
+    @property
+    def signals(self) -> str:
+        """Signals that the equation reads: deviations, filtered samples or means; empty for the record's."""
+        return describe_signals(self.model)
+
+    def to_sympy(self) -> "sympy.Eq":
+        """Return the model as a SymPy equation; see `to_sympy` (extra ``sympy``)."""
+        return to_sympy(self.model)
+
+    def linearise(self, operating_point: ArrayLike, y: float | None = None) -> "control.StateSpace":
+        """Linearise the model; see `islands.linearise` (extra ``control``)."""
+        return linearise(self.model, operating_point, y)
+
+    def static_characteristic(self, inputs: ArrayLike) -> NDArray[np.float64]:
+        """Return the output at rest for constant inputs; see `static_characteristic`."""
+        return static_characteristic(self.model, inputs)
+
+    def plot_static_characteristic(self, inputs: Sequence[float], *, ax: "Axes | None" = None) -> "Figure":
+        """Draw the output at rest over a constant input, for models with one input.
+
+        Parameters
+        ----------
+        inputs : sequence of float
+        ax : Axes, optional
+            Axes to draw into; by default those of a new figure.
+
+        Raises
+        ------
+        ModelError
+            As in `static_characteristic`, or the model has several inputs.
+        """
+        from islands.figures.model_responses import draw_static_characteristic  # noqa: PLC0415 - matplotlib
+
+        if self.model.inputs > 1:
+            raise ModelError(
+                "a characteristic curve has one input: draw a section of static_characteristic()"
+            )
+        return draw_static_characteristic(self.model, inputs, self.static_characteristic(inputs), ax)
+
+    def step_response(
+        self, start: ArrayLike, end: ArrayLike, y: float | None = None, samples: int | None = None
+    ) -> StepResponse:
+        """Simulate the response to a step of the inputs from rest; see `step_response`."""
+        return step_response(self.model, start, end, y, samples)
+
+    def plot_step_response(
+        self,
+        start: ArrayLike,
+        end: ArrayLike,
+        y: float | None = None,
+        samples: int | None = None,
+        *,
+        ax: "Axes | None" = None,
+    ) -> "Figure":
+        """Draw the response to a step of the inputs from rest.
+
+        Parameters
+        ----------
+        start, end, y, samples
+            As in `step_response`.
+        ax : Axes, optional
+            Axes to draw into; by default those of a new figure.
+        """
+        from islands.figures.model_responses import draw_step_response  # noqa: PLC0415 - matplotlib
+
+        return draw_step_response(self.step_response(start, end, y, samples), ax)
 
     @property
     def physics(self) -> PhysicsChecks:
@@ -107,7 +240,7 @@ class FittedModel(AssessedModel):
         Raises
         ------
         ModelError
-            The result has no ensemble.
+            The result has no ensemble, or was read from a folder, whose `document` has them.
         """
         ensemble = self.search_result.ensemble
         if ensemble is None:
@@ -124,3 +257,182 @@ class FittedModel(AssessedModel):
         result = self.search_result
         found = least_squares_bias(self.model, result.split.estimation, str(result.settings["constraints"]))
         return None if isinstance(found, EvaluationOutcome) else found
+
+    def predict(
+        self,
+        record: "RecordLike",
+        y: "ArrayLike | IntoSeries | None" = None,
+        dt: float | None = None,
+        *,
+        inputs: str | Sequence[str] = (),
+        output: str | None = None,
+    ) -> NDArray[np.float64]:
+        """Return the free run of the model, one value for every row of the data.
+
+        It starts from the first samples of the output, as many as the largest lag of the model. `simulate`
+        starts later, after the warm-up of `metrics`.
+
+        Parameters
+        ----------
+        record : Dataset, data frame or array
+            Inputs, and the output, of which only the first samples are used; the rest may be missing.
+        y, dt, inputs, output
+            As in `as_record`. By default the columns and the sampling time are those of the model.
+
+        Returns
+        -------
+        ndarray, shape (samples,)
+            Each row of a model of means has the prediction of its mean. NaN during the warm-up of every
+            segment and after a divergence.
+
+        Raises
+        ------
+        RecordError
+            The data do not match the model (the message lists the columns), are too short, or the output is
+            missing in the warm-up.
+        """
+        data = record_of_model(self.model, record, y, dt, inputs, output)
+        return predict(self.model, data)
+
+    def simulate(
+        self,
+        record: "RecordLike",
+        mode: str = "free-run",
+        warm_up: int | None = None,
+        shooting: int | None = None,
+    ) -> Simulation:
+        """Simulate the model on a record.
+
+        On the validation data, the errors of the simulation are those in `metrics`.
+
+        Parameters
+        ----------
+        record : Dataset or data frame
+            Its samples are averaged as in the search if it has the sampling time of the search's record.
+        mode : str
+            ``one-step``, ``shooting`` or ``free-run``.
+        warm_up : int, optional
+            Number of samples before the first prediction; by default that of the errors in `metrics`.
+        shooting : int, optional
+            Steps of the model in each shooting interval; by default those of the errors in `metrics`.
+        """
+        warm_up = self.warm_up if warm_up is None else warm_up
+        shooting = self.shooting_interval if shooting is None else shooting
+        return simulate(self.model, record, mode, shooting, warm_up=warm_up)
+
+    def bands(self, record: "RecordLike", level: float = LEVEL, warm_up: int | None = None) -> PredictionBand:
+        """Simulate the model on a record, with a band that contains a measured sample with a probability.
+
+        Parameters
+        ----------
+        record : Dataset or data frame
+            Inputs, and the output of the warm-up; averaged as in `simulate`.
+        level : float
+            Probability, between 0.5 and 0.99.
+        warm_up : int, optional
+            Number of samples before the first prediction; by default that of the errors in `metrics`.
+
+        Raises
+        ------
+        ModelError
+            The free runs of the model diverged on the data that calibrate the bands, the search was stopped
+            before them, or the model is of no result.
+        SettingsError
+            The level is out of range.
+        """
+        if self.prediction_bands is None and self.rank is None:
+            raise ModelError("prediction bands need a model of a result folder: give its folder or file")
+        if self.prediction_bands is None:
+            raise ModelError(
+                f"model {self.rank} has no prediction bands: its free run diverged, or the search was "
+                "stopped before them or is of an earlier version. Take another model"
+            )
+        warm_up = self.warm_up if warm_up is None else warm_up
+        data = match_rate(self.model, record_of_model(self.model, record))
+        return self.prediction_bands.predict(self.model, data, level, warm_up)
+
+    def plot(
+        self, kind: str = "free-run", record: "RecordLike | None" = None, *, ax: "Axes | None" = None
+    ) -> "Figure":
+        """Draw a figure of the model.
+
+        Parameters
+        ----------
+        kind : str
+            A key of ``islands.figures.registry.FIGURES``: ``free-run`` (or ``free_run``, as in ``metrics``),
+            ``loop``, ``hold``, ``residuals``, ...
+        record : Dataset or data frame, optional
+            Record that is drawn; by default the validation data. A frame has the columns of the model.
+        ax : Axes, optional
+            Axes to draw into, for the kinds of ``PANELS``: of a figure with several panels, the first.
+
+        Returns
+        -------
+        Figure
+            A new figure, or that of the axes.
+
+        Raises
+        ------
+        SettingsError
+            There is no such figure, or it does not fit into one axes.
+        RecordError
+            The record does not match the model.
+        ModelError
+            The result was read from a folder without the record, and no record is given.
+        """
+        # matplotlib takes half a second to import, which every process of a cluster would pay.
+        from islands.figures.registry import FIGURES, draw_record_figure  # noqa: PLC0415
+
+        kind = kind.replace("_", "-")
+        if record is None and ax is None:
+            return lookup(FIGURES, kind, "figure")(self.ranked_model, self.search_result.split)
+        if record is None:
+            data = self.validation
+        else:
+            data = match_rate(self.model, record_of_model(self.model, record))
+        return draw_record_figure(kind, self.model, data, self.warm_up, self.prediction_bands, ax)
+
+    def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
+        """Return the model as text, or write it to a file.
+
+        Parameters
+        ----------
+        kind : str
+            plain, latex, mathml, python, c, matlab or json; with a path also fmu (FMI 3.0) or fmu2.
+        path : str or Path, optional
+            File to write; nothing is returned then.
+
+        Raises
+        ------
+        SettingsError
+            The format is unknown, or is not text and no path is given.
+        """
+        if path is None:
+            return export(self.model, kind)
+        write_export(self.model, kind, path)
+        return None
+
+    def __str__(self) -> str:
+        return self.equation
+
+    def __repr__(self) -> str:
+        rank = "" if self.rank is None else f" of rank {self.rank}"
+        return f"<{type(self).__name__}{rank}: {self.equation}>"
+
+    def _repr_html_(self) -> str:
+        sentences = [self.describe_error()] if self.metrics else []
+        return render_html(self.model, sentences, None if self._search_result is None else self.plot())
+
+    def describe_error(self) -> str:
+        """Return the rank and the error of the model as a sentence."""
+        error = self.metrics["validation"]["free_run"].rmse
+        text = f"Rank {self.rank}: free-run RMSE on the validation data {error:.4g} {self.output_unit}"
+        return text.rstrip()
+
+
+def _missing_search() -> ModelError:
+    """Return the error of a property that needs the record and the search."""
+    return ModelError(
+        "a model that was read has no data of its search: give a record, as plot(record=...), or take its "
+        "checks from `document`"
+    )

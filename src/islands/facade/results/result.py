@@ -1,52 +1,205 @@
-"""Result of `fit` and `identify`."""
+"""`Result` of `fit` and `identify`, new or read from a folder."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from islands.errors import ModelError, SettingsError
 from islands.evolution.progress import Steps
 from islands.evolution.search_result import SearchResult
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
-from islands.facade.results.ranked_models import RankedModels, write_validation_key
+from islands.facade.results.result_comparison import ResultComparison, compare_models
 from islands.io.result_folder import content_sha256, write_result
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.summary_text import summary
+from islands.simulation.predictors import Simulation
 from islands.validation.recommendation import Recommendation
 
 if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from narwhals.typing import IntoSeries
+
+    from islands.io.data_frames import RecordLike
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Result(RankedModels[FittedModel]):
-    """Result of a search."""
+class Result:
+    """Result of a search, new or read from a folder.
 
-    search_result: SearchResult
+    Attributes
+    ----------
+    models : tuple of FittedModel
+        All models, in the order of their free-run error on the validation data.
+    recommendation : Recommendation
+        Rank of the recommended model, and the reasons for the choice.
+    settings : mapping
+        Settings that determine the result, together with the record and the seed.
+    folder : Path or None
+        Folder that the result was read from; None for a new result.
+    document : mapping
+        Content of the ``result.json`` of this folder: record, settings, statistics of the search, models.
+        Empty for a new result.
+    """
+
+    models: tuple[FittedModel, ...]
+    recommendation: Recommendation
+    settings: Mapping[str, Any]
+    folder: Path | None = None
+    document: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    _search_result: SearchResult | None = None
+
+    @classmethod
+    def from_search(cls, found: SearchResult) -> "Result":
+        """Return the result of a search."""
+        models = tuple(
+            FittedModel.from_search(rank, entry, found) for rank, entry in enumerate(found.models, start=1)
+        )
+        return cls(models, found.recommendation, found.settings, _search_result=found)
 
     @property
-    def models(self) -> tuple[FittedModel, ...]:
-        """All models, in the order of their free-run error on the validation data."""
-        return tuple(
-            FittedModel(rank, entry, self.search_result)
-            for rank, entry in enumerate(self.search_result.models, start=1)
+    def search_result(self) -> SearchResult:
+        """Record, split and statistics of the search.
+
+        Raises
+        ------
+        ModelError
+            The result was read from a folder.
+        """
+        if self._search_result is None:
+            raise ModelError(f"{self.folder} has no data of its search: read `document`, or search again")
+        return self._search_result
+
+    @property
+    def best(self) -> FittedModel:
+        """Recommended model: the smallest one that is as good as the one with the least validation error.
+
+        ``result.models[0]`` has the least free-run error on the validation data.
+        """
+        return self.models[self.recommendation.rank - 1]
+
+    def predict(
+        self,
+        record: "RecordLike",
+        y: "ArrayLike | IntoSeries | None" = None,
+        dt: float | None = None,
+        *,
+        inputs: str | Sequence[str] = (),
+        output: str | None = None,
+    ) -> NDArray[np.float64]:
+        """Return the free run of the recommended model; see `FittedModel.predict`."""
+        return self.best.predict(record, y, dt, inputs=inputs, output=output)
+
+    def simulate(
+        self,
+        record: "RecordLike",
+        mode: str = "free-run",
+        warm_up: int | None = None,
+        shooting: int | None = None,
+    ) -> Simulation:
+        """Simulate a record with the recommended model; see `FittedModel.simulate`."""
+        return self.best.simulate(record, mode, warm_up, shooting)
+
+    def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
+        """Return the recommended model as text, or write it to a file; see `FittedModel.export`."""
+        return self.best.export(kind, path)
+
+    def plot(
+        self, kind: str = "free-run", record: "RecordLike | None" = None, *, ax: "Axes | None" = None
+    ) -> "Figure":
+        """Draw a figure of the recommended model; see `FittedModel.plot`."""
+        return self.best.plot(kind, record, ax=ax)
+
+    def compare(
+        self,
+        other: "Result",
+        record: "RecordLike | None" = None,
+        names: Sequence[str] = ("this", "other"),
+    ) -> ResultComparison:
+        """Compare the models with those of another result.
+
+        Parameters
+        ----------
+        other : Result
+        record : Dataset or data frame, optional
+            Record that all models simulate. By default the errors are those on the validation data of each
+            result, which are comparable if both have the same record and the same validation data.
+        names : sequence of str
+            Names of both results.
+
+        Returns
+        -------
+        ResultComparison
+            A table of the recommended models, also as HTML in a notebook, and a figure of all models
+            (`ResultComparison.plot`).
+
+        Raises
+        ------
+        RecordError
+            The record does not match a model.
+        """
+        both = (self, other)
+        return compare_models(
+            [each.models for each in both],
+            [each.recommendation.rank for each in both],
+            names,
+            self.validation_key == other.validation_key,
+            record,
         )
 
-    @property
-    def recommendation(self) -> Recommendation:
-        """Rank of the recommended model, and the reasons for the choice."""
-        return self.search_result.recommendation
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a table with one row per model, by rank.
+
+        Columns: whether it is recommended, its terms, its errors in free run (RMSE in the unit of the output,
+        MAPE in per cent of the output range, R2) on both parts of the data and one step ahead, and its
+        equation.
+
+        Raises
+        ------
+        SettingsError
+            pandas is not installed.
+        """
+        try:
+            import pandas  # noqa: PLC0415
+        except ImportError as error:
+            raise SettingsError("install pandas to get a table of the models") from error
+        rows = [_row(each, each.rank == self.recommendation.rank) for each in self.models]
+        return pandas.DataFrame(rows).set_index("rank")
+
+    def __repr__(self) -> str:
+        models = len(self.models)
+        return f"<Result of {models} model{'s' * (models > 1)}, recommended: {self.best.equation}>"
 
     @property
     def left_out(self) -> tuple[str, ...]:
         """Steps that a request to stop has left out; empty for a complete result."""
-        return self.search_result.search.left_out
+        if self._search_result is None:
+            return tuple(self.document["search"].get("left_out", ()))
+        return self._search_result.search.left_out
+
+    @property
+    def validation_key(self) -> str:
+        """Text that identifies the validation data."""
+        if self._search_result is None:
+            sha256, average = self.document["record"]["sha256"], self.document["preprocessing"]["average"]
+        else:
+            record, average = self._search_result.record, self._search_result.average
+            sha256 = record.sha256 or content_sha256(record)
+        return json.dumps([sha256, self.settings["validation"], average], sort_keys=True)
 
     def with_wall_time(self, seconds: float) -> "Result":
         """Return a copy of the result with the duration of the search in seconds."""
-        return Result(replace(self.search_result, search=replace(self.search_result.search, wall_s=seconds)))
+        found = self.search_result
+        return Result.from_search(replace(found, search=replace(found.search, wall_s=seconds)))
 
     def save(self, folder: str | Path, steps: Steps | None = None) -> Path:
         """Write ``result.json``, the models, the figures of the recommended model, and the texts.
@@ -87,17 +240,32 @@ class Result(RankedModels[FittedModel]):
                 save(figure, figures / f"{name}.svg")
 
     def __str__(self) -> str:
-        return summary(self.search_result)
-
-    @property
-    def validation_key(self) -> str:
-        """Text that identifies the validation data."""
-        found = self.search_result
-        return write_validation_key(
-            found.record.sha256 or content_sha256(found.record), found.settings, found.average
-        )
+        if self._search_result is None:
+            return (Path(self.folder or "") / "summary.txt").read_text(encoding="utf-8")
+        return summary(self._search_result)
 
     def _repr_html_(self) -> str:
+        if self._search_result is None:
+            reasons = [f"Recommended: model {self.best.rank}: {'; '.join(self.recommendation.reasons)}"]
+            return render_html(self.best.model, [*reasons, self.best.describe_error()])
         # The equation, which is indented, is shown in MathML.
-        sentences = [line for line in describe(self.search_result) if not line.startswith(" ")]
+        sentences = [line for line in describe(self._search_result) if not line.startswith(" ")]
         return render_html(self.best.model, sentences, self.best.plot())
+
+
+def _row(entry: FittedModel, recommended: bool) -> dict[str, object]:
+    parts = {"est": "estimation", "val": "validation"}
+    errors = {
+        f"{name}_{short}": getattr(entry.metrics[part]["free_run"], name)
+        for short, part in parts.items()
+        for name in ("rmse", "mape", "r2")
+    }
+    one_step = entry.metrics["validation"]["one_step_ahead"].rmse
+    return {
+        "rank": entry.rank,
+        "recommended": recommended,
+        "terms": entry.model.size,
+        **errors,
+        "one_step_rmse_val": one_step,
+        "equation": entry.equation,
+    }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
-from islands.facade.results.assessed_model import AssessedModel
+from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.model_simulation import record_of_model
 from islands.validation.metrics import Metrics, metrics
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class ComparedModel:
+class ComparisonRow:
     """One row of a comparison.
 
     Attributes
@@ -49,16 +49,16 @@ class ResultComparison:
 
     Attributes
     ----------
-    recommended : tuple of ComparedModel
+    recommended : tuple of ComparisonRow
         Recommended model of each result.
-    models : tuple of ComparedModel
+    models : tuple of ComparisonRow
         All models of both results.
     data : str
         What the errors were measured on.
     """
 
-    recommended: tuple[ComparedModel, ...]
-    models: tuple[ComparedModel, ...]
+    recommended: tuple[ComparisonRow, ...]
+    models: tuple[ComparisonRow, ...]
     data: str
 
     def plot(self, *, ax: "Axes | None" = None) -> "Figure":
@@ -99,7 +99,7 @@ class ResultComparison:
         return f"<div>{sentence}{table}{image_html(self.plot(), 'error over the number of terms')}</div>"
 
     def _cells(self) -> list[list[str]]:
-        head = [each.name for each in fields(ComparedModel)]
+        head = [each.name for each in fields(ComparisonRow)]
         return [head, *([_write(getattr(row, name)) for name in head] for row in self.recommended)]
 
 
@@ -110,7 +110,7 @@ def _write(value: object) -> str:
 
 
 def compare_models(
-    results: Sequence[Sequence[AssessedModel]],
+    results: Sequence[Sequence[FittedModel]],
     chosen: Sequence[int],
     names: Sequence[str],
     same_data: bool,
@@ -120,7 +120,7 @@ def compare_models(
 
     Parameters
     ----------
-    results : sequence of sequence of AssessedModel
+    results : sequence of sequence of FittedModel
         Models by rank, of each result.
     chosen : sequence of int
         Rank of the recommended model of each result.
@@ -153,11 +153,11 @@ def compare_models(
     return ResultComparison(recommended, tuple(row for models in rows for row in models), data)
 
 
-def _row(name: str, rank: int, entry: AssessedModel, record: "RecordLike | None") -> ComparedModel:
+def _row(name: str, rank: int, entry: FittedModel, record: "RecordLike | None") -> ComparisonRow:
     if record is None:
         errors = entry.metrics["validation"]["free_run"]
     else:
         data = match_rate(entry.model, record_of_model(entry.model, record))
         run = entry.simulate(data)
         errors = metrics(data.y, run.y) if run.outcome else Metrics(nan, nan, nan, nan)
-    return ComparedModel(name, rank, entry.model.size, errors.rmse, errors.mape, errors.r2, entry.equation)
+    return ComparisonRow(name, rank, entry.model.size, errors.rmse, errors.mape, errors.r2, entry.equation)

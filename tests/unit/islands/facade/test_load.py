@@ -81,7 +81,7 @@ def test_a_result_simulates_as_the_command(base, tmp_path, name, arguments):
     with undrawn_figures():
         succeed(name, base / "r.csv", *COLUMNS, *arguments, "--out", folder)
     record, loaded = read(base), islands.load(folder)
-    assert isinstance(loaded, islands.SavedResult)
+    assert isinstance(loaded, islands.Result)
     for mode in ("free-run", "shooting", "one-step"):
         (printed,) = command(folder, base / "r.csv", "--mode", mode, out=out)
         np.testing.assert_array_equal(loaded.simulate(record, mode).y, printed)
@@ -106,7 +106,7 @@ def test_two_outputs_simulate_as_the_command(base, tmp_path):
         assert isinstance(loaded, FittedCoupledModel)
         printed = command(path, base / "masses.csv", out=out)
         np.testing.assert_array_equal(loaded.simulate(record).y.T, printed)
-    assert isinstance(islands.load(folder / "outputs" / "1-y1"), islands.SavedResult)
+    assert isinstance(islands.load(folder / "outputs" / "1-y1"), islands.Result)
 
 
 @pytest.mark.ci
@@ -136,7 +136,7 @@ def test_a_model_file_starts_after_its_lags_and_has_no_bands(base, tmp_path):
     np.testing.assert_array_equal(loaded.simulate(read(base)).y, printed)
     with pytest.raises(islands.ModelError, match="bands need a model of a result folder"):
         loaded.bands(read(base))
-    assert repr(loaded).startswith("<SavedModel: y(k) =")
+    assert repr(loaded).startswith("<FittedModel: y(k) =")
     assert "</math>" in loaded._repr_html_()
 
 

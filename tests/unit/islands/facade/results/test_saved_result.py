@@ -23,9 +23,7 @@ def test_a_folder_gives_the_models_errors_and_settings_of_the_result(result, sto
     assert stored.settings["library"] == "polynomial"
     assert stored.to_pandas().equals(result.to_pandas())
     assert str(stored) == str(result)
-    assert (
-        repr(stored) == f"<SavedResult of {len(result.models)} models, recommended: {result.best.equation}>"
-    )
+    assert repr(stored) == f"<Result of {len(result.models)} models, recommended: {result.best.equation}>"
 
 
 def test_predictions_and_bands_of_a_folder_are_those_of_the_result(result, stored):
