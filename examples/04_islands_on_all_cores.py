@@ -53,7 +53,7 @@ print(f"error {serial.best.metrics['validation']['free_run'].mape:.3f} %")
 # `engine=islands.Ray(cpus=2)` uses two cores. The islands run in several processes at the same time. Starting
 # Ray takes a few seconds, so it pays off in searches that take longer than this one.
 #
-# `progress` is called after the first generation and after every migration, with the state of the search
+# `on_epoch` is called after the first generation and after every migration, with the state of the search
 # and its settings.
 
 
@@ -62,7 +62,7 @@ def show(state, settings):
     print(f"generation {state.archipelago.generation} of {settings.generations}: {state.evaluations} models")
 
 
-parallel = islands.identify(record, seed=0, engine="ray", progress=show, **settings)
+parallel = islands.identify(record, seed=0, engine="ray", on_epoch=show, **settings)
 
 # %%
 # ## The same result

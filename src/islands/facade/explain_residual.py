@@ -11,7 +11,7 @@ from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
 from islands.evolution.engine import Engine
-from islands.evolution.progress import Stop, never_stop
+from islands.evolution.progress import ProgressCallback, Stop, ignore_progress, never_stop
 from islands.evolution.search_state import SearchState
 from islands.facade.engine_choice import Ray
 from islands.facade.identify import SearchCallback, identify
@@ -55,7 +55,8 @@ def explain_residual(
     found: Diagnosis,
     seed: int = 0,
     engine: Engine | Ray | str | None = None,
-    progress: SearchCallback | None = None,
+    progress: ProgressCallback = ignore_progress,
+    on_epoch: SearchCallback | None = None,
     stop: Stop = never_stop,
     start: SearchState | None = None,
 ) -> ResidualFormula | None:
@@ -66,7 +67,7 @@ def explain_residual(
     Parameters
     ----------
     found : Diagnosis
-    seed, engine, progress, stop, start
+    seed, engine, progress, on_epoch, stop, start
         Arguments of `identify`; ``start`` is a state of the search for the same residual.
 
     Returns
@@ -99,6 +100,7 @@ def explain_residual(
         seed=seed,
         engine=engine,
         progress=progress,
+        on_epoch=on_epoch,
         stop=stop,
         start=start,
         **SEARCH,

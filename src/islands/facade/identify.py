@@ -78,8 +78,8 @@ def identify(
     validation: "RecordLike | float" = 0.25,
     preset: str | Choice = AUTO,
     seed: int = 0,
-    progress: SearchCallback | None = None,
-    stage: ProgressCallback = ignore_progress,
+    progress: ProgressCallback = ignore_progress,
+    on_epoch: SearchCallback | None = None,
     stop: Stop = never_stop,
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
@@ -107,9 +107,9 @@ def identify(
     seed : int
         Seed of the random generator; the same seed gives the same result, bit for bit.
     progress : callable, optional
-        Called with the `SearchState` and the `Settings` after every epoch.
-    stage : callable, optional
         Called with a message and the completed fraction of each stage before and after the epochs.
+    on_epoch : callable, optional
+        Called with the `SearchState` and the `Settings` after every epoch.
     stop : callable, optional
         Called frequently. Once it returns true, the present step ends with the best models so far, and those
         after it are left out: refinement, prediction bands. ``search.ended_by`` of the result is ``stopped``.
@@ -141,10 +141,10 @@ def identify(
     record, validation = read_data(record, y, dt, inputs, output, validation)
     if seed < 0:
         raise SettingsError(f"a seed is not negative, got {seed}")
-    steps = Steps(stage, stop)
+    steps = Steps(progress, stop)
     if preset == AUTO:
         try:
-            preset = choose_preset(record, validation, changes, stage, stop)
+            preset = choose_preset(record, validation, changes, progress, stop)
         except StoppedChoiceError as stopped:
             return Result.from_search(stopped.found)
     if isinstance(preset, Choice):
@@ -172,13 +172,13 @@ def identify(
         raise SettingsError(
             "the start state has other islands or another seed: pass the settings and the seed of its run"
         )
-    with open_engine(engine, stage) as opened:
-        state = _evolve(search_problem, state, settings, opened, steps, progress or _ignore_epoch)
+    with open_engine(engine, progress) as opened:
+        state = _evolve(search_problem, state, settings, opened, steps, on_epoch or _ignore_epoch)
     if state.archipelago.generation < 0 and not search_problem.seeds:
         raise StoppedError("first populations")
     hall_of_fame = state.archipelago.hall_of_fame
     candidates = estimate_candidates(hall_of_fame, search_problem, split, offsets, steps)
-    stage("assessment of the final models", 1.0)
+    progress("assessment of the final models", 1.0)
     models = select_final_models(candidates, search_problem, split, steps)
     if not models:
         raise SettingsError(
@@ -201,14 +201,14 @@ def _evolve(
     settings: Settings,
     engine: Engine,
     steps: Steps,
-    progress: SearchCallback,
+    on_epoch: SearchCallback,
 ) -> SearchState:
     """Run the epochs, which are an optional step; return the state after the last one."""
     with closing(engine.run(problem, state.archipelago, steps.stop)) as epochs:
         # Epochs after the last one are never requested, so work that an engine does in advance has no effect.
         while not (steps.stop() or stop_reason(state, settings)) and (epoch := next(epochs, None)):
             state = advance(state, epoch)
-            progress(state, settings)
+            on_epoch(state, settings)
     if not stop_reason(state, settings):
         done = max(0, state.archipelago.generation)
         steps.skip(f"search from generation {done} to {settings.generations}")

@@ -1,8 +1,12 @@
 """Public names of the package and its docstring."""
 
+import inspect
+from collections import defaultdict
+
 import islands
+from islands.evolution.progress import ProgressCallback
 from islands.facade.fit import fit
-from islands.facade.identify import identify
+from islands.facade.identify import SearchCallback, identify
 from support.repository import ROOT
 
 
@@ -32,3 +36,16 @@ def test_package_docstring_shows_an_example():
 def test_facade_functions_are_public():
     assert islands.identify is identify
     assert islands.fit is fit
+
+
+def test_callbacks_mean_the_same_in_every_function():
+    """``progress`` gets a message and a fraction, ``on_epoch`` the state of a search and its settings."""
+    found = defaultdict(set)
+    for name in islands.__all__:
+        value = getattr(islands, name)
+        if inspect.isfunction(value):
+            for parameter in inspect.signature(value).parameters.values():
+                found[parameter.name].add(str(parameter.annotation))
+    assert found["progress"] == {str(ProgressCallback)}
+    assert found["on_epoch"] == {str(SearchCallback | None)}
+    assert "stage" not in found

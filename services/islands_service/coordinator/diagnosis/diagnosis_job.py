@@ -84,7 +84,7 @@ def run_diagnosis_job(
         )
         report(FORMULA, 0.95)
         start = state.begin_search(diagnosed)
-        formula = explain_residual(diagnosed, spec.seed, progress=report.count_epochs, stop=stop, start=start)
+        formula = explain_residual(diagnosed, spec.seed, on_epoch=report.count_epochs, stop=stop, start=start)
         left_out.remove(FORMULA)
         found = DiagnosisResult.from_diagnosis(diagnosed, formula, wall_s=report.spent)
         report("writing the report", 0.98)

@@ -135,9 +135,7 @@ def fit_coupled(
     trial = take_library(chosen["library"], degree, lags, constraints)
     find = partial(fit, seed=seed, stop=stop)
     data = _read_data(record, inputs, outputs, dt, validation)
-    return _couple(
-        data, chosen, trial, trial.lags + 3, refine_together, Steps(progress, stop), "progress", find
-    )
+    return _couple(data, chosen, trial, trial.lags + 3, refine_together, Steps(progress, stop), find)
 
 
 def identify_coupled(
@@ -150,8 +148,8 @@ def identify_coupled(
     refine_together: bool = True,
     preset: str = "narx",
     seed: int = 0,
-    progress: SearchCallback | None = None,
-    stage: ProgressCallback = ignore_progress,
+    progress: ProgressCallback = ignore_progress,
+    on_epoch: SearchCallback | None = None,
     stop: Stop = never_stop,
     engine: Engine | Ray | str | None = None,
     **changes: Unpack[SettingChanges],
@@ -169,9 +167,9 @@ def identify_coupled(
     seed : int
         Seed of the random generator; the same seed gives the same result, bit for bit.
     progress : callable, optional
-        Called with the `SearchState` and the `Settings` after every epoch of the search of each output.
-    stage : callable, optional
         Called with a message and the completed fraction of each stage.
+    on_epoch : callable, optional
+        Called with the `SearchState` and the `Settings` after every epoch of the search of each output.
     stop : callable, optional
         As for `fit_coupled`.
     engine : str, Ray or Engine, optional
@@ -199,11 +197,11 @@ def identify_coupled(
             "select is 'validation' with several outputs: equations are chosen by their free run together"
         )
     chosen.setdefault("average", settings.average)
-    find = partial(identify, preset=preset, seed=seed, progress=progress, stop=stop, engine=engine)
+    find = partial(identify, preset=preset, seed=seed, on_epoch=on_epoch, stop=stop, engine=engine)
     trial = make_trial_library(settings)
     data = _read_data(record, inputs, outputs, dt, validation)
     return _couple(
-        data, chosen, trial, settings.maximum_lag + 3, refine_together, Steps(stage, stop), "stage", find
+        data, chosen, trial, settings.maximum_lag + 3, refine_together, Steps(progress, stop), find
     )
 
 
@@ -250,7 +248,6 @@ def _couple(
     least: int,
     refine_together: bool,
     steps: Steps,
-    callback: str,
     find: Callable[..., Result],
 ) -> CoupledResult:
     """Search every output, choose the equations and refine them."""
@@ -263,9 +260,9 @@ def _couple(
     options["average"] = min(select_rate(split, average, trial, least, steps)[1] for split in splits)
     results = []
     for name, split in zip(names, splits, strict=True):
-        shown = {callback: partial(_report, steps.report, name)}
+        show = partial(_report, steps.report, name)
         try:
-            results.append(find(split.estimation, validation=split.validation, **shown, **options))
+            results.append(find(split.estimation, validation=split.validation, progress=show, **options))
         except StoppedError as stopped:
             raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
     steps.report("choice of the equations", 0.0)

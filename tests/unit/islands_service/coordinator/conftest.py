@@ -55,7 +55,7 @@ def undisturbed(record: Path) -> tuple[list[Any], list[Any]]:
         read_record(record, ["u_V"], "y_um"),
         preset="hysteresis",
         seed=SEED,
-        progress=lambda state, _: states.append(state),
+        on_epoch=lambda state, _: states.append(state),
         engine=SerialEngine(),
         **SETTINGS,
     )

@@ -79,8 +79,8 @@ def demo(
             validation=validation,
             preset=PRESET,
             islands=ISLANDS,
-            progress=search_progress(show),
-            stage=show,
+            progress=show,
+            on_epoch=search_progress(show),
             stop=stop,
             engine=engine,
         )

@@ -14,7 +14,7 @@ def data():
 def search(data):
     """Return the result of an identification and the states that it reported."""
     states = []
-    return identify(data, **BUDGET, seed=5, progress=record_states(states)), states
+    return identify(data, **BUDGET, seed=5, on_epoch=record_states(states)), states
 
 
 @pytest.fixture(scope="session")

@@ -98,7 +98,7 @@ def test_exact_model_meets_every_positive_target_error():
 )
 def test_search_ends_with_the_first_epoch_that_reaches_max_evaluations(data, states, budget):
     seen = []
-    found = identify(data, **BUDGET, max_evaluations=budget, seed=5, progress=record_states(seen))
+    found = identify(data, **BUDGET, max_evaluations=budget, seed=5, on_epoch=record_states(seen))
     last = next((place for place, state in enumerate(states) if state.evaluations >= budget), 4)
     assert seen == states[: last + 1]
     search = found.search_result.search
@@ -112,7 +112,7 @@ def test_search_ends_with_the_first_epoch_that_reaches_max_evaluations(data, sta
 def test_search_ends_with_the_first_epoch_that_reaches_target_error(data, states, place):
     seen = []
     target = nextafter(min(states[place].history[-1].islands) ** 0.5, inf)
-    found = identify(data, **BUDGET, target_error=target, seed=5, progress=record_states(seen))
+    found = identify(data, **BUDGET, target_error=target, seed=5, on_epoch=record_states(seen))
     last = next(at for at, state in enumerate(states) if min(state.history[-1].islands) <= target**2)
     assert last <= place
     assert seen == states[: last + 1]
@@ -124,7 +124,7 @@ def test_epoch_in_which_a_budget_is_reached_is_completed(data, states):
     """A longer run has the same epochs, because no epoch is cut short."""
     seen = []
     changes = {**BUDGET, "migrate_every": 3, "max_evaluations": 31}
-    found = identify(data, **changes, seed=5, progress=record_states(seen))
+    found = identify(data, **changes, seed=5, on_epoch=record_states(seen))
     assert [state.evaluations for state in seen] == [30, 120]
     assert seen[-1].history == states[3].history
     assert (found.search_result.search.generations, found.search_result.search.ended_by) == (3, "evaluations")
@@ -142,14 +142,14 @@ def test_search_that_fails_closes_its_engine(data):
 
     engine = RecordingEngine()
     with pytest.raises(ZeroDivisionError) as failed:
-        identify(data, **BUDGET, seed=5, engine=engine, progress=broken)
+        identify(data, **BUDGET, seed=5, engine=engine, on_epoch=broken)
     # The engine is closed at once, not when the traceback is released.
     assert (len(engine.epochs), engine.closed) == (1, True), failed
 
 
 def test_stopped_search_keeps_its_last_epoch(data, states):
     seen = []
-    found = identify(data, **BUDGET, seed=5, progress=record_states(seen), stop=lambda: len(seen) == 2)
+    found = identify(data, **BUDGET, seed=5, on_epoch=record_states(seen), stop=lambda: len(seen) == 2)
     assert seen == states[:2]
     assert found.search_result.search.ended_by == "stopped"
     assert found.search_result.search.generations == 1
@@ -165,7 +165,7 @@ def test_search_stopped_within_an_epoch_keeps_the_previous_epoch(data, states):
         return len(calls) > 6
 
     seen = []
-    found = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, progress=record_states(seen), stop=stop)
+    found = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, on_epoch=record_states(seen), stop=stop)
     assert seen == states[:1]
     assert (found.search_result.search.generations, found.search_result.search.ended_by) == (0, "stopped")
     # A resumed run continues as if it had not been stopped.
@@ -175,7 +175,7 @@ def test_search_stopped_within_an_epoch_keeps_the_previous_epoch(data, states):
 
 def test_stop_after_the_last_epoch_leaves_out_the_steps_after_the_search(data, states):
     seen = []
-    found = identify(data, **BUDGET, seed=5, progress=record_states(seen), stop=lambda: len(seen) == 5)
+    found = identify(data, **BUDGET, seed=5, on_epoch=record_states(seen), stop=lambda: len(seen) == 5)
     assert seen == states
     assert found.search_result.search.ended_by == "stopped"
     assert found.search_result.ensemble is None
@@ -183,7 +183,7 @@ def test_stop_after_the_last_epoch_leaves_out_the_steps_after_the_search(data, s
 
 def test_search_stopped_before_its_first_population_raises_an_error(data):
     with pytest.raises(StoppedError, match="stopped before this step: sampling rate"):
-        identify(data, **BUDGET, progress=pytest.fail, stop=lambda: True)
+        identify(data, **BUDGET, on_epoch=pytest.fail, stop=lambda: True)
 
 
 def test_search_state_needs_an_archipelago():

@@ -94,7 +94,7 @@ def test_models_without_property_1_do_not_enter_the_hall_of_fame(data, seed):
     states = []
     budget = {"preset": "paper-case1", "population": 30, "generations": 2, "max_terms": 4, "shooting": 100}
     short = data[:1500]
-    found = identify(short, **budget, seed=seed, progress=lambda state, _settings: states.append(state))
+    found = identify(short, **budget, seed=seed, on_epoch=lambda state, _settings: states.append(state))
     assert all(fitted.physics.property_1 for fitted in found.models)
     estimation = split(short, 0.25).estimation
     known = [
@@ -145,7 +145,7 @@ def test_run_from_a_start_state_equals_an_uninterrupted_run(data, result, states
 )
 def test_start_with_other_islands_or_another_seed_raises_an_error(data, other):
     with pytest.raises(SettingsError, match="the start state has other islands or another seed"):
-        identify(data, **BUDGET, islands=2, seed=5, start=SearchState(other), progress=pytest.fail)
+        identify(data, **BUDGET, islands=2, seed=5, start=SearchState(other), on_epoch=pytest.fail)
 
 
 def test_empty_start_state_equals_a_run_without_a_start_state(data, result):
@@ -168,7 +168,7 @@ def test_islands_evolve_independently_between_migrations(data):
     ):
         budget = islands_budget(**changes)
         result = identify(
-            data[:1000], **budget, seed=5, progress=lambda state, _settings, to=states: to.append(state)
+            data[:1000], **budget, seed=5, on_epoch=lambda state, _settings, to=states: to.append(state)
         )
         assert result.search_result.settings["islands"] == len(states[0].archipelago.islands)
         assert result.search_result.search.evaluations == 4 * 12 * result.search_result.settings["islands"]
@@ -193,7 +193,7 @@ def test_epochs_end_at_stops_and_report_all_generations(data):
         identify(
             data[:1000],
             **{**islands_budget(), "generations": 4, "migrate_every": every, "seed": 5},
-            progress=lambda state, _settings, to=to: to.append(state),
+            on_epoch=lambda state, _settings, to=to: to.append(state),
         )
     assert [state.archipelago.generation for state in states] == [0, 3, 4]
     assert [state.archipelago.generation for state in longer] == [0, 2, 3, 4]
@@ -241,8 +241,8 @@ def test_stages_before_and_after_the_epochs_are_reported_and_have_no_effect():
         record(600),
         **search,
         seed=5,
-        progress=lambda _state, _settings: news.append("epoch"),
-        stage=lambda message, _fraction=None: news.append(message),
+        on_epoch=lambda _state, _settings: news.append("epoch"),
+        progress=lambda message, _fraction=None: news.append(message),
     )
     assert parameters(found) == parameters(identify(record(600), **search, seed=5))
     first, last = news.index("epoch"), len(news) - news[::-1].index("epoch")

@@ -25,7 +25,7 @@ def states():
 
 @pytest.fixture(scope="module")
 def result(states):
-    return islands.identify(record(), progress=lambda state, _: states.append(state), **SEARCH)
+    return islands.identify(record(), on_epoch=lambda state, _: states.append(state), **SEARCH)
 
 
 def test_search_finds_a_law_that_needs_the_primitive(result):
@@ -72,7 +72,7 @@ def test_resumed_run_equals_an_uninterrupted_one(result, states, tmp_path):
 
 def refused(*primitives):
     with pytest.raises(SettingsError) as caught:
-        islands.identify(record(), progress=pytest.fail, **{**SEARCH, "primitives": primitives})
+        islands.identify(record(), on_epoch=pytest.fail, **{**SEARCH, "primitives": primitives})
     return str(caught.value)
 
 
@@ -86,4 +86,4 @@ def test_wrong_entries_are_refused_with_advice():
 def test_function_that_does_not_compile_is_refused_before_the_search():
     own = islands.primitive("own", lambda a: float(decimal.Decimal(a)))
     with pytest.raises(ModelError, match="primitive 'own' does not compile; use arithmetic"):
-        islands.identify(record(), progress=pytest.fail, **{**SEARCH, "primitives": (own,)})
+        islands.identify(record(), on_epoch=pytest.fail, **{**SEARCH, "primitives": (own,)})

@@ -141,23 +141,23 @@ def test_presets_run_with_a_small_budget(data, preset):
 )
 def test_invalid_setting_raises_settings_error_with_its_name(data, changes, message):
     with pytest.raises(SettingsError, match=message):
-        identify(data, progress=pytest.fail, **changes)
+        identify(data, on_epoch=pytest.fail, **changes)
 
 
 def test_too_short_records_raise_an_error_before_the_search(data):
     with pytest.raises(RecordError, match="the validation data has 20 samples: lags up to"):
-        identify(data, validation=record(seed=9)[:20], progress=pytest.fail, **BUDGET)
+        identify(data, validation=record(seed=9)[:20], on_epoch=pytest.fail, **BUDGET)
     with pytest.raises(RecordError, match="the validation data has 25 samples"):
-        identify(data[:100], progress=pytest.fail, **BUDGET)
+        identify(data[:100], on_epoch=pytest.fail, **BUDGET)
     with pytest.raises(RecordError, match="take a longer recording"):
-        identify(data[:20], validation=record(seed=9), progress=pytest.fail, **BUDGET)
+        identify(data[:20], validation=record(seed=9), on_epoch=pytest.fail, **BUDGET)
 
 
 def test_validation_data_of_another_system_raise_an_error(data):
     with pytest.raises(RecordError, match="the validation data 2"):
-        identify(data, validation=two_inputs(seed=1), progress=pytest.fail)
+        identify(data, validation=two_inputs(seed=1), on_epoch=pytest.fail)
     with pytest.raises(RecordError, match="resample the validation data"):
-        identify(data, validation=replace(data, dt=0.5), progress=pytest.fail)
+        identify(data, validation=replace(data, dt=0.5), on_epoch=pytest.fail)
 
 
 def test_error_without_models_lists_the_outcomes():
@@ -209,7 +209,7 @@ def test_select_fitness_recommends_the_model_of_least_training_error():
             generations=4,
             prune=0.0,
             select=select,
-            progress=lambda state, _settings: states.append(state),
+            on_epoch=lambda state, _settings: states.append(state),
         )
         for select in ("fitness", "validation")
     }

@@ -178,7 +178,7 @@ def test_a_run_with_the_recorded_settings_equals_the_run():
 
 def test_a_resumed_run_on_means_equals_an_uninterrupted_one():
     states = []
-    found = identify_in_two_epochs(SHORT, average=5, progress=lambda state, _: states.append(state))
+    found = identify_in_two_epochs(SHORT, average=5, on_epoch=lambda state, _: states.append(state))
     resumed = identify_in_two_epochs(SHORT, average=5, start=states[0])
     assert measurements(resumed) == measurements(found)
 
