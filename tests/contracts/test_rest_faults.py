@@ -280,7 +280,7 @@ def test_the_figure_process_has_memory_and_cpu_limits(tmp_path):
     """The process reads untrusted files."""
     script = (
         "import resource, sys\n"
-        "from islands_service.reports import figure_worker\n"
+        "from islands_service import figure_worker\n"
         "sys.argv = ['figure_worker', 'job', '--owner', 'local']\n"
         "assert figure_worker.main() == 22\n"
         "print(resource.getrlimit(resource.RLIMIT_AS)[0], resource.getrlimit(resource.RLIMIT_CPU)[0])\n"

@@ -186,30 +186,31 @@ def test_batch_equals_single_evaluations():
 
 
 @pytest.fixture
-def calls(monkeypatch):
-    """Sizes of the batches passed to the kernel."""
+def batches(monkeypatch):
+    """Sizes of the batches whose inner products are computed: of selections, then of evaluations."""
     sizes = []
-    original = evaluation.kernel.evaluate
+    original = evaluation.complete_pairs
 
-    def spy(structures, *others):
-        sizes.append(len(structures))
-        return original(structures, *others)
+    def spy(terms, lengths, *others):
+        sizes.append(len(lengths))
+        return original(terms, lengths, *others)
 
-    monkeypatch.setattr(evaluation.kernel, "evaluate", spy)
+    monkeypatch.setattr(evaluation, "complete_pairs", spy)
     return sizes
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-def test_small_pair_table_splits_a_generation_into_several_calls(calls, name):
+def test_small_pair_table_splits_a_generation_into_several_batches(batches, name):
     population = [(each, pruned) for each in POOL for pruned in (False, True)]
     whole = Evaluator(record(), SETTINGS[name]).evaluate(population)
-    assert calls == [len(population) - whole[1]]
-    del calls[:]
-    # A call may use half of 1024 places; five genes and y(k) have 21 pairs.
+    (selected, evaluated) = batches
+    assert evaluated == len(population) - whole[1]
+    del batches[:]
+    # A batch may use half of 1024 places; five genes and y(k) have 21 pairs.
     parts = Evaluator(record(), SETTINGS[name], Limits(pairs=0)).evaluate(population)
     assert repr(parts) == repr(whole)
-    assert max(calls) == 1024 // 2 // 21
-    assert sum(calls) == len(population) - whole[1]
+    assert batches[0] == 1024 // 2 // 21 < selected
+    assert sum(batches) == selected + evaluated
 
 
 def test_nearly_full_pair_table_is_emptied_between_calls():

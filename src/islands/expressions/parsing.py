@@ -1,7 +1,7 @@
 """Parser of expressions in plain text, for regressors of models and for equations of simulations.
 
 Both syntaxes are subsets of Python's, except for the caret in models, so Python's parser is used; nothing is
-evaluated. `MODEL_SYNTAX` and `EQUATION_SYNTAX` state in what they differ.
+evaluated. Their differences are in `MODEL_SYNTAX` and `EQUATION_SYNTAX`.
 """
 
 import ast

@@ -200,7 +200,7 @@ def select_terms(structures, pruned, context, selected):
 def evaluate_individuals(selected, allowed, context, results):
     """Estimate and simulate individuals whose terms are selected; the pairs are in the table.
 
-    It takes half of the time of all compilations, so it is a kernel of its own.
+    It takes half of the time of all compilations, so it is a separate kernel.
 
     Parameters
     ----------

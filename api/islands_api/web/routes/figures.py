@@ -233,7 +233,7 @@ async def _run_figure_worker(state: AppState, caller: Principal, job: str, rank:
         *(
             sys.executable,
             "-m",
-            "islands_service.reports.figure_worker",
+            "islands_service.figure_worker",
             job,
             f"--owner={caller.owner}",
             *options,

@@ -80,7 +80,7 @@ class DiagnosisResult(Diagnosis):
     def write_report(self, name: str) -> bytes:
         """Return ``report.html``, with the name of the record: sentences, numbers and figures."""
         # matplotlib takes half a second to import.
-        from islands.reports.diagnosis_report import diagnosis_report  # noqa: PLC0415
+        from islands.reports.diagnosis import diagnosis_report  # noqa: PLC0415
 
         return diagnosis_report(name, self, self.tested, self.formula)
 

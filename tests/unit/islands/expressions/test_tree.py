@@ -104,7 +104,7 @@ def test_content_orders_signals_functions_back_shifts_numbers():
     assert len(set(keys)) == len(keys)
 
 
-def test_functions_of_equations_are_not_protected_primitives_but_share_the_arithmetic():
+def test_functions_of_equations_are_not_protected_but_share_the_arithmetic():
     assert Apply(PRIMITIVES["div"], (Symbol("a"), Symbol("b"))) != parse_expression("a/b")
     assert Apply(MUL, (Symbol("a"), Symbol("b"))) == parse_expression("a*b")
 

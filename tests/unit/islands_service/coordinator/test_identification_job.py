@@ -14,7 +14,7 @@ from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError, Submission
-from islands_service.reports.figure_worker import read_search_result
+from islands_service.figure_worker import read_search_result
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreUnavailableError

@@ -12,7 +12,7 @@ from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import ISLANDS_VERSION, Job, JobState, Submission
-from islands_service.reports.figure_worker import read_search_result
+from islands_service.figure_worker import read_search_result
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs

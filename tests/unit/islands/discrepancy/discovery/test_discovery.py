@@ -31,7 +31,7 @@ from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import LocalExtendedSpec
-from islands.reports.diagnosis_report import diagnosis_report
+from islands.reports.diagnosis import diagnosis_report
 from support.equation_programs import run_c
 
 DT = 0.01

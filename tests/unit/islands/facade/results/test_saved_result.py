@@ -71,7 +71,7 @@ def test_damaged_results_are_named(folder, tmp_path, damage, message):
         islands.read_result(tmp_path / "copy")
 
 
-def test_a_result_of_an_earlier_version_has_no_bands_and_starts_after_the_lags_of_a_model(folder, tmp_path):
+def test_a_result_of_an_earlier_version_has_no_bands_and_starts_after_the_lags(folder, tmp_path):
     shutil.copytree(folder, tmp_path / "copy")
     file = tmp_path / "copy" / "result.json"
     document = json.loads(file.read_text())

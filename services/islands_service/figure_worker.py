@@ -1,4 +1,4 @@
-"""Figures of a finished job: ``python -m islands_service.reports.figure_worker JOB``.
+"""Figures of a finished job: ``python -m islands_service.figure_worker JOB``.
 
 Rendering takes seconds and must not delay requests, so it runs in a separate process. Messages on standard
 output are for the owner of the job, those on standard error for the operator.
@@ -26,7 +26,7 @@ from islands.io.checkpoints import history_from_document
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import model_from_json
 from islands.io.result_models import read_shooting_interval
-from islands.reports.identification_report import identification_report
+from islands.reports.identification import identification_report
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands_service.domain.job import REPORT, Job
@@ -51,7 +51,7 @@ _CPU_SECONDS = 600
 
 def main() -> int:
     """Render and store all figures of a model or of the search."""
-    command = "python -m islands_service.reports.figure_worker"
+    command = "python -m islands_service.figure_worker"
     parser = argparse.ArgumentParser(prog=command, description=__doc__)
     parser.add_argument("job")
     parser.add_argument("--owner", required=True)

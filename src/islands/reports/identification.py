@@ -1,28 +1,16 @@
-"""HTML report of an identification ."""
+"""HTML report of an identification."""
 
-import base64
 from collections.abc import Mapping
-from io import BytesIO
 from math import nan
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 from islands.evolution.search_result import SearchResult
-from islands.figures.style import save
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.model_table import LEGEND, columns, number, rows
 from islands.model.equations import mathml_equation, named_term
-
-#: Environment of the HTML templates.
-TEMPLATES = Environment(
-    loader=PackageLoader("islands.reports", "templates"),
-    autoescape=select_autoescape(),
-    trim_blocks=True,
-    undefined=StrictUndefined,
-)
+from islands.reports.rendering import TEMPLATES, inline_svg
 
 #: Captions of the figures, in the order of the report.
 CAPTIONS = {
@@ -53,7 +41,7 @@ def identification_report(name: str, found: SearchResult, figures: Mapping[str, 
         {"cells": cells, "equation": Markup(mathml_equation(entry.model))}
         for cells, entry in zip(rows(found), found.models, strict=True)
     ]
-    shown = [(caption, _inline(figures[each])) for each, caption in CAPTIONS.items() if each in figures]
+    shown = [(caption, inline_svg(figures[each])) for each, caption in CAPTIONS.items() if each in figures]
     text = TEMPLATES.get_template("report.html").render(
         name=name,
         record=found.record,
@@ -89,14 +77,3 @@ def _terms(found: SearchResult) -> list[tuple[str, str, str, str]]:
 
 def _settings(found: SearchResult) -> list[tuple[str, Any]]:
     return [(name, value) for name, value in found.settings.items() if not isinstance(value, Mapping)]
-
-
-def inline_figure(figure: Figure) -> str:
-    """Return a figure as the address of an embedded image."""
-    stream = BytesIO()
-    save(figure, stream)
-    return _inline(stream.getvalue())
-
-
-def _inline(svg: bytes) -> str:
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"

@@ -3,7 +3,7 @@
 import islands
 from islands.data.dataset import Dataset
 from islands.model.equations import named_term
-from islands.reports.identification_report import identification_report
+from islands.reports.identification import identification_report
 from support.identifications import record
 
 

@@ -14,7 +14,7 @@ from islands.discrepancy.discovery.discovery import Discovery
 from islands.discrepancy.inference.finding import Value
 from islands.discrepancy.inference.verdict import Verdict
 from islands.io.result_text.diagnosis_text import summarise_diagnosis, summarise_self_test
-from islands.reports.diagnosis_report import diagnosis_report
+from islands.reports.diagnosis import diagnosis_report
 
 EQUATIONS = Discovery("dx/dt = -x + a1*x**3; a1 = 0.2", ("jump",), ("cubic-stiffness",), 2.0)
 

@@ -13,7 +13,7 @@ from islands.io.result_text.diagnosis_text import (
     describe_verdict,
     summarise_self_test,
 )
-from islands.reports.identification_report import TEMPLATES, inline_figure
+from islands.reports.rendering import TEMPLATES, inline_figure
 
 #: Captions of the figures, in the order of the report.
 _CAPTIONS = {

@@ -1,1 +1,0 @@
-"""The process that renders figures of jobs."""
