@@ -78,10 +78,10 @@ def test_a_level_without_a_band_is_refused(level):
 
 def test_a_model_without_bands_says_why():
     best = result().best
-    unknown = replace(best, ranked_model=replace(best.ranked_model, bands=None))
+    unknown = replace(best, prediction_bands=None)
     with pytest.raises(ModelError, match="no prediction bands"):
         unknown.bands(record())
-    without = replace(best, search_result=replace(best.search_result, ensemble=None))
+    without = replace(best, _search_result=replace(best.search_result, ensemble=None))
     with pytest.raises(ModelError, match="no ensemble"):
         _ = without.inclusion
 
