@@ -49,6 +49,7 @@ from islands.evolution.search_state import SearchState, advance
 from islands_service.coordinator.identification_job import ProgressReporter
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_notes import JobNotes
+from islands_service.coordinator.job_run import JobRun
 from islands_service.engines import ENGINES
 from islands_service.runtime import actor_pool, regions
 from islands_service.runtime.packed_epoch import PackedEpoch, PackedIslands, pack_epoch
@@ -203,10 +204,10 @@ def measure_driver(answer: PackedEpoch, pace: float) -> dict[str, float]:
         store = Store(f"sqlite:///{folder}/islands.db")
         submitted(store)
         lease = claimed(store)
-        checkpoints = NoCheckpoints(lease.job, Blobs(Path(folder) / "blobs"))
-        reporter = ProgressReporter(
-            lease, store, checkpoints, lambda: None, inf, JobStart(), JobNotes(lease, store)
-        )
+        blobs = Blobs(Path(folder) / "blobs")
+        checkpoints = NoCheckpoints(lease.job, blobs)
+        run = JobRun(lease, store, blobs, SerialEngine(), lambda: None, inf, JobNotes(lease, store))
+        reporter = ProgressReporter(run, checkpoints, lambda: None, JobStart())
         state = SearchState(empty_archipelago(ISLANDS * REGIONS, 0))
         for epoch in regions.run_regions(problem, state.archipelago, never, REGIONS, print):
             began = time.process_time()

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from islands.evolution.engine import SerialEngine
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.settings import ServiceSettings
 from islands_service.store.blobs import Blobs
+from support.job_runs import make_run
 from support.played import stored
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
@@ -52,7 +52,7 @@ def finished(service: Service) -> str:
     with stored(service) as store:
         lease = taken(store, job)
         blobs = Blobs(ServiceSettings(data_dir=service.folder).blobs)
-        outcome = run_identification_job(lease, store, blobs, SerialEngine(), lambda: None, LONG)
+        outcome = run_identification_job(make_run(lease, store, blobs, lambda: None, LONG))
         store.leases.finish(lease, outcome)
     return job
 

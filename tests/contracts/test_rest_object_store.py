@@ -9,7 +9,8 @@ import pytest
 
 from islands_service.backup import create_backup, restore_backup, verify_backup
 from islands_service.coordinator import coordinator as coordinator_module
-from islands_service.domain.job import JobOutcome, JobState, Lease, ProgressReport
+from islands_service.coordinator.job_run import JobRun
+from islands_service.domain.job import JobOutcome, JobState, ProgressReport
 from islands_service.liveness import StopRequest
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -102,8 +103,8 @@ def test_a_job_waits_for_the_object_store_and_is_not_lost(
     absent.away = True
     read: list[bytes] = []
 
-    def run(_lease: Lease, _store: Store, blobs: Blobs, *_: object) -> JobOutcome:
-        read.append(blobs.read(blob))
+    def run(job: JobRun) -> JobOutcome:
+        read.append(job.blobs.read(blob))
         return DONE
 
     replace_runner(monkeypatch, run)

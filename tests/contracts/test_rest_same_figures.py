@@ -8,13 +8,13 @@ import pytest
 
 import islands
 from islands.data.signal_map import match_rate
-from islands.evolution.engine import SerialEngine
 from islands.validation.metrics import metrics
 from islands_api.client import Client
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import JobState
 from islands_service.store.blobs import Blobs
 from support.command_line import fail, succeed
+from support.job_runs import make_run
 from support.monitoring_jobs import analyse_next
 from support.stores import LONG, taken
 from support.undrawn import undrawn_figures
@@ -56,7 +56,7 @@ def search(service, client, dataset, **settings) -> str:
     """Run a job in this process; return its id."""
     job = client.submit(dataset, *COLUMNS, preset="narx", **SMALL, **settings)
     blobs, lease = Blobs(service.settings.blobs), taken(service.store, job.id)
-    outcome = run_identification_job(lease, service.store, blobs, SerialEngine(), lambda: None, LONG)
+    outcome = run_identification_job(make_run(lease, service.store, blobs, lambda: None, LONG))
     service.store.leases.finish(lease, outcome)
     return job.id
 

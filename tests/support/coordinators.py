@@ -3,16 +3,15 @@
 import time
 from collections.abc import Callable
 from types import MappingProxyType
-from typing import Any
 
 import pytest
 
 from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import coordinator as coordinator_module
 from islands_service.coordinator.coordinator import Coordinator
-from islands_service.domain.job import Job, JobOutcome, JobState, Lease
+from islands_service.coordinator.job_run import JobRun
+from islands_service.domain.job import Job, JobOutcome, JobState
 from islands_service.store import Store
-from islands_service.store.blobs import Blobs
 from support.processes import eventually
 from support.stores import ALICE
 
@@ -32,7 +31,7 @@ def wait_until_finished(store: Store, job: Job) -> Job:
     return store.jobs.get(ALICE, job.id)
 
 
-def replace_runner(monkeypatch: pytest.MonkeyPatch, how: Callable[..., JobOutcome]) -> None:
+def replace_runner(monkeypatch: pytest.MonkeyPatch, how: Callable[[JobRun], JobOutcome]) -> None:
     """Replace the runner of identification jobs."""
     monkeypatch.setattr(coordinator_module, "JOB_RUNNERS", MappingProxyType({"identification": how}))
     monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.02)
@@ -41,9 +40,7 @@ def replace_runner(monkeypatch: pytest.MonkeyPatch, how: Callable[..., JobOutcom
 DONE = JobOutcome(JobState.SUCCEEDED, {}, (), {"done": True})
 
 
-def run_until_check_raises(
-    _lease: Lease, _store: Store, _blobs: Blobs, _engine: object, check: Any, *_: object
-) -> JobOutcome:
+def run_until_check_raises(run: JobRun) -> JobOutcome:
     while True:
-        check()
+        run.check()
         time.sleep(0.01)

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from islands.discrepancy.interfaces.parallel import ParallelMap
-from islands.evolution.engine import SerialEngine
 from islands.io.records.preview import preview
 from islands_service.coordinator.diagnosis.diagnosis_job import run_diagnosis_job
 from islands_service.domain.job import DISCREPANCY, Job, JobOutcome, Lease, Submission
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
+from support.job_runs import make_run
 from support.service import held
 from support.stores import ALICE
 
@@ -41,7 +41,7 @@ def run_job(
     fits: ParallelMap = map,
     every: float = 1.0,
 ) -> JobOutcome:
-    return run_diagnosis_job(lease, store, blobs, SerialEngine(), check, every, map_cases=fits)
+    return run_diagnosis_job(make_run(lease, store, blobs, check, every), map_cases=fits)
 
 
 def without_time(outcome: JobOutcome) -> JobOutcome:

@@ -4,12 +4,12 @@ from pathlib import Path
 from typing import Any
 
 from islands.data.dataset import Dataset
-from islands.evolution.engine import SerialEngine
 from islands.io.records import write_record
 from islands_api.client import Client
 from islands_service.coordinator.monitoring_job import run_monitoring_job
 from islands_service.domain.job import JobOutcome
 from islands_service.store.blobs import Blobs
+from support.job_runs import make_run
 from support.monitored_oscillator import SIMULATION
 from support.service import Service
 
@@ -36,7 +36,7 @@ def analyse_next(service: Service) -> JobOutcome:
     lease = service.store.leases.claim("test", 600.0)
     assert lease is not None
     blobs = Blobs(service.settings.blobs)
-    outcome = run_monitoring_job(lease, service.store, blobs, SerialEngine(), lambda: None, 600.0)
+    outcome = run_monitoring_job(make_run(lease, service.store, blobs))
     service.store.leases.finish(lease, outcome)
     return outcome
 

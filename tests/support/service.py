@@ -228,8 +228,8 @@ def hidden(folder: Path, seconds: float = 4.0) -> bytes:
 
 def run_diagnosis(service: Service, content: bytes, /, **changes: Any) -> str:
     """Upload a record, submit a diagnosis and execute it in this process; return the id of the job."""
-    from islands.evolution.engine import SerialEngine
     from islands_service.coordinator.diagnosis.diagnosis_job import run_diagnosis_job
+    from support.job_runs import make_run
 
     dataset = service.upload(content).json()["id"]
     asked = held(dataset, channels=["T_K"], tolerance=KNOWN, **changes)
@@ -237,9 +237,8 @@ def run_diagnosis(service: Service, content: bytes, /, **changes: Any) -> str:
     lease = service.store.leases.claim("test", 600.0)
     assert lease is not None
     assert lease.job.id == job["id"]
-    blobs = Blobs(service.settings.blobs)
-    arguments = (lease, service.store, blobs, SerialEngine(), lambda: None, 600.0)
-    outcome = run_diagnosis_job(*arguments, map_cases=map)
+    run = make_run(lease, service.store, Blobs(service.settings.blobs))
+    outcome = run_diagnosis_job(run, map_cases=map)
     service.store.leases.finish(lease, outcome)
     return str(job["id"])
 
@@ -271,14 +270,12 @@ def identification(dataset: str, islands: int = 1) -> dict[str, Any]:
 
 def execute_identification(service: Service) -> str:
     """Execute the identification that is next in the queue in this process; return the id of the job."""
-    from islands.evolution.engine import SerialEngine
     from islands_service.coordinator.identification_job import run_identification_job
+    from support.job_runs import make_run
 
     lease = service.store.leases.claim("test", 600.0)
     assert lease is not None
-    outcome = run_identification_job(
-        lease, service.store, Blobs(service.settings.blobs), SerialEngine(), lambda: None, 600.0
-    )
+    outcome = run_identification_job(make_run(lease, service.store, Blobs(service.settings.blobs)))
     service.store.leases.finish(lease, outcome)
     return lease.job.id
 

@@ -21,6 +21,7 @@ from islands_service.coordinator.job_failures import (
     make_problem_document,
 )
 from islands_service.coordinator.job_notes import JobNotes
+from islands_service.coordinator.job_run import JobRun
 from islands_service.coordinator.job_runners import JOB_RUNNERS
 from islands_service.coordinator.sweeper import Sweeper
 from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
@@ -200,15 +201,16 @@ class Coordinator:
             heartbeat.check()
             self._wait_for_ray(lease, heartbeat)
             notes = JobNotes(lease, self._store)
-            return JOB_RUNNERS[lease.job.kind](
+            run = JobRun(
                 lease,
                 self._store,
                 self._blobs,
-                HangGuard(self._make_engine(lease, notes, heartbeat), heartbeat),
-                partial(self._check, heartbeat),
-                self._settings.checkpoint_every,
-                notes,
+                engine=HangGuard(self._make_engine(lease, notes, heartbeat), heartbeat),
+                check=partial(self._check, heartbeat),
+                checkpoint_every=self._settings.checkpoint_every,
+                notes=notes,
             )
+            return JOB_RUNNERS[lease.job.kind](run)
         except JobCancelled:
             return JobOutcome(JobState.CANCELLED)
         except (LeaseLostError, CoordinatorStopping, ClusterError, StoreError, JobDeclinedError):

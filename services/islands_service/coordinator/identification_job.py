@@ -27,13 +27,11 @@ from islands.model.equations import equation
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
-from islands_service.coordinator.job_notes import JobNotes
-from islands_service.domain.job import RUN_TIME, JobOutcome, JobState, Lease, ProgressReport
+from islands_service.coordinator.job_run import JobRun
+from islands_service.domain.job import RUN_TIME, JobOutcome, JobState, ProgressReport
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.runtime.errors import ClusterError
-from islands_service.store import Store
-from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
 
 log = structlog.get_logger()
@@ -42,47 +40,28 @@ log = structlog.get_logger()
 REPORT_EVERY = 0.5
 
 
-def run_identification_job(
-    lease: Lease,
-    store: Store,
-    blobs: Blobs,
-    engine: Engine,
-    check: Callable[[], None],
-    every: float,
-    notes: JobNotes | None = None,
-) -> JobOutcome:
+def run_identification_job(run: JobRun) -> JobOutcome:
     """Run an identification job from its last checkpoint.
 
     A job that is cancelled ends between two steps, with the models found so far.
-
-    Parameters
-    ----------
-    check : callable
-        Raises the reason if the job must end early.
-    every : float
-        Least number of seconds between two checkpoints.
-    notes : JobNotes, optional
-        Messages that the progress of the job contains.
 
     Raises
     ------
     JobCancelled
         The job was cancelled before the first model.
     IslandsError
-        The record or the settings are unusable, the cluster failed, or any other error that ``check``
+        The record or the settings are unusable, the cluster failed, or any other error that ``run.check``
         raises. At the limit of run time the search also ends with its models; without any it is an error.
     """
-    job = lease.job
-    spec = parse_identification(job.spec)
-    datasets = {name: store.datasets.get(job.owner, name, deleted=True) for name in spec.datasets}
-    record, validation = read_record_and_validation(spec, datasets, blobs)
-    checkpoints = JobCheckpoints(job, blobs)
+    spec = parse_identification(run.job.spec)
+    datasets = {name: run.get_dataset(name) for name in spec.datasets}
+    record, validation = read_record_and_validation(spec, datasets, run.blobs)
+    checkpoints = JobCheckpoints(run.job, run.blobs)
     start = checkpoints.read()
-    notes = notes or JobNotes(lease, store)
-    stop = SearchStop(check)
-    reporter = ProgressReporter(lease, store, checkpoints, stop, every, start, notes)
+    stop = SearchStop(run.check)
+    reporter = ProgressReporter(run, checkpoints, stop, start)
     try:
-        found = _identify(record, validation, spec, start, engine, reporter, stop)
+        found = _identify(record, validation, spec, start, run.engine, reporter, stop)
     except StoppedError as stopped:
         raise stop.reason or stopped from stopped
     if not found.search.left_out:
@@ -187,17 +166,9 @@ class ProgressReporter:
     """Progress callback that stores progress, history and checkpoints of a search."""
 
     def __init__(
-        self,
-        lease: Lease,
-        store: Store,
-        checkpoints: JobCheckpoints,
-        stop: SearchStop,
-        every: float,
-        start: JobStart,
-        notes: JobNotes,
+        self, run: JobRun, checkpoints: JobCheckpoints, stop: Callable[[], object], start: JobStart
     ) -> None:
-        self._lease, self._store, self._checkpoints, self._notes = lease, store, checkpoints, notes
-        self._stop, self._every = stop, every
+        self._run, self._checkpoints, self._stop = run, checkpoints, stop
         self._started_at = monotonic() - start.spent
         state = start.state
         self._first = (monotonic(), 0 if state is None else state.evaluations)
@@ -227,15 +198,15 @@ class ProgressReporter:
         self._stop()
         reached = self._progress(*self._last) if self._last else self._reached_before()
         try:
-            progress = self._notes.complete({**reached, "phase": message})
-            self._store.leases.report(self._lease, ProgressReport(progress))
+            progress = self._run.notes.complete({**reached, "phase": message})
+            self._run.store.leases.report(self._run.lease, ProgressReport(progress))
         except StoreError as error:
             # Continue the search. The next report has the progress.
-            log.warning("report failed", job=self._lease.job.id, reason=str(error))
+            log.warning("report failed", job=self._run.job.id, reason=str(error))
 
     def _reached_before(self) -> dict[str, Any]:
         """Return the progress of earlier attempts, without their note."""
-        before = {} if self._note else {**(self._lease.job.progress or {})}
+        before = {} if self._note else {**(self._run.job.progress or {})}
         before.pop("note", None)
         return {**before, **self._note}
 
@@ -248,16 +219,16 @@ class ProgressReporter:
         """Store the progress of the search; return whether the store accepted it."""
         started = monotonic()
         points, after = self._points(state)
-        progress = self._notes.complete(self._progress(state, settings))
+        progress = self._run.notes.complete(self._progress(state, settings))
         report = ProgressReport(progress, points, after=after)
         try:
             if started >= self._checkpoint_at:
                 blob = self._checkpoints.write(state, self.spent, self.choice)
                 report = replace(report, checkpoint=blob)
-            self._store.leases.report(self._lease, report)
+            self._run.store.leases.report(self._run.lease, report)
         except (StoreError, ClusterError) as error:
             # Continue the search. The next report contains the same points.
-            log.warning("report failed", job=self._lease.job.id, reason=str(error))
+            log.warning("report failed", job=self._run.job.id, reason=str(error))
             if report.checkpoint is not None:
                 self._checkpoints.remember(report.checkpoint)
             self._schedule(started)
@@ -274,7 +245,7 @@ class ProgressReporter:
         self._report_at = now + REPORT_EVERY
         if started >= self._checkpoint_at:
             # Also after a failure: a checkpoint of thousands of islands takes long, and may fail at its end.
-            self._checkpoint_at = now + max(self._every, (now - started) / CHECKPOINT_SHARE)
+            self._checkpoint_at = now + max(self._run.checkpoint_every, (now - started) / CHECKPOINT_SHARE)
 
     def _progress(self, state: SearchState, settings: Settings) -> dict[str, Any]:
         last = state.history[-1]

@@ -2,61 +2,32 @@
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TypeAlias
 
-from islands_service.coordinator.job_notes import JobNotes
-from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, MONITORING, JobOutcome, Lease
-from islands_service.store import Store
-from islands_service.store.blobs import Blobs
+from islands_service.coordinator.job_run import JobRun
+from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, MONITORING, JobOutcome
 
-if TYPE_CHECKING:
-    from islands.evolution.engine import Engine
+#: Runs a job of one kind and returns its outcome.
+JobRunner: TypeAlias = Callable[[JobRun], JobOutcome]
 
 
-class JobRunner(Protocol):
-    """Runs a job of one kind."""
-
-    def __call__(
-        self,
-        lease: Lease,
-        store: Store,
-        blobs: Blobs,
-        engine: "Engine",
-        check: Callable[[], None],
-        every: float,
-        notes: JobNotes,
-        /,
-    ) -> JobOutcome:
-        """Run a job and return its outcome.
-
-        Parameters
-        ----------
-        check : callable
-            Raises the reason if the job must end early.
-        every : float
-            Least number of seconds between two checkpoints.
-        notes : JobNotes
-            Messages that the progress of the job contains.
-        """
-
-
-def _run_identification(*arguments: Any) -> JobOutcome:
+def _run_identification(run: JobRun) -> JobOutcome:
     # These imports take half a second: claim the job before them.
     from islands_service.coordinator.identification_job import run_identification_job  # noqa: PLC0415
 
-    return run_identification_job(*arguments)
+    return run_identification_job(run)
 
 
-def _run_diagnosis(*arguments: Any) -> JobOutcome:
+def _run_diagnosis(run: JobRun) -> JobOutcome:
     from islands_service.coordinator.diagnosis.diagnosis_job import run_diagnosis_job  # noqa: PLC0415
 
-    return run_diagnosis_job(*arguments)
+    return run_diagnosis_job(run)
 
 
-def _run_monitoring(*arguments: Any) -> JobOutcome:
+def _run_monitoring(run: JobRun) -> JobOutcome:
     from islands_service.coordinator.monitoring_job import run_monitoring_job  # noqa: PLC0415
 
-    return run_monitoring_job(*arguments)
+    return run_monitoring_job(run)
 
 
 #: Runner of each kind of job.

@@ -1,14 +1,13 @@
 """Monitoring job: analyse a record of a monitor; the outcome contains the new state of the monitor."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.context import Signal
 from islands.errors import RecordError
-from islands.evolution.engine import Engine
 from islands.facade.record_monitor import create_monitor, monitor_record
 from islands.io.checkpoints.monitor_document import (
     describe_alarm,
@@ -25,8 +24,8 @@ from islands.io.checkpoints.monitor_state import (
 )
 from islands.io.result_text.monitor_text import describe_alarm_text, describe_last_record
 from islands_service.coordinator.job_failures import check_readable, make_problem_document
-from islands_service.coordinator.job_notes import JobNotes
-from islands_service.domain.job import JobOutcome, JobState, Lease, ProgressReport
+from islands_service.coordinator.job_run import JobRun
+from islands_service.domain.job import JobOutcome, JobState, ProgressReport
 from islands_service.domain.monitor_spec import MonitorSpec, name_record, parse_monitor, parse_monitor_record
 from islands_service.domain.monitoring import (
     Monitor,
@@ -36,53 +35,39 @@ from islands_service.domain.monitoring import (
     RecordEntry,
 )
 from islands_service.intake.job_inputs import read_record_and_columns
-from islands_service.store import Store
-from islands_service.store.blobs import Blobs
 
 #: Schema of the result of a record.
 SCHEMA = "islands.monitored-record/1"
 
 
-def run_monitoring_job(
-    lease: Lease,
-    store: Store,
-    blobs: Blobs,
-    _engine: Engine,
-    check: Callable[[], None],
-    _every: float,
-    _notes: JobNotes | None = None,
-) -> JobOutcome:
+def run_monitoring_job(run: JobRun) -> JobOutcome:
     """Analyse a record and add it to the state of its monitor.
 
     This function writes nothing: a job that is interrupted starts again with the same state of the monitor.
     A record that cannot be used fails its job, and is listed in the monitor.
-
-    Parameters
-    ----------
-    check : callable
-        Raises the reason if the job must end early.
 
     Raises
     ------
     MonitorNotFoundError
         The monitor was deleted.
     IslandsError
-        The monitor or the first record is unusable, or any error that ``check`` raises.
+        The monitor or the first record is unusable, or any error that ``run.check`` raises.
     """
-    identity, asked = parse_monitor_record(lease.job.spec)
-    monitor, states = store.monitors.load(lease.job.owner, identity)
+    identity, asked = parse_monitor_record(run.job.spec)
+    monitors = run.store.monitors
+    monitor, states = monitors.load(run.job.owner, identity)
     saved = _parse_states(monitor, states)
-    stored = store.datasets.get(lease.job.owner, asked.dataset, deleted=True)
-    store.leases.report(lease, ProgressReport({"phase": "analysis of the record"}))
+    stored = run.get_dataset(asked.dataset)
+    run.store.leases.report(run.lease, ProgressReport({"phase": "analysis of the record"}))
     spec, name = parse_monitor(monitor.spec), name_record(asked, stored.name)
     reading = spec.describe_record(asked.dataset, asked.rows)
     sha256 = stored.blob
     try:
-        record, columns = read_record_and_columns(reading, {asked.dataset: stored}, blobs)
-        check()
+        record, columns = read_record_and_columns(reading, {asked.dataset: stored}, run.blobs)
+        run.check()
         sha256 = record.sha256
         if states is not None and (
-            known := store.monitors.find_record(monitor.id, name, sha256, is_rejected=False)
+            known := monitors.find_record(monitor.id, name, sha256, is_rejected=False)
         ):
             return _describe_known(monitor, states, name, json.loads(known))
         before = saved or _create_monitor(spec, record, columns)
@@ -93,11 +78,11 @@ def run_monitoring_job(
         if (
             saved is not None
             and states is not None
-            and store.monitors.find_record(monitor.id, name, sha256, is_rejected=True) is None
+            and monitors.find_record(monitor.id, name, sha256, is_rejected=True) is None
         ):
             update = _make_rejection(monitor, saved, states, RejectedRecord(name, sha256, str(error)))
         return JobOutcome(JobState.FAILED, problem=make_problem_document(error), monitor=update)
-    check()
+    run.check()
     return _describe_outcome(monitor, states, before, after)
 
 

@@ -1,6 +1,5 @@
 """Discrepancy job: diagnose a simulation, write the report and the extended simulation."""
 
-from collections.abc import Callable
 from time import sleep
 
 import structlog
@@ -8,20 +7,17 @@ import structlog
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interim_findings import InterimFindings
-from islands.evolution.engine import Engine
 from islands.facade.explain_residual import FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.simulator_spec.factory import make_simulator
 from islands_service.coordinator.diagnosis.diagnosis_checkpoints import DiagnosisCheckpoints
 from islands_service.coordinator.diagnosis.diagnosis_progress import DiagnosisProgress
 from islands_service.coordinator.heartbeat import JobCancelled
-from islands_service.coordinator.job_notes import JobNotes
-from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, Lease
+from islands_service.coordinator.job_run import JobRun
+from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState
 from islands_service.domain.job_spec import parse_discrepancy
 from islands_service.intake.job_inputs import read_record_and_columns
 from islands_service.runtime.parallel_map import ray_map
-from islands_service.store import Store
-from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
 
 log = structlog.get_logger()
@@ -30,26 +26,14 @@ log = structlog.get_logger()
 _RETRY_SECONDS = 1.0
 
 
-def run_diagnosis_job(
-    lease: Lease,
-    store: Store,
-    blobs: Blobs,
-    _engine: Engine,
-    check: Callable[[], None],
-    every: float,
-    _notes: JobNotes | None = None,
-    map_cases: ParallelMap | None = None,
-) -> JobOutcome:
+def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobOutcome:
     """Run a discrepancy job from its last checkpoint.
 
     A job that is cancelled ends with its findings so far, without formula and report.
 
     Parameters
     ----------
-    check : callable
-        Raises the reason if the job must end early.
-    every : float
-        Least number of seconds between two checkpoints.
+    run : JobRun
     map_cases : ParallelMap, optional
         Fits the effects; by default on the Ray cluster to which this process is connected.
 
@@ -58,24 +42,22 @@ def run_diagnosis_job(
     JobCancelled
         The job was cancelled before the first result.
     IslandsError
-        The record or the simulation is unusable, or any other error that ``check`` raises.
+        The record or the simulation is unusable, or any other error that ``run.check`` raises.
     """
-    checkpoints = DiagnosisCheckpoints(lease.job, blobs)
+    checkpoints = DiagnosisCheckpoints(run.job, run.blobs)
     state = checkpoints.read()
-    report = DiagnosisProgress(lease, store, check, checkpoints, state, every)
-    spec = parse_discrepancy(lease.job.spec)
-    datasets = {
-        part.dataset: store.datasets.get(lease.job.owner, part.dataset, deleted=True) for part in spec.parts
-    }
+    report = DiagnosisProgress(run, checkpoints, state)
+    spec = parse_discrepancy(run.job.spec)
+    datasets = {part.dataset: run.get_dataset(part.dataset) for part in spec.parts}
     report("reading the record", 0.0)
-    record, columns = read_record_and_columns(spec, datasets, blobs)
+    record, columns = read_record_and_columns(spec, datasets, run.blobs)
     simulator = make_simulator(spec.simulation, record, columns)
-    fits = state.journal.record(map_cases or ray_map(check=check))
+    fits = state.journal.record(map_cases or ray_map(check=run.check))
     interim, artefacts = InterimFindings(), dict[str, str]()
     formula, left_out = None, [FORMULA, REPORT]
 
     def stop() -> bool:
-        check()
+        run.check()
         return False
 
     try:
@@ -89,10 +71,10 @@ def run_diagnosis_job(
         found = DiagnosisResult.from_diagnosis(diagnosed, formula, wall_s=report.spent)
         report("writing the report", 0.98)
         names = ", ".join(datasets[part.dataset].name for part in spec.parts)
-        artefacts[REPORT] = _keep(found.write_report(names), blobs, check)
+        artefacts[REPORT] = _keep(found.write_report(names), run)
         left_out.remove(REPORT)
         if (extended := found.extended_document) is not None:
-            artefacts[EXTENDED] = _keep(extended.encode(), blobs, check)
+            artefacts[EXTENDED] = _keep(extended.encode(), run)
         ended = JobState.SUCCEEDED
     except JobCancelled:
         so_far = interim.make_diagnosis(spec.seed)
@@ -101,19 +83,19 @@ def run_diagnosis_job(
         found = DiagnosisResult.from_diagnosis(so_far, formula, wall_s=report.spent, left_out=left_out)
         ended = JobState.CANCELLED
         if EXTENDED not in artefacts and (extended := found.extended_document) is not None:
-            artefacts[EXTENDED] = blobs.write(extended.encode())
+            artefacts[EXTENDED] = run.blobs.write(extended.encode())
     summary = _make_summary(found, simulator.name, state.note)
     return JobOutcome(ended, found.document, summary=summary, artefacts=artefacts)
 
 
-def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
+def _keep(data: bytes, run: JobRun) -> str:
     """Store a blob. Retry while the store is unavailable: the work is done."""
     while True:
         try:
-            return blobs.write(data)
+            return run.blobs.write(data)
         except StoreError as error:
             log.warning("cannot store yet", reason=str(error))
-            check()
+            run.check()
             sleep(_RETRY_SECONDS)
 
 

@@ -11,8 +11,8 @@ from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.diagnosis.diagnosis_checkpoints import DiagnosisCheckpoints, DiagnosisState
-from islands_service.domain.job import Lease, ProgressReport
-from islands_service.store import Store
+from islands_service.coordinator.job_run import JobRun
+from islands_service.domain.job import ProgressReport
 from islands_service.store.database import StoreError
 
 log = structlog.get_logger()
@@ -38,28 +38,15 @@ class DiagnosisProgress:
 
     Parameters
     ----------
-    lease : Lease
-    store : Store
-    check : callable
-        Raises the reason if the job must end early; called at the start of each step.
+    run : JobRun
+        Its check is called at the start of each step.
     checkpoints : DiagnosisCheckpoints
     state : DiagnosisState
         What the diagnosis has computed; read for each checkpoint.
-    every : float
-        Least number of seconds between two checkpoints.
     """
 
-    def __init__(
-        self,
-        lease: Lease,
-        store: Store,
-        check: Callable[[], None],
-        checkpoints: DiagnosisCheckpoints,
-        state: DiagnosisState,
-        every: float,
-    ) -> None:
-        self._lease, self._store, self._check = lease, store, check
-        self._checkpoints, self._state, self._every = checkpoints, state, every
+    def __init__(self, run: JobRun, checkpoints: DiagnosisCheckpoints, state: DiagnosisState) -> None:
+        self._run, self._checkpoints, self._state = run, checkpoints, state
         self._reported_at = self._checkpoint_at = monotonic()
         self._started_at = self._reported_at - state.spent
         self._stored = state.reached
@@ -72,7 +59,7 @@ class DiagnosisProgress:
 
     def __call__(self, message: str, fraction: float | None = None, /) -> None:
         """Store the start of a step."""
-        self._check()
+        self._run.check()
         self._phase = message
         self._begin = self._begin if fraction is None else fraction
         self._report(self._begin)
@@ -91,7 +78,7 @@ class DiagnosisProgress:
 
     def count_epochs(self, state: SearchState, settings: Settings) -> None:
         """Store the state of the search for a formula, as a part of the current step; called every epoch."""
-        self._check()
+        self._run.check()
         self._state.search = state
         if monotonic() - self._reported_at > REPORT_EVERY:
             self._report(self._begin + SEARCH * state.archipelago.generation / settings.generations)
@@ -107,24 +94,24 @@ class DiagnosisProgress:
             self._write_checkpoint() if began >= self._checkpoint_at and reached != self._stored else None
         )
         try:
-            self._store.leases.report(self._lease, ProgressReport(progress, checkpoint=checkpoint))
+            self._run.store.leases.report(self._run.lease, ProgressReport(progress, checkpoint=checkpoint))
         except StoreError as error:
             # Continue the analysis. The next report has the progress.
-            log.warning("report failed", job=self._lease.job.id, reason=str(error))
+            log.warning("report failed", job=self._run.job.id, reason=str(error))
             if checkpoint is not None:
                 self._checkpoints.remember(checkpoint)
-                self._checkpoint_at = monotonic() + self._every
+                self._checkpoint_at = monotonic() + self._run.checkpoint_every
             return
         if checkpoint is not None:
             self._checkpoints.supersede(checkpoint)
             self._stored, now = reached, monotonic()
-            self._checkpoint_at = now + max(self._every, (now - began) / CHECKPOINT_SHARE)
+            self._checkpoint_at = now + max(self._run.checkpoint_every, (now - began) / CHECKPOINT_SHARE)
 
     def _write_checkpoint(self) -> str | None:
         """Write a checkpoint; return its blob, or None if that is not possible now."""
         try:
             return self._checkpoints.write(self._state, self.spent)
         except StoreError as error:
-            log.warning("no checkpoint", job=self._lease.job.id, reason=str(error))
-            self._checkpoint_at = monotonic() + self._every
+            log.warning("no checkpoint", job=self._run.job.id, reason=str(error))
+            self._checkpoint_at = monotonic() + self._run.checkpoint_every
             return None

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from islands.evolution.engine import SerialEngine
 from islands.io.export import EXPORTS
 from islands.io.models import model_from_json
 from islands_api.client import ServiceError
 from islands_api.schemas import HistoryPage, ModelView
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.store.blobs import Blobs
+from support.job_runs import make_run
 from support.service import Service, csv, spec
 
 #: Settings of a very short search on two islands.
@@ -46,7 +46,7 @@ def finished(service: Service) -> tuple[str, str]:
     assert lease is not None
     assert lease.job.id == job
     blobs = Blobs(service.settings.blobs)
-    outcome = run_identification_job(lease, service.store, blobs, SerialEngine(), lambda: None, 0.0)
+    outcome = run_identification_job(make_run(lease, service.store, blobs, lambda: None, 0.0))
     service.store.leases.finish(lease, outcome)
     return secret, job
 

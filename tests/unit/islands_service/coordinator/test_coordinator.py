@@ -12,6 +12,7 @@ import pytest
 from islands_service.coordinator import coordinator as coordinator_module
 from islands_service.coordinator import sweeper as sweeper_module
 from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
@@ -97,10 +98,10 @@ def test_job_with_a_lost_lease_is_left_to_its_new_owner(
 ) -> None:
     gone = []
 
-    def lose(lease: Lease, *arguments: Any) -> JobOutcome:
+    def lose(run: JobRun) -> JobOutcome:
         if not gone:
             gone.append(store.leases.claim("me", 60.0))  # the same name may claim the job
-            run_until_check_raises(lease, *arguments)
+            run_until_check_raises(run)
         return DONE
 
     replace_runner(monkeypatch, lose)
@@ -134,7 +135,7 @@ def test_outcome_is_stored_as_soon_as_the_disk_has_space(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The job is not run again: it is one attempt, and a cancel request in the meantime is too late."""
-    replace_runner(monkeypatch, lambda *_: DONE)
+    replace_runner(monkeypatch, lambda _run: DONE)
     monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.1)
     coordinator(Full)
     ended = wait_until_finished(store, job)
@@ -146,7 +147,7 @@ def test_unavailable_store_during_a_job_is_not_an_attempt(
 ) -> None:
     away = [7]  # more often than a job may fail
 
-    def work(*_: object) -> JobOutcome:
+    def work(_run: JobRun) -> JobOutcome:
         if away[0]:
             away[0] -= 1
             raise StoreUnavailableError("the database does not answer")
@@ -162,7 +163,7 @@ def test_unavailable_store_during_a_job_is_not_an_attempt(
 def test_lost_cluster_ends_the_coordinator_and_is_an_attempt(
     store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def lost(*_: object) -> JobOutcome:
+    def lost(_run: JobRun) -> JobOutcome:
         raise ClusterError("no more")
 
     replace_runner(monkeypatch, lost)
@@ -179,7 +180,7 @@ def test_coordinator_with_the_same_name_takes_a_job_over_at_once(
 ) -> None:
     died = store.leases.claim("me", 3600.0)
     assert died is not None
-    replace_runner(monkeypatch, lambda *_: DONE)
+    replace_runner(monkeypatch, lambda _run: DONE)
     coordinator(name="me")
     assert wait_until_finished(store, job).attempt == 2  # long before the lease of an hour has expired
 
@@ -233,12 +234,12 @@ def test_replaced_checkpoints_are_swept_while_the_job_runs(
         os.utime(blobs.path(blob), (1e9, 1e9))
         return blob
 
-    def keeps_checkpoints(lease: Lease, *arguments: Any) -> JobOutcome:
+    def keeps_checkpoints(run: JobRun) -> JobOutcome:
         for data in (b"replaced", b"named"):
             left.append(old(data))
-            store.leases.report(lease, ProgressReport({}, checkpoint=left[-1]))
+            store.leases.report(run.lease, ProgressReport({}, checkpoint=left[-1]))
         left.append(blobs.write(b"about to be named"))
-        return run_until_check_raises(lease, *arguments)
+        return run_until_check_raises(run)
 
     replace_runner(monkeypatch, keeps_checkpoints)
     monkeypatch.setattr(sweeper_module, "SWEEP_INTERVAL", 0.05)
@@ -267,9 +268,9 @@ def test_failed_sweep_does_not_affect_the_job(
             tries.append(1)
             raise error
 
-    def works(*arguments: Any) -> JobOutcome:
+    def works(run: JobRun) -> JobOutcome:
         while len(tries) < 3:
-            arguments[4]()
+            run.check()
         return DONE
 
     replace_runner(monkeypatch, works)
@@ -335,6 +336,7 @@ import sys, time
 from pathlib import Path
 from islands_service.liveness import StopRequest
 from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.job_run import JobRun
 from islands_service.settings import ServiceSettings
 class Waiting(Coordinator):
     def _wait_for_address(self, *_):
@@ -349,6 +351,7 @@ from pathlib import Path
 from islands_service.liveness import StopRequest
 from islands_service.coordinator import heartbeat
 from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.job_run import JobRun
 from islands_service.settings import ServiceSettings
 heartbeat.HANG_TIMEOUT = 0.3
 class Engine:

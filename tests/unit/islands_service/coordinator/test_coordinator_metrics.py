@@ -9,6 +9,7 @@ from islands_service.coordinator import job_engine
 from islands_service.coordinator.coordinator import Coordinator
 from islands_service.coordinator.heartbeat import Heartbeat
 from islands_service.coordinator.job_notes import JobNotes
+from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import IDENTIFICATION, Job, JobOutcome, JobState
 from islands_service.liveness import StopRequest
 from islands_service.settings import ServiceSettings
@@ -22,8 +23,8 @@ def test_metrics_count_attempts_outcomes_and_writes(
 ) -> None:
     attempts: list[Any] = []
 
-    def fail_once(_lease: object, _store: object, blobs: Any, *_: object) -> JobOutcome:
-        attempts.append(blobs.write(b"a checkpoint"))
+    def fail_once(run: JobRun) -> JobOutcome:
+        attempts.append(run.blobs.write(b"a checkpoint"))
         if len(attempts) == 1:
             raise OSError("the network was away")
         return DONE

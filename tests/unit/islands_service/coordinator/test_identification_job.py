@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_job import run_identification_job
@@ -18,6 +17,7 @@ from islands_service.figure_worker import read_search_result
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreUnavailableError
+from support.job_runs import make_run
 from support.stores import ALICE
 
 Found = tuple[list[Any], list[Any]]
@@ -30,7 +30,7 @@ def claim(store: Store, name: str = "me") -> Lease:
 
 
 def run_job(lease: Lease, store: Any, blobs: Any, check: Callable[[], None] = lambda: None) -> JobOutcome:
-    return run_identification_job(lease, store, blobs, SerialEngine(), check, 1e-9)
+    return run_identification_job(make_run(lease, store, blobs, check, 1e-9))
 
 
 def get_models(outcome: JobOutcome) -> list[Any]:
@@ -253,9 +253,7 @@ def test_stages_of_a_job_are_its_phases_and_keep_its_generation(store: Store, bl
 def test_first_populations_are_stored_in_a_checkpoint_at_once(store: Store, blobs: Blobs, job: Job) -> None:
     """Otherwise a job that soon ends its coordinator would never make progress."""
     with pytest.raises(CoordinatorStopping):
-        run_identification_job(
-            claim(store), store, blobs, SerialEngine(), Interruption(store, job, 0), 3600.0
-        )
+        run_identification_job(make_run(claim(store), store, blobs, Interruption(store, job, 0), 3600.0))
     assert store.jobs.get(ALICE, job.id).checkpoint is not None
 
 
@@ -310,6 +308,6 @@ def test_unavailable_store_does_not_cause_repeated_checkpoints(
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
     before = set(dict(blobs.all()))
     flaky = Flaky(store, lambda number: number < 20)
-    run_identification_job(claim(store), flaky, blobs, SerialEngine(), lambda: None, 3600.0)  # type: ignore[arg-type]
+    run_identification_job(make_run(claim(store), flaky, blobs, lambda: None, 3600.0))  # type: ignore[arg-type]
     assert flaky.reports >= 20
     assert len(set(dict(blobs.all())) - before) == 1

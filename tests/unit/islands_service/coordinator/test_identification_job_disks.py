@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import Job
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from support.disks import filled, read_only
+from support.job_runs import make_run
 from support.stores import ALICE
 
 #: Checks of a search after which its disk fails, and after which it is repaired.
@@ -65,7 +65,7 @@ def test_search_continues_without_checkpoints_while_its_disk_fails(
             failure.close()
 
     with failure:
-        outcome = run_identification_job(lease, store, blobs, SerialEngine(), check, 1e-9)
+        outcome = run_identification_job(make_run(lease, store, blobs, check, 1e-9))
     found = [json.loads(json.dumps(document)) for document, _ in outcome.models]
     assert found == undisturbed[0]
     assert store.results.history(job.id) == undisturbed[1]

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 from sqlalchemy import MetaData, create_engine, select, update
 
-from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import ISLANDS_VERSION, Job, JobState, Submission
@@ -19,6 +18,7 @@ from islands_service.store.blobs import Blobs
 from islands_service.store.database import Database
 from islands_service.store.migrations.upgrade import upgrade
 from islands_service.store.tables import jobs
+from support.job_runs import make_run
 from support.stores import ALICE
 
 Found = tuple[list[Any], list[Any]]
@@ -69,7 +69,7 @@ def previous(
                 raise ProcessEndedError
 
         try:
-            outcome = run_identification_job(lease, store, blobs, SerialEngine(), stop_at_3, 1e-9)
+            outcome = run_identification_job(make_run(lease, store, blobs, stop_at_3, 1e-9))
         except ProcessEndedError:
             continue
         store.leases.finish(lease, outcome)
@@ -109,7 +109,7 @@ def test_data_folder_of_the_previous_release_is_continued(
         def look() -> None:
             reached.append((store.jobs.get(ALICE, running.id).progress or {})["generation"])
 
-        outcome = run_identification_job(lease, store, blobs, SerialEngine(), look, 1e-9)
+        outcome = run_identification_job(make_run(lease, store, blobs, look, 1e-9))
         assert min(reached) >= 3
         store.leases.finish(lease, outcome)
         models = [json.loads(json.dumps(document)) for document, _ in outcome.models]

@@ -23,6 +23,7 @@ from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import CommitUnknownError, StoreUnavailableError
 from islands_service.store.tables import jobs
+from support.job_runs import make_run
 from support.stores import ALICE
 
 Found = tuple[list[Any], list[Any]]
@@ -48,7 +49,7 @@ def interrupt(store: Store, blobs: Blobs, at: int = 3) -> Path:
             raise ProcessEndedError
 
     with pytest.raises(ProcessEndedError):
-        run_identification_job(lease, store, blobs, SerialEngine(), check, 1e-9)
+        run_identification_job(make_run(lease, store, blobs, check, 1e-9))
     blob = store.jobs.get(ALICE, lease.job.id).checkpoint
     assert blob is not None
     return blobs.path(blob)
@@ -78,7 +79,7 @@ def test_job_without_its_checkpoint_starts_again_with_the_same_result(
 ) -> None:
     harm(interrupt(store, blobs))
     lease = claim(store)
-    outcome = run_identification_job(lease, store, blobs, SerialEngine(), lambda: None, 1e-9)
+    outcome = run_identification_job(make_run(lease, store, blobs, lambda: None, 1e-9))
     assert [json.loads(json.dumps(document)) for document, _ in outcome.models] == undisturbed[0]
     assert store.results.history(job.id) == undisturbed[1]
     ended = store.jobs.get(ALICE, job.id)
@@ -98,7 +99,7 @@ def test_checkpoint_of_a_newer_version_is_left_to_its_coordinators(
     newer = update(jobs).values(checkpoint_version="999.0")
     store.database.write(lambda connection: connection.execute(newer))
     with pytest.raises(JobDeclinedError, match=r"islands 999\.0, which wrote the checkpoint"):
-        run_identification_job(claim(store), store, blobs, SerialEngine(), lambda: None, 1e-9)
+        run_identification_job(make_run(claim(store), store, blobs, lambda: None, 1e-9))
 
 
 @pytest.mark.ci
@@ -114,7 +115,7 @@ def test_superseded_checkpoint_is_deleted_at_once(
         seen.add(named)
         assert set(dict(blobs.all())) - before == ({named} if named else set())
 
-    run_identification_job(claim(store), store, blobs, SerialEngine(), look, 1e-9)
+    run_identification_job(make_run(claim(store), store, blobs, look, 1e-9))
     assert len(seen) > 5
 
 
@@ -124,7 +125,7 @@ def test_lost_lease_deletes_no_checkpoint_of_its_successor(store: Store, blobs: 
     old, new = claim(store), claim(store)
     kept = store.jobs.get(ALICE, job.id).checkpoint
     with pytest.raises(LeaseLostError):
-        run_identification_job(old, store, blobs, SerialEngine(), lambda: None, 1e-9)
+        run_identification_job(make_run(old, store, blobs, lambda: None, 1e-9))
     assert store.jobs.get(ALICE, job.id).checkpoint == kept == new.job.checkpoint
     assert kept in dict(blobs.all())
 
@@ -163,7 +164,7 @@ def test_named_checkpoint_exists_whatever_the_store_acknowledges(
         kept.append(len(found))
 
     flaky: Any = Doubtful(store)
-    outcome = run_identification_job(claim(store), flaky, blobs, SerialEngine(), look, 1e-9)
+    outcome = run_identification_job(make_run(claim(store), flaky, blobs, look, 1e-9))
     assert [json.loads(json.dumps(document)) for document, _ in outcome.models] == undisturbed[0]
     assert 2 <= max(kept) <= 4
     assert flaky.reports > 10
@@ -193,7 +194,8 @@ def test_search_continues_without_a_checkpoint_whose_islands_were_lost(
     monkeypatch.setattr(work, "CHECKPOINT_SHARE", 1e9)
     named, before = set(), set(dict(blobs.all()))
     look = lambda: named.add(store.jobs.get(ALICE, job.id).checkpoint)  # noqa: E731
-    outcome = run_identification_job(claim(store), store, blobs, LosingEngine(), look, 1e-9)
+    run = replace(make_run(claim(store), store, blobs, look, 1e-9), engine=LosingEngine())
+    outcome = run_identification_job(run)
     assert [json.loads(json.dumps(document)) for document, _ in outcome.models] == undisturbed[0]
     assert store.results.history(job.id) == undisturbed[1]
     assert len(named) > 5

@@ -12,7 +12,8 @@ from sqlalchemy import select, update
 from islands.errors import IslandsError, RecordError, SettingsError
 from islands_service.coordinator import coordinator as coordinator_module
 from islands_service.coordinator.job_failures import describe_interruption, is_newer, make_problem_document
-from islands_service.domain.job import ISLANDS_VERSION, Job, JobOutcome, JobState, Lease, Submission
+from islands_service.coordinator.job_run import JobRun
+from islands_service.domain.job import ISLANDS_VERSION, Job, JobOutcome, JobState, Submission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import BlobNotFoundError
@@ -43,8 +44,8 @@ def test_failed_job_has_a_typed_problem_and_does_not_block_others(
     kind: str,
     detail: str,
 ) -> None:
-    def fail_first(lease: Lease, *_: object) -> JobOutcome:
-        if lease.job.id == job.id:
+    def fail_first(run: JobRun) -> JobOutcome:
+        if run.job.id == job.id:
             raise error
         return DONE
 
@@ -74,7 +75,7 @@ def test_job_is_tried_again_after_a_transient_error(
 ) -> None:
     failures = [error] * (ATTEMPTS - 1)
 
-    def fail(*_: object) -> JobOutcome:
+    def fail(_run: JobRun) -> JobOutcome:
         if failures:
             raise failures.pop()
         return DONE
@@ -92,7 +93,7 @@ def test_job_is_tried_again_after_a_transient_error(
 def test_repeated_transient_errors_fail_the_job_with_their_reason(
     store: Store, job: Job, coordinator: Coordinators, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(*_: object) -> JobOutcome:
+    def fail(_run: JobRun) -> JobOutcome:
         raise MemoryError
 
     replace_runner(monkeypatch, fail)
@@ -133,8 +134,8 @@ def accepted_by(store: Store, version: str) -> None:
 def test_job_of_a_newer_version_waits_for_a_coordinator_of_it(
     store: Store, job: Job, coordinator: Coordinators, monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
-    def fail_first(lease: Lease, *_: object) -> JobOutcome:
-        if lease.job.id == job.id:
+    def fail_first(run: JobRun) -> JobOutcome:
+        if run.job.id == job.id:
             raise error
         return DONE
 
@@ -174,7 +175,7 @@ def test_coordinators_of_two_old_versions_decline_a_job_once_each(store: Store, 
 def test_job_of_this_version_fails_and_a_job_without_a_version_too(
     store: Store, job: Job, coordinator: Coordinators, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(*_: object) -> JobOutcome:
+    def fail(_run: JobRun) -> JobOutcome:
         raise SettingsError("unknown")
 
     replace_runner(monkeypatch, fail)

@@ -14,6 +14,7 @@ from islands_service.domain.job import MONITORING, JobOutcome, JobState, Lease, 
 from islands_service.domain.monitoring import Monitor, MonitorNotFoundError
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
+from support.job_runs import make_run
 from support.monitor_updates import make_update
 from support.service import held, kept
 from support.stores import ALICE, claimed, contents
@@ -38,7 +39,7 @@ def add(store: Store, monitor: Monitor) -> Lease:
 
 
 def run(lease: Lease, store: Store, blobs: Blobs, check: Any = lambda: None) -> JobOutcome:
-    return run_monitoring_job(lease, store, blobs, None, check, 1.0)  # type: ignore[arg-type]
+    return run_monitoring_job(make_run(lease, store, blobs, check))  # type: ignore[arg-type]
 
 
 def refuse(*_: Any) -> Any:

@@ -8,6 +8,7 @@ from islands_service.coordinator.diagnosis import diagnosis_progress
 from islands_service.coordinator.diagnosis.diagnosis_checkpoints import DiagnosisState
 from islands_service.coordinator.diagnosis.diagnosis_progress import STEP, DiagnosisProgress
 from islands_service.store.database import CommitUnknownError, StorageFullError
+from support.job_runs import make_run
 from support.stores import ALICE, claimed, submitted
 
 
@@ -22,7 +23,7 @@ def test_time_left_follows_the_fraction_of_steps_and_fits(store, clock):
     job = submitted(store)
     lease, state, seen = claimed(store), DiagnosisState(spent=3.0), []
     # Without new fits no checkpoint is written: the job would never be given up.
-    report = DiagnosisProgress(lease, store, lambda: None, None, state, 1e-9)
+    report = DiagnosisProgress(make_run(lease, store, None, checkpoint_every=1e-9), None, state)
 
     def look(_):
         clock[0] += 1.0
@@ -67,7 +68,8 @@ def step(store, clock):
     """Make a fit, report a second later, and return the number of fits in the checkpoint of the job."""
     job, state, checkpoints = submitted(store), DiagnosisState(), Checkpoints(clock)
     reporting = SimpleNamespace(leases=store.leases)
-    report = DiagnosisProgress(claimed(store), reporting, lambda: None, checkpoints, state, 10.0)
+    run = make_run(claimed(store), reporting, None, checkpoint_every=10.0)
+    report = DiagnosisProgress(run, checkpoints, state)
 
     def step(seconds=1.0):
         clock[0] += seconds

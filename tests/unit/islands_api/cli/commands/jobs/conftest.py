@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from islands.evolution.engine import SerialEngine
 from islands_api.cli.service import client_options
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import JobOutcome, Submission
 from islands_service.store.blobs import Blobs
+from support.job_runs import make_run
 from support.service import FIGURES, Service, ahead, csv
 from support.stores import LONG, taken
 
@@ -68,7 +68,7 @@ def found(service: Service) -> JobOutcome:
     job, _ = service.store.jobs.submit(Submission("local", spec, priority=100))
     blobs = Blobs(service.settings.blobs)
     lease = taken(service.store, job.id)
-    return run_identification_job(lease, service.store, blobs, SerialEngine(), lambda: None, LONG)
+    return run_identification_job(make_run(lease, service.store, blobs, lambda: None, LONG))
 
 
 @pytest.fixture

@@ -1,0 +1,51 @@
+"""What the runner of a job works with."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from islands_service.coordinator.job_notes import JobNotes
+from islands_service.domain.job import Job, Lease
+from islands_service.store import Store
+from islands_service.store.blobs import Blobs
+from islands_service.store.datasets import StoredDataset
+
+if TYPE_CHECKING:
+    from islands.evolution.engine import Engine
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JobRun:
+    """A job that this process runs under its lease.
+
+    Attributes
+    ----------
+    lease : Lease
+    store : Store
+    blobs : Blobs
+    engine : Engine
+        Engine for searches.
+    check : callable
+        Raises the reason if the job must end early.
+    checkpoint_every : float
+        Least number of seconds between two checkpoints.
+    notes : JobNotes
+        Messages that the progress of the job contains.
+    """
+
+    lease: Lease
+    store: Store
+    blobs: Blobs
+    engine: "Engine"
+    check: Callable[[], None]
+    checkpoint_every: float
+    notes: JobNotes
+
+    @property
+    def job(self) -> Job:
+        """The job at the time of the claim."""
+        return self.lease.job
+
+    def get_dataset(self, identity: str) -> StoredDataset:
+        """Return a dataset of the job, which may have been deleted since its submission."""
+        return self.store.datasets.get(self.job.owner, identity, deleted=True)
