@@ -3,7 +3,9 @@
 import traceback
 from collections.abc import Callable
 from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from functools import partial
+from logging import ERROR, INFO, WARNING
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -166,35 +168,14 @@ class Coordinator:
                     self._finish(lease, outcome, heartbeat)
                 self._metrics.finished.labels(lease.job.kind, outcome.state).inc()
                 log.info("job finished", state=outcome.state, seconds=round(monotonic() - started, 3))
-            except LeaseLostError as error:
-                log.warning("lease lost", reason=str(error))
-                self._metrics.given_back.labels("lease-lost").inc()
-            except JobDeclinedError as error:
-                log.warning("job declined", reason=str(error))
-                self._metrics.given_back.labels("declined").inc()
-                self._give_back(self._store.leases.decline, lease, str(error))
-            except TRANSIENT_ERRORS as error:
-                log.error("job interrupted", trace=traceback.format_exc())
-                self._metrics.given_back.labels("interrupted").inc()
-                reason = describe_interruption(error)
-                self._give_back(self._store.leases.postpone, lease, reason, RETRY_BACKOFF)
-            except CoordinatorStopping:
-                self._metrics.given_back.labels("stopping").inc()
-                self._release(lease)
-            except ObjectStoreError as error:
-                log.warning("object store unavailable", reason=str(error))
-                self._metrics.given_back.labels("object-store").inc()
-                self._give_back(self._postpone_for_objects, lease)
-            except StoreError as error:
-                log.warning("job given back", reason=str(error))
-                self._metrics.given_back.labels("store").inc()
-                self._release(lease)
-                self._stopping.wait(RETRY_SECONDS)
-            except ClusterError as error:
-                log.error("cluster lost", reason=str(error))
-                self._metrics.given_back.labels("cluster").inc()
-                self._release(lease, attempted=self._connected)
-                raise
+            except Exception as error:
+                interruption = find_interruption(error)
+                if interruption is None:
+                    raise
+                details = {"trace": traceback.format_exc()} if interruption.level == ERROR else {}
+                log.log(interruption.level, interruption.message, reason=str(error), **details)
+                self._metrics.given_back.labels(interruption.label).inc()
+                interruption.react(self, lease, error)
 
     def _run_job(self, lease: Lease, heartbeat: Heartbeat) -> JobOutcome:
         try:
@@ -213,11 +194,9 @@ class Coordinator:
             return JOB_RUNNERS[lease.job.kind](run)
         except JobCancelled:
             return JobOutcome(JobState.CANCELLED)
-        except (LeaseLostError, CoordinatorStopping, ClusterError, StoreError, JobDeclinedError):
-            raise
-        except TRANSIENT_ERRORS:
-            raise
         except Exception as error:
+            if find_interruption(error) is not None:
+                raise
             check_readable(lease.job.versions["job"], "job", error)
             trace = None if isinstance(error, IslandsError) else traceback.format_exc()
             log.error("job failed", reason=str(error), trace=trace)
@@ -240,8 +219,33 @@ class Coordinator:
                 heartbeat.check()
                 self._stopping.wait(RETRY_SECONDS)
 
-    def _release(self, lease: Lease, attempted: bool = False) -> None:
-        self._give_back(self._store.leases.release, lease, attempted)
+    def _leave(self, _lease: Lease, _error: Exception) -> None:
+        """Leave a job to the process that has its lease now."""
+
+    def _release(self, lease: Lease, _error: Exception) -> None:
+        self._give_back(self._store.leases.release, lease)
+
+    def _release_later(self, lease: Lease, error: Exception) -> None:
+        """Release a job, and wait for the store before the next claim."""
+        self._release(lease, error)
+        self._stopping.wait(RETRY_SECONDS)
+
+    def _release_and_end(self, lease: Lease, error: Exception) -> None:
+        """Release a job, and end this process. It is an attempt if the cluster was there at its start."""
+        self._give_back(self._store.leases.release, lease, self._connected)
+        raise error
+
+    def _decline(self, lease: Lease, error: Exception) -> None:
+        self._give_back(self._store.leases.decline, lease, str(error))
+
+    def _postpone(self, lease: Lease, error: Exception) -> None:
+        self._give_back(self._store.leases.postpone, lease, describe_interruption(error), RETRY_BACKOFF)
+
+    def _postpone_for_objects(self, lease: Lease, _error: Exception) -> None:
+        # No attempt: the job is not lost however long the object store is away.
+        note = "waiting for the object store, which does not answer"
+        postpone = partial(self._store.leases.postpone, attempted=False)
+        self._give_back(postpone, lease, note, OBJECT_STORE_PAUSE)
 
     def _give_back(self, how: Callable[..., None], *arguments: object) -> None:
         """Return a job to the queue, by an operation of the store."""
@@ -251,11 +255,6 @@ class Coordinator:
         except (LeaseLostError, StoreError) as error:
             # Another coordinator claims the job after the lease has expired.
             log.warning("job not released", reason=str(error))
-
-    def _postpone_for_objects(self, lease: Lease) -> None:
-        # No attempt: the job is not lost however long the object store is away.
-        note = "waiting for the object store, which does not answer"
-        self._store.leases.postpone(lease, note, OBJECT_STORE_PAUSE, attempted=False)
 
     def _wait_for_ray(self, lease: Lease, heartbeat: Heartbeat) -> None:
         if self._connected:
@@ -306,3 +305,46 @@ class Coordinator:
             heartbeat.observe_islands(placed, waiting)
 
         return make_job_engine(lease, notes.add, self._settings.autoscaling, observe)
+
+
+@dataclass(frozen=True, slots=True)
+class Interruption:
+    """What a coordinator does after an error that ends an attempt without an outcome of the job.
+
+    Attributes
+    ----------
+    errors : exception type or tuple of these
+    label : str
+        Reason in the metric of attempts given back.
+    level : int
+        Level of the message in the log.
+    message : str
+    react : callable
+        Gives the job back, or leaves it.
+    """
+
+    errors: type[Exception] | tuple[type[Exception], ...]
+    label: str
+    level: int
+    message: str
+    react: Callable[[Coordinator, Lease, Exception], None]
+
+
+#: Errors that end an attempt; of several that apply, the first one counts.
+INTERRUPTIONS = (
+    Interruption(LeaseLostError, "lease-lost", WARNING, "lease lost", Coordinator._leave),
+    Interruption(JobDeclinedError, "declined", WARNING, "job declined", Coordinator._decline),
+    Interruption(TRANSIENT_ERRORS, "interrupted", ERROR, "job interrupted", Coordinator._postpone),
+    Interruption(CoordinatorStopping, "stopping", INFO, "job stopped", Coordinator._release),
+    Interruption(
+        *(ObjectStoreError, "object-store", WARNING, "object store unavailable"),
+        Coordinator._postpone_for_objects,
+    ),
+    Interruption(StoreError, "store", WARNING, "job given back", Coordinator._release_later),
+    Interruption(ClusterError, "cluster", ERROR, "cluster lost", Coordinator._release_and_end),
+)
+
+
+def find_interruption(error: Exception) -> Interruption | None:
+    """Return what a coordinator does after an error; None if the error is that of the job."""
+    return next((each for each in INTERRUPTIONS if isinstance(error, each.errors)), None)
