@@ -12,28 +12,14 @@ from starlette.middleware.gzip import GZipMiddleware
 from islands.distribution import read_version
 from islands_api.web import exception_handlers
 from islands_api.web.auth import KeyCache, make_verifier
-from islands_api.web.concurrency import BlockingExecutor
-from islands_api.web.dependencies import (
-    MAX_CONCURRENT_DRAWINGS,
-    MAX_CONCURRENT_INSPECTIONS,
-    MAX_INSPECTIONS_PER_OWNER,
-    AppState,
-)
-from islands_api.web.event_hub import JobEventHub
-from islands_api.web.limits.owner_counts import OwnerCounts
-from islands_api.web.limits.owner_slots import OwnerSlots
-from islands_api.web.limits.rate import RateLimiter
+from islands_api.web.dependencies import open_state
 from islands_api.web.middleware import BodyLimit, HeadRequests, RequestLogging, RootPath, SameOrigin
 from islands_api.web.problems import ProblemDocument
-from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.routes import ROUTERS
-from islands_api.web.uploads.admission import UploadAdmission
 from islands_service.liveness import EVERY, send_heartbeat
-from islands_service.outbound.checked_client import make_checked_client
 from islands_service.outbound.delivery_sender import DeliverySender
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.tracing import Traces
 
 #: Least number of seconds between two complete checks of the database.
@@ -65,45 +51,23 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         opened = store or Store(settings.url)
-        executor = BlockingExecutor()
-        hub = JobEventHub(opened, executor)
-        app.state.islands = state = AppState(
-            settings,
-            opened,
-            open_blobs(settings),
-            hub,
-            RateLimiter(settings.rate, settings.burst),
-            ServiceMetrics(opened, settings.data_dir),
-            UploadAdmission(settings.max_uploads),
-            OwnerSlots(MAX_CONCURRENT_INSPECTIONS, MAX_INSPECTIONS_PER_OWNER),
-            OwnerSlots(MAX_CONCURRENT_DRAWINGS, MAX_CONCURRENT_DRAWINGS),
-            OwnerCounts("requests for figures"),
-            OwnerCounts("event streams"),
-            executor,
-            make_checked_client(settings),
-            tokens,
-        )
-        sender = DeliverySender(
-            opened.deliveries, state.outbound, executor.run, state.metrics.observe_delivery
-        )
-        state.blobs.observe_object = state.metrics.observe_object
-        app.state.keys = KeyCache(state)
-        running = (hub.run(), sender.run(), _send_heartbeats(settings.lifeline))
-        opened.readiness.watch(CHECK_SECONDS)
-        tasks = [asyncio.create_task(each) for each in running]
-        try:
-            yield
-        finally:
-            opened.readiness.stop()
-            for task in tasks:
-                task.cancel()
-                with suppress(asyncio.CancelledError):
-                    await task
-            if tokens is not None:
-                await tokens.keys.close()
-            await state.run_blocking(opened.close)
-            await state.run_blocking(traces.close)
-            executor.close()
+        async with open_state(settings, opened, tokens) as state:
+            app.state.islands, app.state.keys = state, KeyCache(state)
+            sender = DeliverySender(
+                opened.deliveries, state.outbound, state.executor.run, state.metrics.observe_delivery
+            )
+            running = (state.hub.run(), sender.run(), _send_heartbeats(settings.lifeline))
+            opened.readiness.watch(CHECK_SECONDS)
+            tasks = [asyncio.create_task(each) for each in running]
+            try:
+                yield
+            finally:
+                opened.readiness.stop()
+                for task in tasks:
+                    task.cancel()
+                    with suppress(asyncio.CancelledError):
+                        await task
+                await state.run_blocking(traces.close)
 
     app = FastAPI(
         title="islands",

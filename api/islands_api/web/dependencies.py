@@ -1,6 +1,7 @@
 """State shared by the routes of one application, and the dependency that injects it."""
 
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar
 
@@ -15,9 +16,10 @@ from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.responses import QueuePlaces
 from islands_api.web.uploads.admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
-from islands_service.outbound.checked_client import CheckedClient
+from islands_service.outbound.checked_client import CheckedClient, make_checked_client
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
+from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.store.blobs import Blobs
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ MAX_CONCURRENT_DRAWINGS = 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AppState:
-    """Settings, store and shared services of one application, from its startup to its shutdown."""
+    """Settings, store and shared services of one application; `open_state` makes it from the settings."""
 
     settings: ServiceSettings
     store: Store
@@ -47,13 +49,17 @@ class AppState:
     rate_limiter: RateLimiter
     metrics: ServiceMetrics
     uploads: UploadAdmission
-    inspection_slots: OwnerSlots
-    figure_slots: OwnerSlots
-    drawings: OwnerCounts
-    streams: OwnerCounts
     executor: BlockingExecutor
     outbound: CheckedClient
     tokens: "TokenVerifier | None"
+    inspection_slots: OwnerSlots = field(
+        default_factory=lambda: OwnerSlots(MAX_CONCURRENT_INSPECTIONS, MAX_INSPECTIONS_PER_OWNER)
+    )
+    figure_slots: OwnerSlots = field(
+        default_factory=lambda: OwnerSlots(MAX_CONCURRENT_DRAWINGS, MAX_CONCURRENT_DRAWINGS)
+    )
+    drawings: OwnerCounts = field(default_factory=lambda: OwnerCounts("requests for figures"))
+    streams: OwnerCounts = field(default_factory=lambda: OwnerCounts("event streams"))
     places: QueuePlaces = field(default_factory=QueuePlaces)
 
     async def quotas(self, owner: str) -> Quotas:
@@ -63,6 +69,35 @@ class AppState:
     async def run_blocking(self, operation: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Run an operation that waits for the database or the disk in a thread."""
         return await self.executor.run(operation, *args, **kwargs)
+
+
+@asynccontextmanager
+async def open_state(
+    settings: ServiceSettings, store: Store, tokens: "TokenVerifier | None"
+) -> AsyncIterator[AppState]:
+    """Open the shared services of an application; close them and the store at its shutdown."""
+    executor, metrics = BlockingExecutor(), ServiceMetrics(store, settings.data_dir)
+    blobs = open_blobs(settings)
+    blobs.observe_object = metrics.observe_object
+    state = AppState(
+        settings=settings,
+        store=store,
+        blobs=blobs,
+        hub=JobEventHub(store, executor),
+        rate_limiter=RateLimiter(settings.rate, settings.burst),
+        metrics=metrics,
+        uploads=UploadAdmission(settings.max_uploads),
+        executor=executor,
+        outbound=make_checked_client(settings),
+        tokens=tokens,
+    )
+    try:
+        yield state
+    finally:
+        if tokens is not None:
+            await tokens.keys.close()
+        await state.run_blocking(store.close)
+        executor.close()
 
 
 async def _get_state(request: Request) -> Any:
