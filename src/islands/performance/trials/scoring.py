@@ -1,7 +1,7 @@
 """Scores of blind trials: rates with confidence intervals, compared with targets."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -144,55 +144,16 @@ def score(
         Injected causes that the analysis has no name for.
     goals : Targets
     """
-    known = [each for each in outcomes if not set(each.trial.effects) & set(unknown)]
-    clean = [each for each in known if not each.trial.effects]
-    open_set = [each for each in outcomes if each.trial.effects and {*each.trial.effects} <= {*unknown}]
-    mixed = [each for each in outcomes if each not in known and each not in open_set]
-    every = [each for each in known if len(each.trial.effects) == 1]
-    single = [each for each in every if each.misfit > MIDDLE_MISFIT]
-    pairs = [each for each in known if len(each.trial.effects) == 2]
-    triples = [each for each in known if len(each.trial.effects) == 3]
-    detected = [each for each in single if each.noticed]
-    named = [each for each in detected if each.named]
-    gains = [each.gain_share for each in detected if each.gain_share is not None]
+    causes = set(unknown)
+    known = [each for each in outcomes if not causes & set(each.trial.effects)]
+    single = [each for each in known if len(each.trial.effects) == 1]
+    detected = [each for each in single if each.misfit > MIDDLE_MISFIT and each.noticed]
     bins = reliability(outcomes)
-
-    def proportion(
-        name: str,
-        among: Sequence[TrialOutcome],
-        condition: Callable[[TrialOutcome], bool],
-        goal: float | None,
-        most: bool = False,
-    ) -> Proportion:
-        return Proportion(name, sum(map(condition, among)), len(among), goal, most)
-
-    def detection_rate(name: str, low: float, high: float, goal: float | None) -> Proportion:
-        among = [each for each in every if low < each.misfit <= high]
-        return proportion(f"detected, misfit {name} sigma", among, lambda each: each.noticed, goal)
-
     return [
-        detection_rate(f"{WEAK_MISFIT:g} to {MIDDLE_MISFIT:g}", WEAK_MISFIT, MIDDLE_MISFIT, goals.weak),
-        detection_rate(f"{MIDDLE_MISFIT:g} to {STRONG_MISFIT:g}", MIDDLE_MISFIT, STRONG_MISFIT, goals.middle),
-        detection_rate(f"> {STRONG_MISFIT:g}", STRONG_MISFIT, float("inf"), goals.strong),
-        proportion("named first, where detected", detected, lambda each: each.first_right, goals.first),
-        proportion(
-            "among the first three, where detected",
-            detected,
-            lambda each: bool({*each.named[:1], *each.candidates} & set(each.trial.effects)),
-            goals.three,
-        ),
-        proportion("family, where detected", detected, lambda each: each.family_right, goals.family),
-        proportion("truth within the reported set", detected, lambda each: each.within_set, goals.within),
-        Statistic("names in the reported set, mean", _mean([each.set_size for each in named]), len(named)),
-        proportion(
-            "false names on clean records", clean, lambda each: bool(each.named), goals.false_names, True
-        ),
-        proportion("pairs exact", pairs, lambda each: each.exact, goals.pairs),
-        proportion("triples exact", triples, lambda each: each.exact, goals.triples),
-        Statistic("share of the oracle's gain, median", _quantile(gains, 0.5), len(gains), goals.gain),
-        Statistic(
-            "share of the oracle's gain, 10th percentile", _quantile(gains, 0.1), len(gains), goals.gain_tenth
-        ),
+        *_score_detection(single, goals),
+        *_score_names(detected, goals),
+        *_score_sets(known, goals),
+        *_score_gains(detected, goals),
         Statistic(
             "calibration error of the confidence",
             calibration_error(bins),
@@ -200,28 +161,107 @@ def score(
             goals.calibration,
             True,
         ),
-        proportion(
-            "unknown causes silently misnamed",
-            open_set,
-            lambda each: each.verdict == "named" and bool(each.named),
-            goals.misnamed,
-            True,
+        *_score_unknown_causes(
+            [each for each in outcomes if causes & set(each.trial.effects)], causes, goals
         ),
-        proportion(
+    ]
+
+
+def _count(
+    name: str,
+    among: Sequence[TrialOutcome],
+    condition: Callable[[TrialOutcome], bool],
+    goal: float | None = None,
+    most: bool = False,
+) -> Proportion:
+    """Return the proportion of the trials that meet a condition."""
+    return Proportion(name, sum(map(condition, among)), len(among), goal, most)
+
+
+def _score_detection(single: Sequence[TrialOutcome], goals: Targets) -> list[Proportion]:
+    """Return how many single faults are detected, by the size of their misfit."""
+    bands = (
+        (f"{WEAK_MISFIT:g} to {MIDDLE_MISFIT:g}", WEAK_MISFIT, MIDDLE_MISFIT, goals.weak),
+        (f"{MIDDLE_MISFIT:g} to {STRONG_MISFIT:g}", MIDDLE_MISFIT, STRONG_MISFIT, goals.middle),
+        (f"> {STRONG_MISFIT:g}", STRONG_MISFIT, float("inf"), goals.strong),
+    )
+    return [
+        _count(
+            f"detected, misfit {name} sigma",
+            [each for each in single if low < each.misfit <= high],
+            lambda each: each.noticed,
+            goal,
+        )
+        for name, low, high, goal in bands
+    ]
+
+
+def _score_names(detected: Sequence[TrialOutcome], goals: Targets) -> list[Proportion | Statistic]:
+    """Return how well detected single faults are named."""
+    sizes = [each.set_size for each in detected if each.named]
+    return [
+        _count("named first, where detected", detected, lambda each: each.first_right, goals.first),
+        _count(
+            "among the first three, where detected",
+            detected,
+            lambda each: bool({*each.named[:1], *each.candidates} & set(each.trial.effects)),
+            goals.three,
+        ),
+        _count("family, where detected", detected, lambda each: each.family_right, goals.family),
+        _count("truth within the reported set", detected, lambda each: each.within_set, goals.within),
+        Statistic("names in the reported set, mean", _mean(sizes), len(sizes)),
+    ]
+
+
+def _score_sets(known: Sequence[TrialOutcome], goals: Targets) -> list[Proportion]:
+    """Return how well no fault, pairs and triples are named."""
+    clean, pairs, triples = (
+        [each for each in known if len(each.trial.effects) == count] for count in (0, 2, 3)
+    )
+    return [
+        _count("false names on clean records", clean, lambda each: bool(each.named), goals.false_names, True),
+        _count("pairs exact", pairs, lambda each: each.exact, goals.pairs),
+        _count("triples exact", triples, lambda each: each.exact, goals.triples),
+    ]
+
+
+def _score_gains(detected: Sequence[TrialOutcome], goals: Targets) -> list[Statistic]:
+    """Return how much of the gain of the injected faults the names reach."""
+    gains = [each.gain_share for each in detected if each.gain_share is not None]
+    return [
+        Statistic("share of the oracle's gain, median", _quantile(gains, 0.5), len(gains), goals.gain),
+        Statistic(
+            "share of the oracle's gain, 10th percentile", _quantile(gains, 0.1), len(gains), goals.gain_tenth
+        ),
+    ]
+
+
+def _score_unknown_causes(
+    outcomes: Sequence[TrialOutcome], unknown: Set[str], goals: Targets
+) -> list[Proportion]:
+    """Return how often trials with causes that have no name get one."""
+    alone = [each for each in outcomes if set(each.trial.effects) <= unknown]
+    mixed = [each for each in outcomes if not set(each.trial.effects) <= unknown]
+
+    def is_misnamed(each: TrialOutcome) -> bool:
+        return each.verdict == "named" and bool(each.named)
+
+    return [
+        _count("unknown causes silently misnamed", alone, is_misnamed, goals.misnamed, True),
+        _count(
             f"unknown causes misnamed with a confidence above {SURE:g}",
-            open_set,
-            lambda each: each.verdict == "named" and bool(each.named) and each.confidence > SURE,
+            alone,
+            lambda each: is_misnamed(each) and each.confidence > SURE,
             goals.misnamed,
             True,
         ),
-        proportion("known cause named, next to an unknown one", mixed, lambda each: each.one_right, None),
-        proportion(
+        _count("known cause named, next to an unknown one", mixed, lambda each: each.one_right),
+        _count(
             "known cause and an equation or a family, next to an unknown one",
             mixed,
             lambda each: each.one_right and each.verdict in ("discovered", "family"),
-            None,
         ),
-        proportion("wrong name next to an unknown cause", mixed, lambda each: bool(each.wrong), None, True),
+        _count("wrong name next to an unknown cause", mixed, lambda each: bool(each.wrong), most=True),
     ]
 
 
