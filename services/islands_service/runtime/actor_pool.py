@@ -162,32 +162,14 @@ class IslandActorPool:
         self._observe(0, 0)
 
     def _update_members(self, now: float) -> None:
-        if now - self._measured_at > _RESIZE_SECONDS:
-            self._measured_at = now
-            cpus = self._islands if self._autoscaling else int(self._share * cluster_cpus())
-            self._size = max(self._size, min(self._islands, max(1, cpus)))
+        self._resize(now)
         for slot in _find_ended(self._members):
             self._handle_loss(slot, self._members.pop(slot)[0])
         if not self._members and self._started_at < inf:
             # Wait for all actors as at the start: the first one that is back must not get all islands.
             self._started_at, self._created_at = inf, now
         for slot in _find_ended(self._joining):
-            actor, prepared = self._joining[slot]
-            try:
-                actor_version = ray.get(prepared)
-            except LOSS_ERRORS as error:
-                if isinstance(error, RayActorError) and error.actor_init_failed:
-                    raise ClusterError(
-                        f"an actor cannot be started; is islands installed on every machine? {error}"
-                    ) from error
-                self._handle_loss(slot, actor)
-            except RayTaskError as error:
-                raise error.cause from error
-            else:
-                check_version(actor_version)
-                self._members[slot] = (actor, actor.wait_until_killed.remote())
-                self._vacant.discard(slot)
-            self._forget_joining(slot)
+            self._admit(slot)
         for slot in _find_ended(self._unstarted):
             del self._unstarted[slot]
             self._started[slot] = now
@@ -198,17 +180,47 @@ class IslandActorPool:
         standby = [STANDBY] if now - self._started_at > STANDBY_AFTER else []
         for slot in (*range(self._size), *standby):
             if slot not in self._members and slot not in self._joining:
-                self._actor_count += 1
-                actor = _ACTOR.options(
-                    name=f"{self._title}.{self._actor_count}" if self._title else None,
-                    num_cpus=0.0 if slot == STANDBY else reserved_cpus(),
-                ).remote(self._problem)
-                started = actor.confirm_start.remote()
-                self._unstarted[slot] = (actor, started)
-                self._joining[slot] = (actor, actor.prepare.remote(started))
+                self._start(slot)
         self._report_waiting(now)
         ready = len(self._members.keys() - {STANDBY})
         self._observe(ready, self._islands - ready)
+
+    def _resize(self, now: float) -> None:
+        """Measure the CPUs of the cluster from time to time; the pool grows with them."""
+        if now - self._measured_at > _RESIZE_SECONDS:
+            self._measured_at = now
+            cpus = self._islands if self._autoscaling else int(self._share * cluster_cpus())
+            self._size = max(self._size, min(self._islands, max(1, cpus)))
+
+    def _admit(self, slot: int) -> None:
+        """Make an actor a member whose preparation has ended, unless it has failed."""
+        actor, prepared = self._joining[slot]
+        try:
+            actor_version = ray.get(prepared)
+        except LOSS_ERRORS as error:
+            if isinstance(error, RayActorError) and error.actor_init_failed:
+                raise ClusterError(
+                    f"an actor cannot be started; is islands installed on every machine? {error}"
+                ) from error
+            self._handle_loss(slot, actor)
+        except RayTaskError as error:
+            raise error.cause from error
+        else:
+            check_version(actor_version)
+            self._members[slot] = (actor, actor.wait_until_killed.remote())
+            self._vacant.discard(slot)
+        self._forget_joining(slot)
+
+    def _start(self, slot: int) -> None:
+        """Start an actor that joins when it is prepared."""
+        self._actor_count += 1
+        actor = _ACTOR.options(
+            name=f"{self._title}.{self._actor_count}" if self._title else None,
+            num_cpus=0.0 if slot == STANDBY else reserved_cpus(),
+        ).remote(self._problem)
+        started = actor.confirm_start.remote()
+        self._unstarted[slot] = (actor, started)
+        self._joining[slot] = (actor, actor.prepare.remote(started))
 
     def _forget_joining(self, slot: int) -> None:
         del self._joining[slot]
