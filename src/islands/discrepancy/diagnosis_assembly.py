@@ -16,7 +16,7 @@ from islands.discrepancy.findings import describe_gross_errors, describe_noise, 
 from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.inference.experiment_design import suggest_experiment
 from islands.discrepancy.inference.finding import Finding, describe_effects
-from islands.discrepancy.inference.holdout import bound_gain, compute_rmse, measure_gain
+from islands.discrepancy.inference.holdout import HoldoutGain, bound_gain, compute_rmse, measure_gain
 from islands.discrepancy.inference.residual_structure import find_residual_structure
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
 from islands.discrepancy.inference.strategies import SearchOutcome
@@ -130,18 +130,9 @@ def make_diagnosis(
     holdout = slice(fitted, record.samples)
     gain = None
     if verdict in (Verdict.NAMED, Verdict.REMAINDER, Verdict.FAMILY):
-        reference = choose_reference_fit(hypothesis, base, target)
-        before = fit_initial_states(reference, target, fitted).output
-        gain = measure_gain(record, before, hypothesis.fit.output, holdout, floor**0.5, run.rng)
-        # Under model error, a gain in the estimation part is no evidence of one in another part.
-        is_confirmed = (
-            bound_gain(gain, before, hypothesis.fit, target, run.rng) >= -MAX_HOLDOUT_LOSS_PERCENT
-            if target.effective_samples is None
-            else gain.ci95[0] > 0.0
-        )
-        if hypothesis.effects and not is_confirmed:
-            # There is a discrepancy, but its cause is another.
-            gain, verdict = None, Verdict.UNKNOWN
+        gain = _measure_confirmed_gain(replace(outcome, hypothesis=hypothesis), base, record, run.rng)
+        if gain is None:  # There is a discrepancy, but its cause is another.
+            verdict = Verdict.UNKNOWN
     findings: tuple[Finding, ...] = ()
     equivalents: tuple[ScreenedEffect, ...] = ()
     if gain is not None:
@@ -183,6 +174,24 @@ def make_diagnosis(
         discovery=terms.discovery if terms is not None and _is_equivalent(findings) else None,
         shape=compare_shapes(replace(outcome, hypothesis=hypothesis)) if findings else None,
     )
+
+
+def _measure_confirmed_gain(
+    outcome: SearchOutcome, base: CalibrationResult, record: Dataset, rng: np.random.Generator
+) -> HoldoutGain | None:
+    """Return the gain of the effects of an outcome on the hold-out part; None if that refutes them."""
+    hypothesis, target = outcome.hypothesis, outcome.target
+    holdout = slice(target.fitted, record.samples)
+    reference = choose_reference_fit(hypothesis, base, target)
+    before = fit_initial_states(reference, target, target.fitted).output
+    gain = measure_gain(record, before, hypothesis.fit.output, holdout, outcome.noise_floor**0.5, rng)
+    # Under model error, a gain in the estimation part is no evidence of one in another part.
+    is_confirmed = (
+        bound_gain(gain, before, hypothesis.fit, target, rng) >= -MAX_HOLDOUT_LOSS_PERCENT
+        if target.effective_samples is None
+        else gain.ci95[0] > 0.0
+    )
+    return gain if is_confirmed else None
 
 
 def _is_equivalent(findings: Sequence[Finding]) -> bool:

@@ -55,20 +55,14 @@ def select_effects(
     SettingsError
         Two effects of the catalogue have the same name.
     """
-    names = [effect.name for effect in catalogue]
-    if duplicates := sorted({name for name in names if names.count(name) > 1}):
-        raise SettingsError(
-            f"effects need different names, and {', '.join(duplicates)} is given twice: rename one"
-        )
+    _check_names(catalogue)
     has_full_prior = {each.name for each in simulator.parameters if not each.initial} <= tolerance.keys()
     is_visible = _make_visibility_test(simulator, context)
     effects = [
         effect
         for effect in catalogue
         if effect.is_free == free
-        and effect.site in simulator.sites
-        and (effect.site != Site.CORE or effect.name in simulator.supported_effects)
-        and effect.name not in simulator.built_in_effects
+        and _can_extend(simulator, effect)
         and (has_full_prior or not effect.is_gain)
         and effect.is_applicable(context)
         and is_visible(effect)
@@ -77,6 +71,20 @@ def select_effects(
         return effects
     effects += [effect for effect in simulator.state_effects if effect.is_applicable(context)]
     return effects + [wrong_parameter(each) for each in simulator.parameters if each.name in tolerance]
+
+
+def _check_names(catalogue: Sequence[Effect]) -> None:
+    names = [effect.name for effect in catalogue]
+    if duplicates := sorted({name for name in names if names.count(name) > 1}):
+        raise SettingsError(
+            f"effects need different names, and {', '.join(duplicates)} is given twice: rename one"
+        )
+
+
+def _can_extend(simulator: Simulator, effect: Effect) -> bool:
+    """Return whether an effect acts where the simulator admits it, and is not part of the simulator."""
+    is_supported = effect.site != Site.CORE or effect.name in simulator.supported_effects
+    return effect.site in simulator.sites and is_supported and effect.name not in simulator.built_in_effects
 
 
 def _make_visibility_test(simulator: Simulator, context: SimulationContext) -> Callable[[Effect], bool]:

@@ -127,76 +127,114 @@ def describe_effects(
     rival : Rival, optional
         Further alternative of those effects that it does not have.
     """
-    findings, equivalents = [], []
-    base, hypothesis, target = outcome.base, outcome.hypothesis, outcome.target
-    deviations = estimate_deviations(hypothesis.fit, target)
-    if len(hypothesis.effects) == 1:
-        alternatives: Sequence[Alternatives] = (
-            Alternatives(Hypothesis(base, base.score, ()), outcome.screened),
-        )
-    else:
-        alternatives = hypothesis.alternatives or find_alternatives(hypothesis, target, run)
-    for effect, alternative in zip(hypothesis.effects, alternatives, strict=True):
-        without = alternative.without
-        compared = [alternative]
-        forms = outcome.form_alternatives.get(effect.name)
-        if forms is not None and {*forms.without.effects, effect} == {*hypothesis.effects}:
-            compared.append(forms)
-        rivals = [
-            (screened, each.without.fit)
-            for each in compared
-            for screened in each.screened
-            if effect.cause not in screened.effect.special_cases
-        ]
-        scored = {
-            each.effect.cause: ScoredAlternative(
-                _compute_score(each, effect, reference),
-                sum_squares_by_block(each.fit, hypothesis.fit, target),
-            )
-            for each, reference in reversed(rivals)
-        }
-        gain = without.cost - hypothesis.cost
-        score = max(scored[effect.cause].score if effect.cause in scored else 0.0, gain)
-        scored[effect.cause] = ScoredAlternative(
-            score, sum_squares_by_block(hypothesis.fit, hypothesis.fit, target)
-        )
-        if rival is not None and rival.is_alternative(effect, hypothesis.effects):
-            scored[rival.name] = ScoredAlternative(
-                score + rival.lead, sum_squares_by_block(rival.fit, hypothesis.fit, target)
-            )
-        name, family, values = effect.cause, effect.family, _get_values(hypothesis.fit, effect, deviations)
-        if (confounder := find_confounder(hypothesis.fit, effect, target)) is not None:
-            scored[confounder.effect.cause] = ScoredAlternative(score + confounder.score_gain, None)
-            if confounder.score_gain > 0.0:
-                name, family = confounder.effect.cause, confounder.effect.family
-                values = _scale_values(confounder, values, hypothesis.fit)
-        nothing = ScoredAlternative(0.0, sum_squares_by_block(without.fit, hypothesis.fit, target))
-        named = scored.pop(name)
-        others = [*scored.values(), nothing]
-        reference = choose_reference_fit(hypothesis, without.fit, target)
-        explained = explained_fraction(reference, hypothesis.fit, outcome.noise_floor)
-        if outcome.verdict == Verdict.REMAINDER and explained < 1.0:
-            others.append(make_unlisted_cause(named, 1.0 - explained))
-        confidence = compute_confidence(named, others)
-        free = {each.effect.cause for each, _ in rivals if each.effect.is_free}
-        equal = {
-            each
-            for each, other in scored.items()
-            if other.score > named.score - (0.0 if each in free else EQUIVALENCE_MARGIN)
-        }
-        equivalents += [each for each, _ in rivals if each.effect.cause in equal]
-        findings.append(
-            Finding(
-                name,
-                family,
-                confidence,
-                tuple(sorted(equal, key=lambda name: -scored[name].score)),
-                values,
-                named.score,
-                explained,
-            )
-        )
+    hypothesis = outcome.hypothesis
+    deviations = estimate_deviations(hypothesis.fit, outcome.target)
+    findings, equivalents = [], list[ScreenedEffect]()
+    for effect, alternatives in zip(hypothesis.effects, _list_alternatives(outcome, run), strict=True):
+        finding, equal = _describe_effect(effect, alternatives, outcome, rival, deviations)
+        findings.append(finding)
+        equivalents += equal
     return tuple(findings), tuple(equivalents)
+
+
+def _list_alternatives(outcome: SearchOutcome, run: DiagnosisRun) -> Sequence[Alternatives]:
+    """Return the alternatives to each effect of an outcome."""
+    base, hypothesis = outcome.base, outcome.hypothesis
+    if len(hypothesis.effects) == 1:
+        return (Alternatives(Hypothesis(base, base.score, ()), outcome.screened),)
+    return hypothesis.alternatives or find_alternatives(hypothesis, outcome.target, run)
+
+
+def _describe_effect(
+    effect: Effect,
+    alternatives: Alternatives,
+    outcome: SearchOutcome,
+    rival: Rival | None,
+    deviations: Signal,
+) -> tuple[Finding, list[ScreenedEffect]]:
+    """Return the finding of one effect of an outcome, and its equivalents."""
+    hypothesis, target, without = outcome.hypothesis, outcome.target, alternatives.without
+    fit = hypothesis.fit
+    screened = _list_screened(effect, alternatives, outcome)
+    scored = _score_causes(effect, without.cost - hypothesis.cost, screened, outcome, rival)
+    name, family, values = effect.cause, effect.family, _get_values(fit, effect, deviations)
+    if (confounder := find_confounder(fit, effect, target)) is not None:
+        score = scored[effect.cause].score + confounder.score_gain
+        scored[confounder.effect.cause] = ScoredAlternative(score, None)
+        if confounder.score_gain > 0.0:
+            name, family = confounder.effect.cause, confounder.effect.family
+            values = _scale_values(confounder, values, fit)
+    named = scored.pop(name)
+    others = [*scored.values(), ScoredAlternative(0.0, sum_squares_by_block(without.fit, fit, target))]
+    reference = choose_reference_fit(hypothesis, without.fit, target)
+    explained = explained_fraction(reference, fit, outcome.noise_floor)
+    if outcome.verdict == Verdict.REMAINDER and explained < 1.0:
+        others.append(make_unlisted_cause(named, 1.0 - explained))
+    free = {each.effect.cause for each, _ in screened if each.effect.is_free}
+    equal = {
+        cause
+        for cause, other in scored.items()
+        if other.score > named.score - (0.0 if cause in free else EQUIVALENCE_MARGIN)
+    }
+    finding = Finding(
+        name,
+        family,
+        compute_confidence(named, others),
+        tuple(sorted(equal, key=lambda cause: -scored[cause].score)),
+        values,
+        named.score,
+        explained,
+    )
+    return finding, [each for each, _ in screened if each.effect.cause in equal]
+
+
+def _list_screened(
+    effect: Effect, alternatives: Alternatives, outcome: SearchOutcome
+) -> list[tuple[ScreenedEffect, CalibrationResult]]:
+    """Return the effects and forms that could take the place of an effect, and the fits without them.
+
+    A form of which the effect is a special case is none of them.
+    """
+    compared = [alternatives]
+    forms = outcome.form_alternatives.get(effect.name)
+    if forms is not None and {*forms.without.effects, effect} == {*outcome.hypothesis.effects}:
+        compared.append(forms)
+    return [
+        (screened, each.without.fit)
+        for each in compared
+        for screened in each.screened
+        if effect.cause not in screened.effect.special_cases
+    ]
+
+
+def _score_causes(
+    effect: Effect,
+    gain: float,
+    screened: Sequence[tuple[ScreenedEffect, CalibrationResult]],
+    outcome: SearchOutcome,
+    rival: Rival | None,
+) -> dict[str, ScoredAlternative]:
+    """Return the scores of an effect and of its alternatives by cause.
+
+    Parameters
+    ----------
+    gain : float
+        Score gain of the effect in its hypothesis.
+    """
+    hypothesis, target = outcome.hypothesis, outcome.target
+    scored = {
+        each.effect.cause: ScoredAlternative(
+            _compute_score(each, effect, without), sum_squares_by_block(each.fit, hypothesis.fit, target)
+        )
+        for each, without in reversed(screened)
+    }
+    score = max(scored[effect.cause].score if effect.cause in scored else 0.0, gain)
+    squares = sum_squares_by_block(hypothesis.fit, hypothesis.fit, target)
+    scored[effect.cause] = ScoredAlternative(score, squares)
+    if rival is not None and rival.is_alternative(effect, hypothesis.effects):
+        squares = sum_squares_by_block(rival.fit, hypothesis.fit, target)
+        scored[rival.name] = ScoredAlternative(score + rival.lead, squares)
+    return scored
 
 
 def compute_form_chance(form: Effect, effects: Sequence[Effect], fit: CalibrationResult) -> float:

@@ -1,6 +1,6 @@
 """Stepwise regression over effects: beam search, refinement by swaps and backward elimination."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from operator import attrgetter
 
@@ -75,26 +75,43 @@ def stepwise_search(
             names = [effect.name for effect in beam[0].effects]
             run.progress(f"effects in addition to {' and '.join(names)}", min(0.1 + 0.2 * len(names), 0.7))
         min_gain = MIN_GAIN if is_first else _get_min_further_gain(target, run.effects)
-        width = PAIR_SEEDS if is_first and pairs else BEAM_WIDTH
-        extended: dict[frozenset[str], Hypothesis] = {}
-        for hypothesis in beam:
-            candidates = screened if is_first else screen_others(hypothesis, target, run)
-            for candidate in candidates[:width]:
-                found = with_effect(hypothesis, candidate)
-                key = frozenset(effect.name for effect in found.effects)
-                is_accepted = (is_first and pairs) or found.cost < hypothesis.cost - min_gain
-                if is_accepted and (key not in extended or found.cost < extended[key].cost):
-                    extended[key] = found
-        beam = sorted(extended.values(), key=attrgetter("rank"))[:width]
+        is_open = is_first and pairs
+        width = PAIR_SEEDS if is_open else BEAM_WIDTH
+        candidates = [
+            (hypothesis, (screened if is_first else screen_others(hypothesis, target, run))[:width])
+            for hypothesis in beam
+        ]
+        beam = _extend_beam(candidates, None if is_open else min_gain)[:width]
         beam, new_target = refit_with_ar_noise(beam, target, run.parallel_map)
         if beam and beam[0].cost < best.cost - min_gain:
             best, target = beam[0], new_target
-        elif not (is_first and pairs):
+        elif not is_open:
             break
         if not pairs:
             least = MIN_FOLLOWED_GAIN * (base.score - beam[0].cost)
             beam = [each for each in beam if base.score - each.cost >= least]
     return refine_by_swaps(best, target, run, max_effects)
+
+
+def _extend_beam(
+    candidates: Iterable[tuple[Hypothesis, Sequence[ScreenedEffect]]], min_gain: float | None
+) -> list[Hypothesis]:
+    """Return each hypothesis with each of its candidates, the best first; of equal sets of effects the best.
+
+    Parameters
+    ----------
+    min_gain : float or None
+        Least decrease of the cost; None to accept all candidates.
+    """
+    extended: dict[frozenset[str], Hypothesis] = {}
+    for hypothesis, effects in candidates:
+        for each in effects:
+            found = with_effect(hypothesis, each)
+            key = frozenset(effect.name for effect in found.effects)
+            is_accepted = min_gain is None or found.cost < hypothesis.cost - min_gain
+            if is_accepted and (key not in extended or found.cost < extended[key].cost):
+                extended[key] = found
+    return sorted(extended.values(), key=attrgetter("rank"))
 
 
 def _count_causes(hypothesis: Hypothesis) -> int:

@@ -219,32 +219,47 @@ class ExtendedSimulator:
             joined[np.isnan(joined).any(axis=1)] = np.nan
             return joined
         keys = [values[self._before_output].tobytes() for values in points]
-        bases: dict[bytes, bytes] = {}
-        if near is not None and self.fits_states:
-            for index, base in enumerate(near):
-                if keys[index] != keys[base]:
-                    bases[keys[index] + keys[base]] = keys[base]
-                    keys[index] += keys[base]
+        bases = self._link_to_bases(keys, near)
         known = {key: self._cache[key] for key in keys if key in self._cache}
         needed = {base for key, base in bases.items() if key not in known}
         missing = {
             key: values for key, values in zip(keys, points, strict=True) if key not in known or key in needed
         }
         if missing:
-            inputs: dict[bytes, MappedInput] = {}
-            places = {key: place for place, key in enumerate(missing)}
-            runs = [
-                self._make_run(values, _NONE, (), inputs, places[bases[key]] if key in bases else None)
-                for key, values in missing.items()
-            ]
-            with np.errstate(over="ignore", invalid="ignore"):
-                found = np.ascontiguousarray(simulate_runs(self.simulator, runs, self.context))
-            known |= zip(missing, found, strict=True)
+            known |= self._simulate_points(missing, bases)
             # Copies, since a row would keep the outputs of all points in memory.
             self._cache.update({key: known[key].copy() for key in list(missing)[-_CACHE_SIZE:]})
             while len(self._cache) > _CACHE_SIZE:
                 del self._cache[next(iter(self._cache))]
         return self._apply_output_maps([known[key] for key in keys], points)
+
+    def _link_to_bases(self, keys: list[bytes], near: NDArray[np.int64] | None) -> dict[bytes, bytes]:
+        """Return the key of the base of each point that is a change of another one.
+
+        The keys of these points are extended by that of their base, in place: the states of a simulation that
+        fits them depend on it.
+        """
+        bases: dict[bytes, bytes] = {}
+        if near is not None and self.fits_states:
+            for index, base in enumerate(near):
+                if keys[index] != keys[base]:
+                    bases[keys[index] + keys[base]] = keys[base]
+                    keys[index] += keys[base]
+        return bases
+
+    def _simulate_points(
+        self, points: Mapping[bytes, Signal], bases: Mapping[bytes, bytes]
+    ) -> dict[bytes, Signal]:
+        """Simulate points by their keys in one call, without output maps."""
+        inputs: dict[bytes, MappedInput] = {}
+        places = {key: place for place, key in enumerate(points)}
+        runs = [
+            self._make_run(values, _NONE, (), inputs, places[bases[key]] if key in bases else None)
+            for key, values in points.items()
+        ]
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = np.ascontiguousarray(simulate_runs(self.simulator, runs, self.context))
+        return dict(zip(points, found, strict=True))
 
     def _apply_output_maps(self, outputs: Sequence[Signal], points: Signal) -> Signal:
         """Return the outputs of several points after the output maps; NaN if they diverge."""

@@ -18,7 +18,7 @@ from islands.errors import RecordError
 from islands.expressions.tree import FMU, Apply, Expression, Symbol
 from islands.systems.fmu.fmi_description import FmiInterface
 from islands.systems.fmu.instance import FmuRun, load_fmu
-from islands.systems.fmu.model import FmuInitialValue, FmuModel
+from islands.systems.fmu.model import FmuModel
 from islands.systems.fmu.simulation import simulate_fmu
 from islands.systems.ode.lane_values import LaneInput
 from islands.systems.ode.ode_program import OdeProgram, generate_program
@@ -107,11 +107,7 @@ def make_fmu_simulator(model: FmuModel, system: OdeSystem, record: Dataset) -> F
         symbols[each.name]: find_channel(each.name, record, f"{description.name} reads")
         for each in model.channels
     }
-    first = {"input": float(record.u[0, 0]), "output": float(np.nan_to_num(record.y[0]))}
-    initial = {
-        symbols[each.variable.name] if each.place >= 0 else each.variable.name: _find_initial(each, first)
-        for each in model.initial
-    }
+    initial = _find_initial_values(model, record)
     is_integrated = description.interface == FmiInterface.MODEL_EXCHANGE
     # Steps can be shorter than the sampling time.
     is_continuous_time = is_integrated or (description.has_variable_step and description.fixed_step is None)
@@ -123,30 +119,42 @@ def make_fmu_simulator(model: FmuModel, system: OdeSystem, record: Dataset) -> F
     expressions: list[Expression] = [system.output, *map(Symbol, states)]
     expressions += [right for _, right in system.derivatives]
     expressions += [Apply(FMU, (Symbol(name),)) for name in (*system.of_fmu, *values)]
-    for steps in STEPS if is_integrated and not system.steps else (system.steps,):
-        rough = replace(rough, system=replace(system, steps=steps))
-        found = rough.run_nominal(context, tuple(expressions))
-        if np.isfinite(found.y).all():
-            break
-    else:
-        why = f" ({found.failure})" if found.failure else ""
-        raise RecordError(
-            f"the simulation {description.name} fails or diverges on this input{why}: check its parameters "
-            f"and units, and the sampling time {record.dt:g} s"
-        )
-    output, *signals = found.y
+    steps = STEPS if is_integrated and not system.steps else (system.steps,)
+    rough, (output, *signals) = _choose_steps(rough, steps, context, tuple(expressions))
     named = [*states, *(f"d{name}/dt" for name in states)]
     named += [f"{FMU.name}({name})" for name in system.of_fmu] + values
     simulated = dict(zip(named, signals, strict=True))
-    peaks = {"input": peak_amplitude(context.u), "output": peak_amplitude(output)}
     sizes = {name: peak_amplitude(signal) for name, signal in simulated.items()}
-    sizes |= {
-        name: peaks[each.sample_of]
-        for name, each in zip(initial, model.initial, strict=True)
-        if each.sample_of
-    }
+    peaks = {"input": peak_amplitude(context.u), "output": peak_amplitude(output)}
+    pairs = zip(initial, model.initial, strict=True)
+    sizes |= {name: peaks[each.sample_of] for name, each in pairs if each.sample_of}
     definitions = tuple(name for name in states if _is_definition(name, states, simulated))
     return replace(rough, system=replace(rough.system, definitions=definitions), sizes=sizes)
+
+
+def _choose_steps(
+    simulator: FmuSimulator,
+    steps: Sequence[int],
+    context: SimulationContext,
+    outputs: tuple[Expression, ...],
+) -> tuple[FmuSimulator, Signal]:
+    """Return the simulator with the first number of steps at which it does not fail, and its outputs.
+
+    Raises
+    ------
+    RecordError
+        It fails with all of them.
+    """
+    for count in steps:
+        simulator = replace(simulator, system=replace(simulator.system, steps=count))
+        found = simulator.run_nominal(context, outputs)
+        if np.isfinite(found.y).all():
+            return simulator, found.y
+    why = f" ({found.failure})" if found.failure else ""
+    raise RecordError(
+        f"the simulation {simulator.model.description.name} fails or diverges on this input{why}: check its "
+        f"parameters and units, and the sampling time {context.dt:g} s"
+    )
 
 
 def _is_definition(name: str, states: Sequence[str], simulated: Mapping[str, Signal]) -> bool:
@@ -156,10 +164,16 @@ def _is_definition(name: str, states: Sequence[str], simulated: Mapping[str, Sig
     return bool(derivative.any()) and any(np.array_equal(derivative, other) for other in others)
 
 
-def _find_initial(given: FmuInitialValue, first: Mapping[str, float]) -> float:
-    """Return a past sample of the record, or the start value of a variable."""
-    value = first.get(given.sample_of, given.variable.start or 0.0)
-    return min(max(value, given.variable.lower), given.variable.upper)
+def _find_initial_values(model: FmuModel, record: Dataset) -> dict[str, float]:
+    """Return initial values within bounds: first samples of the record, or start values of variables."""
+    first = {"input": float(record.u[0, 0]), "output": float(np.nan_to_num(record.y[0]))}
+    values = {}
+    for each in model.initial:
+        variable = each.variable
+        name = model.symbols[variable.name] if each.place >= 0 else variable.name
+        value = first.get(each.sample_of, variable.start or 0.0)
+        values[name] = min(max(value, variable.lower), variable.upper)
+    return values
 
 
 def _check_units(model: FmuModel, record: Dataset) -> None:
