@@ -22,9 +22,9 @@ from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION
 from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE
 from islands.evolution.presets import PRESET_SUMMARIES, PRESETS
 from islands.evolution.settings import Settings
+from islands.export import EXPORTS, FILE_EXPORTS
 from islands.expressions.primitives import PRIMITIVES
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
-from islands.io.export import EXPORTS, FILE_EXPORTS
 from islands.io.records import READERS
 from islands.model.candidate_library import LIBRARIES
 from islands.systems.catalogue import SYSTEMS

@@ -21,9 +21,9 @@ from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION
 from islands.evolution.migration.topology import TOPOLOGIES
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
+from islands.export import EXPORTS
 from islands.expressions.primitives import PRIMITIVES
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
-from islands.io.export import EXPORTS
 from islands.io.records import READERS
 from islands.io.simulator_spec.specification import SIMULATORS
 from islands.model.candidate_library import LIBRARIES

@@ -14,7 +14,7 @@ from islands.discrepancy.calibration.preparation import count_fitted_samples, ma
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export.fmu.compiler import find_compiler
 from islands.io.records import write_record
 from islands.io.simulator_spec.document import extended_json
 from support.command_line import fail, succeed

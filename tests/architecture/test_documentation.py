@@ -19,8 +19,8 @@ from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION
 from islands.evolution.migration.topology import TOPOLOGIES
 from islands.evolution.presets import PRESET_SUMMARIES, PRESETS
 from islands.evolution.settings import Settings
+from islands.export import EXPORTS
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
-from islands.io.export import EXPORTS
 from islands.io.records import READERS
 from islands.io.simulator_spec.specification import SIMULATORS
 from islands.model.candidate_library import LIBRARIES

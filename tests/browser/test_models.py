@@ -187,7 +187,7 @@ def test_a_model_is_saved_as_a_file(opened: Callable[..., Any], service: Service
 
 @pytest.mark.ci
 def test_every_export_format_has_a_button(opened: Callable[..., Any], finished: str, expect: Any) -> None:
-    from islands.io.export import EXPORTS
+    from islands.export import EXPORTS
 
     page = opened(f"#/jobs/{finished}")
     expect(page.locator(".model .exports button")).not_to_have_count(0)

@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ET
 import pytest
 from jsonschema import Draft202012Validator
 
+from islands.export import EXPORTS
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
-from islands.io.export import EXPORTS
 from islands_api.web.routes.figures import MODEL_FIGURES
 from islands_api.web.routes.figures import SEARCH_FIGURES as NAMED
 from support.service import (

@@ -23,7 +23,7 @@ from islands.discrepancy.simulators import (
     saved_extension,
 )
 from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.specification import SIMULATORS, PhysicalSpec
 from support.simulated_records import made, names
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.io.export.sampled_block import SampledBlock, make_block
+from islands.export.block import SampledBlock, make_block
 from islands.model.model import Model
 from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.coupled_model import CoupledModel

@@ -20,8 +20,8 @@ from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
-from islands.io.export.equations.equation_collection import collect_equations
-from islands.io.export.extension import export_extended
+from islands.export.equations.equation_collection import collect_equations
+from islands.export.extension import export_extended
 from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.specification import LocalExtendedSpec
 from islands.performance.benchmark.compiled_c import compile_model

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from islands.io.export import export, write_export
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export import export, write_export
+from islands.export.fmu.compiler import find_compiler
 from islands.performance.benchmark.compiled_c import compile_model
 from support.equation_programs import OCTAVE_FILES
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.simulator import Simulator
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.ode_spec import OdeSpec

@@ -1,4 +1,4 @@
-"""Reading and writing files: records, models, checkpoints, results and exports.
+"""Reading and writing files: records, models, checkpoints and results.
 
 Start with `records` (measured data) and `models` (model files).
 """

@@ -13,8 +13,8 @@ from islands.discrepancy.monitoring.alarm_rate import parse_alarm_rate
 from islands.errors import IslandsError, suggest
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.presets import resolve_settings
+from islands.export import export
 from islands.expressions.parsing import parse
-from islands.io.export import export
 from islands.io.records.reading_options import ReadingOptions
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import PhysicalSpec, parse_spec

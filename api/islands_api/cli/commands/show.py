@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
+from islands.export import EXPORTS, FILE_EXPORTS
 from islands.facade.load import load
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.result import Result
-from islands.io.export import EXPORTS, FILE_EXPORTS
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.model.equations import named_signals
 from islands_api.cli import options

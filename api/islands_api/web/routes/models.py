@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
 
-from islands.io.export import EXPORTS, export
+from islands.export import EXPORTS, export
 from islands.io.models import model_from_json
 from islands_api.result_schemas import DiscrepancyResult, IdentificationResult, MonitoredRecordResult
 from islands_api.schemas import ModelPage, ModelView

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from islands.data.coupled_record import CoupledRecord
 from islands.evolution.progress import Steps
+from islands.export import export, write_export
+from islands.export.coupled.coupled_document import coupled_json
+from islands.export.coupled.coupled_equations import coupled_equation, coupled_signals
 from islands.facade.results.result import Result
-from islands.io.export import export, write_export
-from islands.io.export.coupled.coupled_document import coupled_json
-from islands.io.export.coupled.coupled_equations import coupled_equation, coupled_signals
 from islands.io.result_folder import record_document
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.simulation.coupled_free_run import CoupledSimulation, coupled_free_run

@@ -15,10 +15,10 @@ from islands.errors import ModelError, lookup
 from islands.estimation.constraints.checks import ConstraintCheck
 from islands.estimation.estimators import least_squares_bias
 from islands.evolution.search_result import RankedModel, SearchResult
+from islands.export import export, write_export
 from islands.facade.results.model_analysis import linearise
 from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
 from islands.facade.results.notebook_html import render_html
-from islands.io.export import export, write_export
 from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
 from islands.model.operating_point import static_characteristic

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
+from islands.export import FILE_EXPORTS, export, write_export
+from islands.export.closed_form import closed_form
+from islands.export.extension import export_extended
 from islands.facade.results.model_simulation import simulate
 from islands.io.data_frames import as_record
-from islands.io.export import FILE_EXPORTS, export, write_export
-from islands.io.export.closed_form import closed_form
-from islands.io.export.extension import export_extended
 from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost

@@ -7,7 +7,7 @@ from pathlib import Path
 from statistics import median
 
 from islands.errors import ModelError
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export.fmu.compiler import find_compiler
 from islands.performance.benchmark import compiled_c, kernel_evaluator, plain_numpy
 from islands.performance.benchmark.clock import milliseconds
 from islands.performance.benchmark.workload import CASE1, INTERVAL, WARM_UP, WorkloadModel

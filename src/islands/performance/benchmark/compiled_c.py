@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.export.fmu.compiler import compile_library
+from islands.export.languages.c import definition
 from islands.expressions.primitives import SIGN
-from islands.io.export.c import definition
-from islands.io.export.fmu.compiler import compile_library
 from islands.model.regressor import Regressor
 from islands.performance.benchmark.expression_source import infix
 

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from islands.distribution import read_version
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export.fmu.compiler import find_compiler
 from islands.performance.benchmark.clock import cpu
 from islands.performance.benchmark.compiled_c import compile_model
 

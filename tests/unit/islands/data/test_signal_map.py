@@ -11,9 +11,9 @@ from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_inputs
 from islands.data.preprocessing import preprocess
 from islands.data.signal_map import map_signals, match_rate
+from islands.export import export
 from islands.expressions.parsing import parse
 from islands.facade.results.model_simulation import predict, simulate
-from islands.io.export import export
 from islands.io.models import model_from_json, model_json
 from islands.model.model import make_model, measured_model
 from islands.model.operating_point import static_characteristic

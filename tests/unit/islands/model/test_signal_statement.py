@@ -10,8 +10,8 @@ from islands.data.averaging import average_samples
 from islands.data.dataset import Dataset
 from islands.data.preprocessing import preprocess
 from islands.errors import ModelError
+from islands.export import export
 from islands.expressions.parsing import parse
-from islands.io.export import export
 from islands.model.equations import mathml_equation, named_signals
 from islands.model.model import make_model
 from islands.model.signal_statement import describe_signals

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from islands.io.export import EXPORTS
+from islands.export import EXPORTS
 from islands.io.models import model_from_json
 from islands_api.client import ServiceError
 from islands_api.schemas import HistoryPage, ModelView

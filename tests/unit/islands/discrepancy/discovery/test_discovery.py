@@ -24,8 +24,8 @@ from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.export.fmu.compiler import find_compiler
 from islands.io.diagnosis_json import diagnosis_document
-from islands.io.export.fmu.compiler import find_compiler
 from islands.io.result_text.diagnosis_text import summarise_diagnosis
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec

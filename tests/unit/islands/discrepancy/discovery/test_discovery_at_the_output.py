@@ -17,7 +17,7 @@ from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
-from islands.io.export.extension import export_extended
+from islands.export.extension import export_extended
 from islands.io.result_text.diagnosis_text import summarise_diagnosis
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import simulate_spec

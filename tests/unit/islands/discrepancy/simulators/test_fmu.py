@@ -19,8 +19,8 @@ from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.fmu import FmuSimulator
 from islands.errors import RecordError
-from islands.io.export import write_export
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export import write_export
+from islands.export.fmu.compiler import find_compiler
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.document import extended_document

@@ -21,8 +21,8 @@ from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import ForceLaw
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.errors import ModelError
-from islands.io.export.closed_form import closed_form
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export.closed_form import closed_form
+from islands.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec

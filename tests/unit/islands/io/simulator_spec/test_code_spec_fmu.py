@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from islands.errors import SettingsError
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.code_spec import FmuParameterSpec, FmuSpec
 from islands.io.simulator_spec.specification import parse_spec
 from islands.systems.fmu.system import make_fmu_system

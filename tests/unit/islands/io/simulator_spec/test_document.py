@@ -18,7 +18,7 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, RecordError, SettingsError
-from islands.io.export.extension import as_json
+from islands.export.extension import as_json
 from islands.io.simulator_spec.document import describe_extension, extended_document, extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.io.simulator_spec.specification import (

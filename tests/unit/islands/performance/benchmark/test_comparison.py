@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 import pytest
 
 from islands.errors import ModelError
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export.fmu.compiler import find_compiler
 from islands.model.model import Model
 from islands.performance.benchmark import comparison, kernel_evaluator
 from islands.performance.benchmark.workload import (

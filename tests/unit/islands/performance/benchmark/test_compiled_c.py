@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from islands.errors import ModelError
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export.fmu.compiler import find_compiler
 from islands.performance.benchmark import compiled_c, plain_numpy
 from islands.performance.benchmark.compiled_c import compile_model
 from islands.performance.benchmark.machine import peak

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from islands.errors import ModelError, SettingsError
-from islands.io.export import write_export
-from islands.io.export.fmu.compiler import find_compiler
+from islands.export import write_export
+from islands.export.fmu.compiler import find_compiler
 from islands.systems.fmu.fmi_description import read_description
 from islands.systems.published_models import PUBLISHED
 from support.oscillator_fmus import write_oscillator

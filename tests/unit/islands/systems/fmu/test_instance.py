@@ -11,8 +11,8 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.errors import ModelError
+from islands.export.fmu.compiler import find_compiler
 from islands.expressions.tree import FMU, Apply, Symbol
-from islands.io.export.fmu.compiler import find_compiler
 from islands.systems.fmu.fmi_description import FmiInterface, read_description
 from islands.systems.fmu.instance import FmuInstance, FmuRun, load_fmu
 from islands.systems.fmu.model import FmuParameterChoice, choose_variables

@@ -1,0 +1,156 @@
+"""Closed form of an extended simulation: one difference equation, which is exported as a model.
+
+It exists for models and linear simulations with effects that are static maps of the input or lines through
+the output. Differential equations are integrated, see `islands.export.equations`; other effects have a
+state or depend on the whole record.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+from islands.data.channel_names import AT_ONCE
+from islands.errors import ModelError
+from islands.expressions.primitives import MUL, PRIMITIVES, SUB
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, replace_leaves
+from islands.io.models import model_from_json
+from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
+from islands.io.simulator_spec.spec_base import EffectSpec, ScalesSpec
+from islands.io.simulator_spec.specification import (
+    ExtendedSpec,
+    LinearSpec,
+    LocalSpec,
+    ModelSpec,
+    SimulationSpec,
+)
+from islands.model.model import Model, make_model, measured_model
+
+_Terms = list[tuple[Expression, float]]
+_Values = Mapping[str, float]
+
+
+def _apply_gain(x: Expression, values: _Values, _scales: ScalesSpec) -> Expression:
+    return Apply(MUL, (Constant(1.0 + values["k"]), x))
+
+
+def _saturate(x: Expression, values: _Values, scales: ScalesSpec) -> Expression:
+    level = scales.input_peak * (1.0 - max(values["cut"], 0.0))
+    upper = Apply(PRIMITIVES["min"], (x, Constant(level)))
+    return Apply(PRIMITIVES["max"], (upper, Constant(-level)))
+
+
+def _remove_dead_zone(x: Expression, values: _Values, _scales: ScalesSpec) -> Expression:
+    beyond = Apply(SUB, (Apply(PRIMITIVES["abs"], (x,)), Constant(values["d"])))
+    return Apply(MUL, (Apply(PRIMITIVES["sign"], (x,)), Apply(PRIMITIVES["max"], (beyond, Constant(0.0)))))
+
+
+#: Static maps of the input, as expressions.
+_INPUT_MAPS: Mapping[str, Callable[[Expression, _Values, ScalesSpec], Expression]] = MappingProxyType(
+    {"input-gain": _apply_gain, "input-saturation": _saturate, "dead-zone": _remove_dead_zone}
+)
+
+#: Lines through the output: factor and constant.
+_OUTPUT_LINES: Mapping[str, Callable[[_Values], tuple[float, float]]] = MappingProxyType(
+    {
+        "sensor-gain": lambda values: (1.0 + values["k"], 0.0),
+        "offset": lambda values: (1.0, values["c"]),
+    }
+)
+
+
+def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
+    """Return an extended simulation as a model.
+
+    A linear simulation without a reference input describes deviations from the equilibrium at its first
+    sample. Its model is in differences of samples, so that it continues the equilibrium of its start values.
+
+    Raises
+    ------
+    ModelError
+        The simulation is not a model or a linear one with known coefficients, or has another effect. The
+        message names it.
+    """
+    match spec:
+        case ModelSpec():
+            return measured_model(model_from_json(json.dumps(spec.model), spec.name))
+        case ExtendedSpec(core=LinearSpec(numerator=tuple()) as core):
+            found = _make_linear_model(core, spec.inputs[0])
+        case ExtendedSpec():
+            found = closed_form(spec.core)
+        case FmuSpec() | ProgramSpec():
+            raise _refuse(f"the simulation {spec.kind}", "plain, python or json")
+        case _:
+            raise _refuse(f"the simulation {spec.kind}")
+    if spec.output_equation is not None:
+        raise _refuse("an equation of the output with missing terms")
+    if (spec.hold, spec.times) != ("first-order", 1):
+        raise _refuse("a simulation with several steps per sample")
+    # A map replaces the input inside the maps before it, so that the last one is applied first.
+    before = [each for each in reversed(spec.effects) if each.name in _INPUT_MAPS]
+    for effect in (*before, *(each for each in spec.effects if each.name not in _INPUT_MAPS)):
+        found = _apply_effect(found, effect, spec.scales)
+    return replace(found, output_name=spec.output, dt=spec.scales.dt)
+
+
+def _refuse(what: str, formats: str = "plain, python, json, c or matlab") -> ModelError:
+    possible = ", ".join([*_INPUT_MAPS, *_OUTPUT_LINES])
+    return ModelError(
+        f"{what} has no closed form as a difference equation: take the format {formats}. Other formats are "
+        f"possible for a model or a linear simulation with the effects {possible}"
+    )
+
+
+def _make_linear_model(spec: LinearSpec, column: str) -> Model:
+    """Return a linear simulation as a model, of the differences of its signals without a reference input."""
+    assert spec.numerator is not None
+    # Regressors read u(k-1) of the input that is read one sample early where the equation has u(k).
+    lead = int(spec.delay == 0)
+    lagged = [(Lagged(0, lag), each) for lag, each in enumerate(spec.denominator, start=1)]
+    lagged += [(Lagged(1, lag), each) for lag, each in enumerate(spec.numerator, start=spec.delay + lead)]
+    terms: _Terms = list(lagged)
+    if spec.reference_input is None:
+        terms += [(Lagged(leaf.channel, leaf.lag + 1), -each) for leaf, each in lagged]
+        terms.append((Lagged(0, 1), 1.0))
+    else:
+        at_rest = spec.level * (1.0 - sum(spec.denominator)) - spec.reference_input * sum(spec.numerator)
+        terms.append((Constant(1.0), at_rest))
+    return make_model(terms, (f"{column}{AT_ONCE * lead}",))
+
+
+def _apply_effect(model: Model, effect: EffectSpec, scales: ScalesSpec) -> Model:
+    values = {name: each.value for name, each in effect.parameters.items()}
+    terms = zip([item.expression for item in model.regressors], model.parameters, strict=True)
+    found: _Terms
+    if effect.name in _INPUT_MAPS:
+        transform = _INPUT_MAPS[effect.name]
+        found = [
+            (_replace_channel(each, 1, lambda leaf: transform(leaf, values, scales)), parameter)
+            for each, parameter in terms
+        ]
+    elif effect.name in _OUTPUT_LINES:
+        found = _move_output(list(terms), *_OUTPUT_LINES[effect.name](values))
+    else:
+        raise _refuse(f"the effect {effect.name}")
+    return make_model(found, model.input_names, model.output_name, model.dt)
+
+
+def _move_output(terms: _Terms, factor: float, constant: float) -> _Terms:
+    """Return the terms of the output ``factor*y + constant``, in which past outputs are replaced likewise."""
+
+    def undo(leaf: Expression) -> Expression:
+        return Apply(MUL, (Constant(1.0 / factor), Apply(SUB, (leaf, Constant(constant)))))
+
+    found: _Terms = [(Constant(1.0), constant)]
+    for each, parameter in terms:
+        if isinstance(each, Lagged) and each.channel == 0:
+            found += [(each, parameter), (Constant(1.0), -parameter * constant)]
+        else:
+            found.append((_replace_channel(each, 0, undo), factor * parameter))
+    return found
+
+
+def _replace_channel(
+    expression: Expression, channel: int, transform: Callable[[Expression], Expression]
+) -> Expression:
+    return replace_leaves(expression, lambda leaf: transform(leaf) if leaf.channel == channel else leaf)

@@ -1,0 +1,251 @@
+"""Expressions and statements of a program, in any language with structures."""
+
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from islands.export.equations.common_parts import take_common_parts
+from islands.export.equations.extended_equations import ExtendedEquations
+from islands.export.equations.identifiers import make_identifiers
+from islands.export.parts import quote_name
+from islands.expressions.primitives import POW
+from islands.expressions.printing import EQUATION_OPERATORS, ProgramPrinter, render
+from islands.expressions.tree import (
+    SIGNAL_FUNCTIONS,
+    Apply,
+    Expression,
+    Primitive,
+    Symbol,
+    find_symbols,
+    replace,
+    substitute,
+)
+from islands.systems.ode.equation_parser import TIME
+from islands.systems.ode.ode_system import sort_variables
+from islands.systems.ode.output_system import SIMULATED
+
+#: Functions that are not functions of every language, and the names of their definitions in programs.
+DEFINED = {
+    "less": "less",
+    "less_equal": "less_equal",
+    "sign": "sign_of",
+    "min": "minimum",
+    "max": "maximum",
+    "where": "choose",
+}
+
+#: Functions that are operators in every language.
+_OPERATORS = {name: EQUATION_OPERATORS[name] for name in ("add", "sub", "mul", "div")}
+
+#: Columns of a line.
+_WIDTH = 108
+
+
+@dataclass(frozen=True)
+class EquationCode:
+    """Writer of the parts of a program.
+
+    Attributes
+    ----------
+    equations : ExtendedEquations
+    member : str
+        Text between a structure and its member, if the structure is an argument.
+    functions : mapping
+        Names of functions of expressions in the language; the others have their own names.
+    declare : str
+        Text before the name of a new variable.
+    continuation : str
+        End of a line that continues.
+    power : callable
+        Writes a power.
+    """
+
+    equations: ExtendedEquations
+    member: str
+    functions: Mapping[str, str]
+    declare: str
+    continuation: str
+    power: Callable[[str, str], str]
+
+    @cached_property
+    def signals(self) -> tuple[Expression, ...]:
+        """Signals that the equations read: input, channels, time, gain, their rates and delays."""
+        system = self.equations.system
+        needed = [right for _, right in (*system.derivatives, *system.variables)]
+        found: dict[str, Expression] = {}
+        for right in (*needed, system.output):
+            for each in _find_signals(right, {*system.signals, TIME}):
+                found.setdefault(render(each), each)
+        return tuple(found.values())
+
+    @property
+    def read_signals(self) -> tuple[Expression, ...]:
+        """Signals that are read from the record: all but the simulated output."""
+        is_sampled = self.equations.core is not None
+        return tuple(each for each in self.signals if not (is_sampled and each == Symbol(SIMULATED)))
+
+    @cached_property
+    def identifiers(self) -> Mapping[str, str]:
+        """Identifiers of all names, and of signals by their text."""
+        given = self.equations
+        names = [*given.values, *given.start, *(name for name, _ in given.system.variables), *given.columns]
+        return make_identifiers([*names, *(render(each) for each in self.signals)])
+
+    @cached_property
+    def _members(self) -> dict[str, str]:
+        """Texts of all names in the equations."""
+        given, own = self.equations, self.identifiers
+        members = {name: f"p{self.member}{own[name]}" for name in given.values}
+        members |= {name: f"s{self.member}{own[name]}" for name in given.start}
+        members |= {name: f"w.{own[name]}" for name, _ in given.system.variables}
+        return members | {render(each): f"in{self.member}{own[render(each)]}" for each in self.signals}
+
+    def write(self, expression: Expression, local: Mapping[str, str] | None = None) -> str:
+        """Write an expression; ``local`` has the texts of further names."""
+        texts = {**self._members, **(local or {})}
+        printer = ProgramPrinter(_OPERATORS, self._call, symbol=lambda name: texts.get(name, name))
+        return printer.write(_name_signals(expression))
+
+    def _call(self, function: Primitive, arguments: Sequence[str]) -> str:
+        if function == POW:
+            return self.power(*arguments)
+        name = function.name
+        return f"{self.functions.get(name, DEFINED.get(name, name))}({', '.join(arguments)})"
+
+    def assign(
+        self, targets: Sequence[tuple[str, Expression]], local: Mapping[str, str] | None = None
+    ) -> list[str]:
+        """Write statements that assign expressions to targets; common parts are computed before."""
+        lines = []
+        for number, (target, expression) in enumerate(targets, start=1):
+            parts, (rest,) = take_common_parts([expression], f"part{number}_" if len(targets) > 1 else "part")
+            for name, part in parts:
+                lines += self.wrap(f"{self.declare}{name} = {self.write(part, local)};")
+            lines += self.wrap(f"{target} = {self.write(rest, local)};")
+        return lines
+
+    def wrap(self, line: str) -> list[str]:
+        """Break a long statement between its operations."""
+        found = textwrap.wrap(
+            line, _WIDTH - 12, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+        )
+        return [f"{each}{self.continuation}" for each in found[:-1]] + found[-1:]
+
+    def assign_variables(self, readers: Iterable[Expression]) -> list[str]:
+        """Write the variables that expressions read, each after those that it reads."""
+        system = self.equations.system
+        right_sides = dict(system.variables)
+        needed: set[str] = set()
+        open_names = [name for each in readers for name in find_symbols(each)]
+        while open_names:
+            name = open_names.pop()
+            if name in right_sides and name not in needed:
+                needed.add(name)
+                open_names += find_symbols(right_sides[name])
+        ordered = [name for name in sort_variables(system) if name in needed]
+        return [
+            line for name in ordered for line in self.assign([(self.write(Symbol(name)), right_sides[name])])
+        ]
+
+    def find_functions(self, text: str) -> list[str]:
+        """Return the functions of `DEFINED` that a program calls."""
+        return [function for function, name in DEFINED.items() if f"{name}(" in text]
+
+    def describe(self) -> list[str]:
+        """Return the equations and the settings of the integration as lines of a comment, in ASCII."""
+        given, own = self.equations, self.identifiers
+        symbols: dict[str, Expression] = {name: Symbol(text) for name, text in own.items()}
+        system, core = given.system, given.core
+        renamed = [(own[name], substitute(right, symbols)) for name, right in system.derivatives]
+        lines = [f"Extended simulation: {system.name}, {quote_name(given.output)} from"]
+        lines += [f"    {own[name]} = {quote_name(column)}" for name, column in given.columns.items()]
+        if core is not None:
+            lines += ["", f"    {SIMULATED} = {core.summary}"]
+        lines += ["", *(f"    d{name}/dt = {render(right)}" for name, right in renamed)]
+        lines += [
+            f"    {own[name]} = {render(substitute(right, symbols))}" for name, right in system.variables
+        ]
+        lines += [f"    output = {render(substitute(system.output, symbols))}", ""]
+        lines += [f"Effect {each}." for each in given.effects]
+        if core is not None:
+            lines.append(f"Sampling time {given.dt!r} s.")
+            return _wrap(lines)
+        count = given.steps * given.times
+        lines += [
+            f"Sampling time {given.dt!r} s; input between samples: {given.hold}.",
+            f"Classical Runge-Kutta method, {count} {'steps' if count > 1 else 'step'} per sample.",
+        ]
+        if system.shooting:
+            lines.append(
+                "This is a free run. The simulation of the package restarts every "
+                f"{system.shooting:g} s from states that are fitted to the measured output."
+            )
+        return _wrap(lines)
+
+    def list_parameters(self) -> list[tuple[str, str, str]]:
+        """Return identifier, value and comment of each parameter."""
+        return [
+            (self.identifiers[name], repr(float(each.value)), _to_ascii(simplify(each.unit)))
+            for name, each in self.equations.values.items()
+        ]
+
+    def list_states(self) -> list[tuple[str, str, str]]:
+        """Return identifier, value at the first sample and comment of each state."""
+        return [
+            (self.identifiers[name], repr(float(each.value)), _to_ascii(simplify(each.unit)))
+            for name, each in self.equations.start.items()
+        ]
+
+
+def make_step(code: EquationCode, access: str, names: Iterable[str], time: str) -> list[str]:
+    """Write the sum of the slopes of a step of the Runge-Kutta method, for states with these identifiers."""
+    lines = []
+    for name in names:
+        slopes = f"first.{name} + 2.0*second.{name} + 2.0*third.{name} + fourth.{name}"
+        lines += code.wrap(f"{access}{name} = {access}{name} + {time}/6.0*({slopes});")
+    return lines
+
+
+def simplify(unit: str) -> str:
+    """Return a unit as the text of a comment."""
+    return "1" if unit in ("", "1") else unit
+
+
+def _wrap(lines: Iterable[str]) -> list[str]:
+    """Return lines of a comment."""
+    return [
+        _to_ascii(part)
+        for line in lines
+        for part in textwrap.wrap(line, 100, subsequent_indent="        ", break_long_words=False) or [""]
+    ]
+
+
+def _to_ascii(text: str) -> str:
+    """Return a text that cannot end a comment or a line, in ASCII."""
+    plain = text.replace("°", "deg").replace("µ", "u").replace("??", "? ?")
+    plain = plain.replace("*/", "* /").replace("/*", "/ *")
+    return re.sub(r"[^ -~]", lambda found: f"\\u{ord(found[0]):04x}", plain)
+
+
+def _find_signals(expression: Expression, names: set[str]) -> Iterator[Expression]:
+    match expression:
+        case Symbol(name) if name in names:
+            yield expression
+        case Apply(primitive, _) if primitive in SIGNAL_FUNCTIONS:
+            yield expression
+        case Apply(_, arguments):
+            for argument in arguments:
+                yield from _find_signals(argument, names)
+
+
+def _name_signals(expression: Expression) -> Expression:
+    """Return an expression in which rates and delays are names."""
+
+    def find(part: Expression) -> Symbol | None:
+        return (
+            Symbol(render(part)) if isinstance(part, Apply) and part.primitive in SIGNAL_FUNCTIONS else None
+        )
+
+    return replace(expression, find)

@@ -1,0 +1,1 @@
+"""Programs and blocks of models in Python, C, MATLAB, Simulink and Modelica."""

@@ -1,0 +1,146 @@
+"""Export of a model as a MATLAB System object, for the Simulink block MATLAB System."""
+
+import textwrap
+
+from islands.export.block import SampledBlock, make_block
+from islands.export.languages.matlab import matlab_definition
+from islands.model.model import Model
+from islands.simulation.coupled_model import CoupledModel
+
+_FILE = """\
+classdef narx_system < matlab.System
+% NARX_SYSTEM  NARX model that is called once per sample.
+%
+{heading}
+%
+% Save this file as narx_system.m; select narx_system in a block MATLAB System, or call a System object with
+% the inputs of each sample: model = narx_system; {results} = model({inputs}).
+
+  properties (Nontunable)
+    % Start  Samples before the first one, newest first:
+{past}
+    Start = zeros(1, {states});
+  end
+
+  properties (DiscreteState)
+    Past
+  end
+
+  methods (Access = protected)
+    function resetImpl(obj)
+      obj.Past = reshape(double(obj.Start), 1, {states});
+    end
+
+    function {results} = outputImpl(obj, {inputs})
+      result = predict(obj, {inputs});
+      {assignments}
+    end
+
+    function updateImpl(obj, {inputs})
+      result = predict(obj, {inputs});
+      x = obj.Past;
+      obj.Past = [{update}];
+    end
+
+    function result = predict(obj, {inputs})
+      x = obj.Past;
+      {conversions}
+      result = zeros(1, {outputs});
+      {equations}
+    end
+
+    function varargout = isInputDirectFeedthroughImpl(~, {ignored})
+      varargout = {{{direct}}};
+    end
+
+    function time = getSampleTimeImpl(obj)
+      time = createSampleTime(obj, 'Type', 'Discrete', 'SampleTime', {dt!r});
+    end
+
+    function [size, class, complex] = getDiscreteStateSpecificationImpl(~, ~)
+      size = [1 {states}];
+      class = 'double';
+      complex = false;
+    end
+
+    function varargout = getOutputSizeImpl(~)
+      varargout = repmat({{[1 1]}}, 1, {outputs});
+    end
+
+    function varargout = getOutputDataTypeImpl(~)
+      varargout = repmat({{'double'}}, 1, {outputs});
+    end
+
+    function varargout = isOutputComplexImpl(~)
+      varargout = repmat({{false}}, 1, {outputs});
+    end
+
+    function varargout = isOutputFixedSizeImpl(~)
+      varargout = repmat({{true}}, 1, {outputs});
+    end
+  end
+{functions}end
+"""
+
+_FUNCTIONS = """
+  methods (Static, Access = private)
+{definitions}  end
+"""
+
+
+def matlab_system_source(model: Model | CoupledModel) -> str:
+    """Return a model of one or several outputs as the source of a MATLAB System object, in ASCII.
+
+    The first sample of the object is the one after the past samples in its property ``Start``. An input that
+    acts at once has direct feedthrough.
+
+    Raises
+    ------
+    ModelError
+        The model has no finite parameters or no sampling time, or a user-defined primitive has no MATLAB
+        body.
+    """
+    block = make_block(model)
+    outputs, inputs = block.signals[: block.outputs], block.signals[block.outputs :]
+    used = [textwrap.indent(matlab_definition(each), "    ") for each in block.primitives]
+    equations = []
+    for place, write in enumerate(block.terms, start=1):
+        equations += [
+            f"result({place}) = result({place}) + {term};"
+            for term in write(
+                lambda signal, lag: f"x({block.position(signal, lag) + 1})" if lag else signal,
+                lambda primitive: f"narx_system.f_{primitive.name}",
+            )
+        ]
+    read = [signal for signal, direct in zip(block.signals, block.feedthrough, strict=True) if direct]
+    return _FILE.format(
+        heading=block.heading("%"),
+        inputs=", ".join(inputs),
+        results=outputs[0] if len(outputs) == 1 else f"[{', '.join(outputs)}]",
+        assignments="\n      ".join(
+            f"{name} = result({place});" for place, name in enumerate(outputs, start=1)
+        ),
+        past=block.describe("    %   "),
+        outputs=block.outputs,
+        states=block.size,
+        update=_update(block),
+        # With integer inputs MATLAB would round every product.
+        conversions="\n      ".join(f"{name} = double({name});" for name in read) or "% no present input",
+        equations="\n      ".join(equations),
+        ignored=", ".join("~" for _ in inputs),
+        direct=", ".join(str(each).lower() for each in block.feedthrough[block.outputs :]),
+        dt=block.dt,
+        functions=_FUNCTIONS.format(definitions="\n".join(used)) if used else "",
+    )
+
+
+def _update(block: SampledBlock) -> str:
+    """Return the elements of the next state: each signal begins with its present sample."""
+    parts, place = [], 1
+    for channel, (signal, depth) in enumerate(zip(block.signals, block.depths, strict=True)):
+        if depth:
+            parts.append(f"double({signal})" if channel >= block.outputs else f"result({channel + 1})")
+        if depth > 1:
+            parts.append(f"x({place}:{place + depth - 2})")
+        place += depth
+    return ", ".join(parts)

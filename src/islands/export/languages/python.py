@@ -1,0 +1,142 @@
+"""Export of a model as a self-contained Python module."""
+
+import inspect
+import math
+import re
+import textwrap
+from collections.abc import Sequence
+from numbers import Integral, Real
+
+from islands.errors import ModelError
+from islands.export.parts import description, functions, signals, terms
+from islands.expressions.tree import Primitive
+from islands.model.equations import equation
+from islands.model.model import Model
+
+_MODULE = '''"""NARX model: {equation}
+
+{description}
+"""
+
+import math
+
+MAXIMUM_LAG = {lag}
+{constants}
+
+{functions}def predict(k, y, {inputs}):
+    """Return y(k) from the preceding samples."""
+    total = 0.0
+    {terms}
+    return total
+
+
+def simulate({inputs}, y0):
+    """Return the free run from the inputs and the first MAXIMUM_LAG outputs y0."""
+    y = [float(value) for value in y0[:MAXIMUM_LAG]]
+    for k in range(MAXIMUM_LAG, len({first_input})):
+        y.append(predict(k, y, {inputs}))
+    return y
+'''
+
+
+def python_source(model: Model) -> str:
+    """Return a model as the source of a Python module.
+
+    The module defines the functions ``predict`` (one sample) and ``simulate`` (free run). It needs only the
+    standard library. Its results equal those of this package's kernels bit for bit, because sums and products
+    are evaluated in the same order.
+
+    Raises
+    ------
+    ModelError
+        The model has no finite parameters, or a user-defined primitive cannot be exported: its source is not
+        available, or it uses globals other than ``math`` and numbers.
+    """
+    used = functions(model)
+    inputs = signals(model)[1:]
+    term_texts = terms(model, lambda name, lag: f"{name}[k-{lag}]" if lag else f"{name}[k]", python_name)
+    sources = [function_source(primitive) for primitive in used]
+    return _MODULE.format(
+        equation=equation(model),
+        description=description(model, escape_name),
+        lag=model.maximum_lag,
+        constants="".join(f"{name} = {value}\n" for name, value in required_globals(used).items()),
+        functions="\n\n".join(sources) + ("\n\n" if sources else ""),
+        inputs=", ".join(inputs),
+        first_input=inputs[0],
+        terms="\n    ".join(f"total += {term}" for term in term_texts),
+    )
+
+
+def python_name(primitive: Primitive) -> str:
+    """Return the name of a primitive's Python function."""
+    return f"_{primitive.name}"
+
+
+def escape_name(name: str) -> str:
+    """Return a column name escaped for a docstring, on one line."""
+    escaped = name.replace("\\", r"\\").replace('"', r"\"")
+    return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in escaped)
+
+
+def function_source(primitive: Primitive) -> str:
+    """Return the source of a primitive's scalar function, with an underscore before its name.
+
+    Raises
+    ------
+    ModelError
+        The source is not available, or is not a function definition.
+    """
+    try:
+        source = textwrap.dedent(inspect.getsource(primitive.scalar))
+    except (OSError, TypeError) as error:
+        raise ModelError(
+            f"the source of primitive {primitive.name!r} is not available: define it with def in a file"
+        ) from error
+    if not source.startswith("def "):
+        raise ModelError(
+            f"primitive {primitive.name!r} can't be exported: write it with def, not as a lambda and without "
+            "a decorator"
+        )
+    return re.sub(r"def \w+", f"def _{primitive.name}", source, count=1)
+
+
+def required_globals(primitives: Sequence[Primitive]) -> dict[str, str]:
+    """Return the module-level names that the functions use, with their Python source.
+
+    Raises
+    ------
+    ModelError
+        A function uses a global other than ``math`` and numbers, or a name of the exported module.
+    """
+    reserved = {"math": "math", "MAXIMUM_LAG": "", "predict": "", "simulate": ""}
+    reserved |= {f"_{primitive.name}": "" for primitive in primitives}
+    found: dict[str, str] = {}
+    for primitive in primitives:
+        closure = inspect.getclosurevars(primitive.scalar)
+        for name, value in {**closure.globals, **closure.nonlocals}.items():
+            source = _value_source(value)
+            if source is None:
+                raise ModelError(
+                    f"primitive {primitive.name!r} uses {name}: an export may only use math and numbers"
+                )
+            if (reserved | found).get(name, source) != source:
+                raise ModelError(
+                    f"primitive {primitive.name!r} uses {name}, a name that means something else in the "
+                    "export: rename it"
+                )
+            if name not in reserved:
+                found[name] = source
+    return found
+
+
+def _value_source(value: object) -> str | None:
+    """Return the Python source of a number, of ``math`` or of a function of it; None for other values."""
+    if value is math:
+        return "math"
+    if isinstance(value, Integral):
+        return repr(int(value))
+    if isinstance(value, Real):
+        return repr(float(value)) if math.isfinite(value) else f"float('{float(value)}')"
+    name = getattr(value, "__name__", "")
+    return f"math.{name}" if value is not None and getattr(math, name, None) is value else None

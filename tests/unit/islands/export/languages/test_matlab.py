@@ -1,0 +1,157 @@
+"""MATLAB export: Octave runs it, and it simulates like the kernel."""
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+import islands
+from islands.export import export
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.user_primitive import primitive
+from islands.simulation.predictors import free_run
+from islands.systems.published_models import PUBLISHED
+from support.exported_programs import needs_octave, octave, run_matlab
+from support.programs import CASES, HOSTILE_NAMES, at_the_edges, model, record, record_of
+from support.strategies import models
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory):
+    found = run_matlab([(CASES[name], record_of(name)) for name in CASES], tmp_path_factory.mktemp("octave"))
+    return dict(zip(CASES, found, strict=True))
+
+
+@pytest.mark.ci
+@needs_octave
+@pytest.mark.parametrize("name", CASES)
+def test_octave_simulates_like_the_kernel(name, cases):
+    exported, data = CASES[name], record_of(name)
+    ours, lag = free_run(exported, data), exported.maximum_lag
+    assert ours.outcome
+    assert cases[name][:lag].tolist() == data.y[:lag].tolist()
+    np.testing.assert_allclose(cases[name][lag:], ours.y[lag:], rtol=1e-12)
+
+
+@pytest.mark.ci
+@needs_octave
+def test_octave_primitives_equal_the_kernels_at_jumps_and_limits(tmp_path):
+    programs = [at_the_edges(name) for name in PRIMITIVES]
+    for (exported, data), theirs in zip(programs, run_matlab(programs, tmp_path), strict=True):
+        ours = free_run(exported, data, bound=np.inf).y
+        np.testing.assert_allclose(theirs[1:], ours[1:], rtol=1e-12, err_msg=export(exported, "plain"))
+
+
+@needs_octave
+# Each example starts Octave, so that shrinking would take minutes.
+@pytest.mark.ci
+@settings(max_examples=4, phases=[Phase.reuse, Phase.generate])
+@given(st.lists(models(), min_size=12, max_size=12), st.integers(0, 2**32 - 1))
+def test_octave_runs_any_model(tmp_path_factory, random_models, seed):
+    data = record(2, seed)
+    runs = [(each, free_run(each, data)) for each in random_models]
+    # The kernel stops a diverging free run at the bound; Octave continues to infinity.
+    calm = [(each, run) for each, run in runs if run.outcome]
+    found = run_matlab([(each, data) for each, _ in calm], tmp_path_factory.mktemp("octave"))
+    for (each, run), theirs in zip(calm, found, strict=True):
+        lag = each.maximum_lag
+        np.testing.assert_allclose(theirs[lag:], run.y[lag:], rtol=1e-12)
+
+
+@needs_octave
+def test_a_column_name_cannot_break_the_file(tmp_path):
+    data = islands.Dataset([[1.0], [2.0]], [0.5, 0.0], 0.1)
+    named = [islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name) for name in HOSTILE_NAMES]
+    found = run_matlab([(each, data) for each in named], tmp_path)
+    assert [y.tolist() for y in found] == [[0.5, 2.0]] * len(HOSTILE_NAMES)
+
+
+#: Calls of y(k) = 0.5 y(k-1) + 0.25 u(k-2), and Octave's output for them.
+CALLS = {
+    # The output is a row or a column like the input; y0 may be either.
+    "narx_model([4 8 12], [1 2])": "[1 2 2]",
+    "narx_model([4 8 12], [1; 2])": "[1 2 2]",
+    "narx_model([4; 8; 12], [1 2])": "[1;2;2]",
+    "narx_model([4 8 12 16], [1 2 77 77 77])": "[1 2 2 3]",
+    "narx_model([4 8], [1 2])": "[1 2]",
+    "narx_model(4, [1 2])": "1",
+    "size(narx_model(zeros(0, 1), [1 2]))": "[0 1]",
+    # Integer arithmetic would round, and single precision would lose digits.
+    "narx_model(int8([1 8 12]), int8([1 3]))": "[1 3 1.75]",
+    "class(narx_model(single([4 8 12]), single([1 2])))": "double",
+}
+
+
+@needs_octave
+def test_octave_accepts_vectors_of_every_shape_and_class(tmp_path):
+    (tmp_path / "narx_model.m").write_text(export(model({"y(k-1)": 0.5, "u(k-2)": 0.25}), "matlab"))
+    show = "r = {}; if ischar(r), disp(r), else, disp(mat2str(r)), end"
+    shown = octave("\n".join(show.format(call) for call in CALLS), tmp_path).splitlines()
+    assert dict(zip(CALLS, shown, strict=True)) == CALLS
+
+
+@needs_octave
+def test_octave_accepts_integers_for_every_input(tmp_path):
+    exported = model({"u1(k-1)": 0.25, "u2(k-1)": 0.25}, ("one", "other"))
+    (tmp_path / "narx_model.m").write_text(export(exported, "matlab"))
+    for call in ("narx_model(int8([1 1]), [2 2], 7)", "narx_model([1 1], int8([2 2]), int8(7))"):
+        assert octave(f"disp(mat2str({call}))", tmp_path).strip() == "[7 0.75]"
+
+
+@needs_octave
+def test_too_few_first_outputs_are_an_error_in_octave(tmp_path):
+    (tmp_path / "narx_model.m").write_text(export(PUBLISHED["12"].model, "matlab"))
+    shown = octave("try, narx_model(1:9, 1), catch e, disp(e.message), end", tmp_path)
+    assert "out of bound 1" in shown
+    assert "y0" in shown
+
+
+def test_the_file_describes_the_model():
+    text = export(PUBLISHED["12"].model, "matlab")
+    assert text.startswith("function y = narx_model(u, y0)\n% NARX_MODEL  Free run")
+    assert "% NARX model: y(k) = 1*y(k-1) - 0.000246*" in text
+    assert '% Inputs u = "u_V"; output y = "y_um"; sampling time 0.001 s.' in text
+    assert "y0 holds the first 3 samples" in text
+    assert "Save this file as narx_model.m" in text
+    assert max(map(len, text.splitlines())) <= 110
+
+
+def test_functions_are_defined_once_after_the_model():
+    text = export(model({"y(k-1)*sign(u(k-1))": 1.0, "sign(u(k-2))": 2.0}), "matlab")
+    assert [line for line in text.splitlines() if line.startswith("function")] == [
+        "function y = narx_model(u, y0)",
+        "function r = f_sign(a)",
+    ]
+    assert text.count("\nend\n") == 2
+
+
+# User-defined primitives.
+
+
+def saturation(a):
+    return a / (1.0 + abs(a))
+
+
+def blend(a, b):
+    return 0.25 * a - b if a > 0.5 else b
+
+
+OWN = {
+    "saturation": primitive("saturation", saturation, matlab="r = a / (1 + abs(a));"),
+    # Names of the language and of the exported program.
+    "end_": primitive("end_", saturation, matlab="size = abs(a);\nr = a / (1 + size);"),
+    "total": primitive("total", blend, matlab="if a > 0.5, r = 0.25*a - b; else, r = b; end"),
+    "narx_model": primitive("narx_model", blend, matlab="r = b;\nif a > 0.5\n  r = 0.25*a - b;\nend"),
+}
+
+
+@pytest.mark.ci
+@needs_octave
+def test_a_user_defined_primitive_runs_with_its_body(tmp_path):
+    programs = []
+    for name, entry in OWN.items():
+        arguments = "u(k-1), y(k-1)" if entry.arity == 2 else "u(k-1)"
+        terms = {f"{name}({arguments})*sign(u(k-2))": 0.3, "y(k-2)": 0.2}
+        programs.append((model(terms, primitives=PRIMITIVES | OWN), record()))
+    for (exported, data), theirs in zip(programs, run_matlab(programs, tmp_path), strict=True):
+        np.testing.assert_allclose(theirs[2:], free_run(exported, data).y[2:], rtol=1e-12)

@@ -1,0 +1,105 @@
+"""Modelica export: the block has as many equations as unknowns, and its right-hand side is the model."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import islands
+from islands.errors import ModelError
+from islands.export import export
+from islands.export.coupled import export_coupled
+from islands.expressions.evaluation import value
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.user_primitive import primitive
+from support.block_cases import OF_STATES
+from support.coupled_systems import PREY, TWO_MASSES
+from support.programs import CASES, model
+
+SAMPLED = {name: replace(each, dt=each.dt or 0.1) for name, each in CASES.items()} | OF_STATES
+
+
+def body(text):
+    """Return the equations of the block, without the right-hand side of y."""
+    equations = text.partition("equation\n")[2].partition("then\n")[2].partition("  end when;")[0]
+    return [each.strip() for each in equations.split(";") if each.strip()]
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_the_right_hand_side_is_the_model(name):
+    exported = SAMPLED[name]
+    right = body(export(exported, "modelica"))[0].removeprefix("y = ")
+    right = " ".join(right.split())
+    assert not re.search(r"[-+*/]\s*-", right)
+    text = re.sub(r"pre\(past_(y|u\d*)\[(\d+)\]\)", r"\1(k-\2)", right).replace("f_", "")
+    # The parser reads no present sample.
+    text = re.sub(r"\b(u\d*)(?![\d(])", r"\1(k-99)", text)
+    rng = np.random.default_rng(0)
+    samples = rng.normal(size=(exported.inputs + 1, 100))
+    leads = exported.leads
+
+    def read_model(channel, lag):
+        return samples[channel][lag - leads[channel] or 99]
+
+    terms = zip(exported.parameters, exported.regressors, strict=True)
+    expected = sum(theta * value(item.expression, read_model) for theta, item in terms)
+    found = value(islands.parse(text), lambda channel, lag: samples[channel][lag])
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_the_block_has_one_equation_for_each_unknown(name):
+    text = export(SAMPLED[name], "modelica")
+    stored = {signal: int(depth) for signal, depth in re.findall(r"discrete Real past_(\w+)\[(\d+)\]", text)}
+    first, *others = [each.partition(" = ") for each in body(text)]
+    assert first[0] == "y"
+    assert {left: right for left, _, right in others} == {
+        f"past_{signal}[{lag}]": f"pre(past_{signal}[{lag - 1}])" if lag > 1 else signal
+        for signal, depth in stored.items()
+        for lag in range(1, depth + 1)
+    }
+    for signal, depth in stored.items():
+        assert f"parameter Real start_{signal}[{depth}] = fill(0.0, {depth})" in text
+    read = set(re.findall(r"pre\(past_(\w+)\[(\d+)\]\)", first[2]))
+    assert all(int(lag) <= stored[signal] for signal, lag in read)
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_functions_are_defined_if_and_only_if_they_are_called(name):
+    text = export(SAMPLED[name], "modelica")
+    defined = re.findall(r"  function (f_\w+)\n", text)
+    assert set(defined) == set(re.findall(r"\bf_\w+(?=\()", text))
+    assert all(text.count(f"end {each};") == 1 for each in defined)
+
+
+def test_the_block_has_the_units_and_the_columns():
+    exported = replace(model({"u(k-1)": 1.0}), input_names=('u "1" \\ [V]',), output_name="y_um", dt=1e-3)
+    text = export(exported, "modelica")
+    assert r'RealInput u(unit = "V") "u \"1\" \\ [V]";' in text
+    assert 'RealOutput y(unit = "um") "y_um";' in text
+    assert "when sample(0, 0.001) then" in text
+
+
+@pytest.mark.parametrize("exported", [PREY, TWO_MASSES], ids=["prey", "two masses"])
+def test_a_block_of_two_outputs_has_an_equation_for_each(exported):
+    text = export_coupled(exported, "modelica")
+    samples = np.random.default_rng(0).normal(size=(3, 5))
+    for place, written in enumerate(body(text)[:2]):
+        left, _, right = " ".join(written.split()).partition(" = ")
+        assert left == f"y{place + 1}"
+        # The parser knows one output: all signals are read as inputs 1, 2 and 3.
+        outputs_read = re.sub(r"pre\(past_y(\d)\[(\d+)\]\)", r"u\1(k-\2)", right)
+        all_read = re.sub(r"pre\(past_u\[(\d+)\]\)", r"u3(k-\1)", outputs_read)
+        found = value(islands.parse(all_read), lambda channel, lag: samples[channel - 1][lag])
+        terms = zip(exported.models[place].parameters, exported.expressions(place), strict=True)
+        assert found == pytest.approx(
+            sum(theta * value(each, lambda channel, lag: samples[channel][lag]) for theta, each in terms)
+        )
+
+
+def test_a_user_defined_primitive_is_refused():
+    known = PRIMITIVES | {"own": primitive("own", lambda a: a)}
+    exported = replace(model({"own(u(k-1))": 1.0}, primitives=known), dt=0.1)
+    with pytest.raises(ModelError, match="only built-in primitives"):
+        export(exported, "modelica")
