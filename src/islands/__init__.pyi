@@ -19,8 +19,6 @@ from islands.estimation.estimator_table import ESTIMATORS as ESTIMATORS
 from islands.evolution.migration.topology import TOPOLOGIES as TOPOLOGIES
 from islands.evolution.presets import PRESETS as PRESETS
 from islands.evolution.settings import Settings as Settings
-from islands.export.coupled.coupled_document import read_coupled_model as read_coupled_model
-from islands.export.coupled.coupled_document import write_coupled_model as write_coupled_model
 from islands.expressions.parsing import parse as parse
 from islands.expressions.primitives import PRIMITIVES as PRIMITIVES
 from islands.expressions.user_primitive import primitive as primitive
@@ -50,6 +48,8 @@ from islands.facade.results.saved_simulation import SavedSimulation as SavedSimu
 from islands.io.checkpoints.monitor_state import SavedMonitor as SavedMonitor
 from islands.io.checkpoints.monitor_state import read_monitor as read_monitor
 from islands.io.checkpoints.monitor_state import write_monitor as write_monitor
+from islands.io.coupled_models import read_coupled_model as read_coupled_model
+from islands.io.coupled_models import write_coupled_model as write_coupled_model
 from islands.io.data_frames import as_record as as_record
 from islands.io.models import read_model as read_model
 from islands.io.models import write_model as write_model

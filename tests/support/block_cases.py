@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.export.block import SampledBlock, make_block
+from islands.export.block import Block, make_sampled_block
 from islands.model.model import Model
 from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.coupled_model import CoupledModel
@@ -39,7 +39,7 @@ class BlockCase:
     Attributes
     ----------
     exported : Model or CoupledModel
-    block : SampledBlock
+    block : Block
     past : list of float
         Samples before the first one, in the order of the state.
     inputs : ndarray, shape (samples, inputs)
@@ -47,7 +47,7 @@ class BlockCase:
     """
 
     exported: Model | CoupledModel
-    block: SampledBlock
+    block: Block
     past: list[float]
     inputs: np.ndarray
     outputs: np.ndarray
@@ -77,7 +77,7 @@ def coupled_case(exported, data):
 
 def make_case(exported, u, y, simulated):
     """Return the case of a simulation, of shape (samples, outputs), that starts from measured samples."""
-    block, first = make_block(exported), max(exported.maximum_lag, 1)
+    block, first = make_sampled_block(exported), max(exported.maximum_lag, 1)
     signals = [*y.T, *u.T]
     past = [float(signals[channel][first - lag]) for channel, lag in block.samples]
     return BlockCase(exported, block, past, np.ascontiguousarray(u[first:]), simulated[first:])

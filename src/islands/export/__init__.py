@@ -1,7 +1,7 @@
 """Export of models to text formats, programming languages and blocks of simulators.
 
-Each text format is an entry of `EXPORTS`, each binary one of `FILE_EXPORTS`. Read `parts` first:
-all programs share them.
+Each text format is an entry of `EXPORTS`, each binary one of `FILE_EXPORTS`. Read `block` first: all programs
+are written from it.
 """
 
 from collections.abc import Callable, Mapping
@@ -9,7 +9,6 @@ from pathlib import Path
 from types import MappingProxyType
 
 from islands.errors import SettingsError, lookup
-from islands.export.coupled import export_coupled
 from islands.export.fmu.archive import fmu2, fmu3
 from islands.export.languages.c import c_source
 from islands.export.languages.matlab import matlab_source
@@ -17,23 +16,32 @@ from islands.export.languages.matlab_system import matlab_system_source
 from islands.export.languages.modelica import modelica_source
 from islands.export.languages.python import python_source
 from islands.export.languages.s_function import s_function_source
+from islands.io.coupled_models import coupled_json, coupled_latex, coupled_mathml, coupled_text
 from islands.io.models import model_json
 from islands.model.equations import latex_equation, mathml_equation, plain_text
 from islands.model.model import Model, measured_model
 from islands.simulation.coupled_model import CoupledModel, measured_coupled_model
 
-EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(
+
+def _choose(
+    of_one: Callable[[Model], str], of_several: Callable[[CoupledModel], str]
+) -> Callable[[Model | CoupledModel], str]:
+    """Return a format of models of one or several outputs."""
+    return lambda model: of_several(model) if isinstance(model, CoupledModel) else of_one(model)
+
+
+EXPORTS: Mapping[str, Callable[[Model | CoupledModel], str]] = MappingProxyType(
     {
-        "plain": plain_text,
-        "latex": latex_equation,
-        "mathml": mathml_equation,
+        "plain": _choose(plain_text, coupled_text),
+        "latex": _choose(latex_equation, coupled_latex),
+        "mathml": _choose(mathml_equation, coupled_mathml),
         "python": python_source,
         "c": c_source,
         "matlab": matlab_source,
         "matlab-system": matlab_system_source,
         "s-function": s_function_source,
         "modelica": modelica_source,
-        "json": model_json,
+        "json": _choose(model_json, coupled_json),
     }
 )
 
@@ -47,7 +55,7 @@ FILE_EXPORTS: Mapping[str, Callable[[Model | CoupledModel], bytes]] = MappingPro
 
 
 def export(model: Model | CoupledModel, kind: str) -> str:
-    """Return a model as text in a format of ``EXPORTS``, or of ``COUPLED_EXPORTS`` for several outputs.
+    """Return a model of one or several outputs as text in a format of ``EXPORTS``.
 
     Raises
     ------
@@ -56,10 +64,8 @@ def export(model: Model | CoupledModel, kind: str) -> str:
     """
     if kind in FILE_EXPORTS:
         raise SettingsError(f"the format {kind} is not text: write a file with --out or write_export")
-    if isinstance(model, CoupledModel):
-        return export_coupled(model if kind in _OF_DEVIATIONS else measured_coupled_model(model), kind)
     lookup({**EXPORTS, **FILE_EXPORTS}, kind, "format")
-    return EXPORTS[kind](model if kind in _OF_DEVIATIONS else measured_model(model))
+    return EXPORTS[kind](model if kind in _OF_DEVIATIONS else _measure(model))
 
 
 def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> None:
@@ -71,7 +77,11 @@ def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> No
         The format is unknown.
     """
     if kind in FILE_EXPORTS:
-        written = measured_coupled_model(model) if isinstance(model, CoupledModel) else measured_model(model)
-        Path(path).write_bytes(FILE_EXPORTS[kind](written))
+        Path(path).write_bytes(FILE_EXPORTS[kind](_measure(model)))
         return
     Path(path).write_text(f"{export(model, kind).rstrip()}\n", encoding="utf-8")
+
+
+def _measure(model: Model | CoupledModel) -> Model | CoupledModel:
+    """Return the model of the measured signals, with the offsets in its equation."""
+    return measured_coupled_model(model) if isinstance(model, CoupledModel) else measured_model(model)

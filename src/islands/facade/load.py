@@ -7,7 +7,6 @@ from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from islands.errors import ModelError
-from islands.export.coupled.coupled_document import read_coupled_model
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.facade.coupled.coupled_result import FittedCoupledModel
@@ -15,6 +14,7 @@ from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.result import Result
 from islands.facade.results.saved_result import read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
+from islands.io.coupled_models import read_coupled_model
 from islands.io.models import read_model
 from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.ode_spec import OdeSpec

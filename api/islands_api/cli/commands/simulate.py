@@ -15,13 +15,13 @@ from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import DETREND
 from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
-from islands.export.coupled.coupled_equations import coupled_signals
 from islands.facade.coupled.coupled_result import FittedCoupledModel
 from islands.facade.load import load
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.results.result import Result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
+from islands.io.coupled_models import coupled_signals
 from islands.io.records import read_dataset, write_simulation
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from islands.export.block import quote_name
 from islands.export.equations.common_parts import take_common_parts
 from islands.export.equations.extended_equations import ExtendedEquations
 from islands.export.equations.identifiers import make_identifiers
-from islands.export.parts import quote_name
 from islands.expressions.primitives import POW
 from islands.expressions.printing import EQUATION_OPERATORS, ProgramPrinter, render
 from islands.expressions.tree import (

@@ -12,7 +12,7 @@ from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 
-from islands.export.block import SampledBlock, c_block, make_block
+from islands.export.block import Block, make_sampled_block
 from islands.export.fmu.compiler import compile_library, find_compiler
 from islands.export.fmu.description import (
     describe_build,
@@ -20,6 +20,7 @@ from islands.export.fmu.description import (
     describe_fmi3,
     model_identifier,
 )
+from islands.export.languages.c import c_block
 from islands.model.model import Model
 from islands.simulation.coupled_model import CoupledModel
 
@@ -55,7 +56,7 @@ class FmiVersion:
     """
 
     source: str
-    describe: Callable[[SampledBlock, str], str]
+    describe: Callable[[Block, str], str]
     platforms: Mapping[tuple[str, str], str]
 
 
@@ -107,7 +108,7 @@ def make_fmu(model: Model | CoupledModel, version: FmiVersion) -> bytes:
         The model has no finite parameters or no sampling time, a user-defined primitive has no C body, a
         column cannot name a variable, or the compiler fails.
     """
-    block = make_block(model)
+    block = make_sampled_block(model)
     program = c_block(block)
     token = hashlib.sha256(f"{version.source}{block.columns}{program}".encode()).hexdigest()
     sources = {name: _read(name) for name in ("instance.h", version.source)}

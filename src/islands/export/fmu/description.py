@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from islands.data.channel_names import parse_unit
-from islands.export.block import SampledBlock
+from islands.export.block import Block
 
 #: Attributes of an FMU of either version.
 _CAPABILITIES = {
@@ -37,7 +37,7 @@ class FmuVariable:
     start: bool = False
 
 
-def fmu_variables(block: SampledBlock) -> tuple[FmuVariable, ...]:
+def fmu_variables(block: Block) -> tuple[FmuVariable, ...]:
     """Return the variables: time, outputs, inputs, and one start value for each past sample of the state."""
     found = [FmuVariable("time", "independent", "continuous", "Time in seconds", "s")]
     late = ", one sampling time late" if any(block.feedthrough) else ""
@@ -66,12 +66,12 @@ def fmu_variables(block: SampledBlock) -> tuple[FmuVariable, ...]:
     return tuple(found)
 
 
-def model_identifier(block: SampledBlock) -> str:
+def model_identifier(block: Block) -> str:
     """Return the name of the library of an FMU, a C identifier: ``narx_y_um``."""
     return f"narx_{re.sub('[^A-Za-z0-9]+', '_', block.title).strip('_')}"[:60].rstrip("_")
 
 
-def describe_fmi3(block: SampledBlock, token: str) -> str:
+def describe_fmi3(block: Block, token: str) -> str:
     """Return ``modelDescription.xml`` of FMI 3.0."""
     root = _make_root(block, "3.0", {"instantiationToken": token})
     SubElement(
@@ -111,7 +111,7 @@ def describe_fmi3(block: SampledBlock, token: str) -> str:
     return _to_text(root)
 
 
-def describe_fmi2(block: SampledBlock, token: str) -> str:
+def describe_fmi2(block: Block, token: str) -> str:
     """Return ``modelDescription.xml`` of FMI 2.0."""
     root = _make_root(block, "2.0", {"guid": token})
     simulation = SubElement(
@@ -151,7 +151,7 @@ def describe_fmi2(block: SampledBlock, token: str) -> str:
     return _to_text(root)
 
 
-def describe_build(block: SampledBlock) -> str:
+def describe_build(block: Block) -> str:
     """Return ``sources/buildDescription.xml`` of FMI 3.0."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     build = SubElement(root, "BuildConfiguration", modelIdentifier=model_identifier(block))
@@ -160,7 +160,7 @@ def describe_build(block: SampledBlock) -> str:
     return _to_text(root)
 
 
-def _make_root(block: SampledBlock, version: str, identity: dict[str, str]) -> Element:
+def _make_root(block: Block, version: str, identity: dict[str, str]) -> Element:
     return Element(
         "fmiModelDescription",
         {
@@ -174,7 +174,7 @@ def _make_root(block: SampledBlock, version: str, identity: dict[str, str]) -> E
     )
 
 
-def _add_units(root: Element, block: SampledBlock) -> None:
+def _add_units(root: Element, block: Block) -> None:
     names = {each.unit for each in fmu_variables(block)} - {""}
     listed = SubElement(root, "UnitDefinitions")
     for name in sorted(names):

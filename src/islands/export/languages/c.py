@@ -1,12 +1,14 @@
-"""Export of a model as one C99 file, for example for an embedded controller."""
+"""Export of a model as C99: a file, for example for an embedded controller, and the block of a simulator."""
 
 import textwrap
 
-from islands.export.parts import body, functions, heading, signals, terms
+from islands.export.block import Block, make_block
+from islands.export.languages.bodies import body
 from islands.expressions.tree import Primitive
 from islands.model.model import Model
+from islands.simulation.coupled_model import CoupledModel
 
-_FILE = """\
+_HEAD = """\
 /*
 {heading}
  *
@@ -19,7 +21,10 @@ _FILE = """\
 
 enum {{ MAXIMUM_LAG = {lag} }};
 
-{functions}/*
+{functions}"""
+
+_ONE_OUTPUT = """\
+/*
  * Return y(k) from the preceding samples. The pointers point to sample k: the function reads y[-1] ..
  * y[-MAXIMUM_LAG] and the same lags of the inputs, never {present}.
  */
@@ -39,40 +44,90 @@ void simulate({inputs}, double *y, size_t samples)
 }}
 """
 
+_PREDICTOR = """\
+/* Return {output}(k) from the preceding samples. The pointers point to sample k. */
+double predict_{output}({pointers})
+{{
+    double total = 0.0;
+    {terms}
+    return total;
+}}
 
-def c_source(model: Model) -> str:
-    """Return a model as C99 source in ASCII.
+"""
 
-    The source defines the functions ``predict`` (one sample) and ``simulate`` (free run). Sums and products
-    are evaluated in the same order as in this package's kernels.
+_SEVERAL_OUTPUTS = """\
+{predictors}/*
+ * Free run: the first MAXIMUM_LAG samples of the outputs are given, the others are computed and written.
+ */
+void simulate({inputs}, {outputs}, size_t samples)
+{{
+    for (size_t k = MAXIMUM_LAG; k < samples; ++k) {{
+        {steps}
+    }}
+}}
+"""
+
+
+def c_source(model: Model | CoupledModel) -> str:
+    """Return a model of one or several outputs as C99 source in ASCII.
+
+    The source defines the function ``predict`` (one sample; ``predict_y1`` .. for several outputs) and
+    ``simulate`` (free run). Sums and products are evaluated in the same order as in this package's kernels.
 
     Raises
     ------
     ModelError
         The model has no finite parameters, or a user-defined primitive has no C body.
     """
-    names = signals(model)
-    definitions = [definition(primitive, c_name(primitive)) for primitive in functions(model)]
-    # Compilers warn about unused parameters.
-    read = {channel for item in model.regressors for channel, _ in item.lags}
-    lines = [f"(void){name};" for channel, name in enumerate(names) if channel not in read]
-    lines += [f"total += {term};" for term in terms(model, lambda name, lag: f"{name}[{-lag}]", c_name)]
-    pointers = [f"const double *{name}" for name in names]
-    return _FILE.format(
-        heading=heading(model, " *"),
-        lag=model.maximum_lag,
-        present=_describe_future(model),
-        functions="".join(f"{text}\n" for text in definitions),
-        signals=", ".join(pointers),
-        inputs=", ".join(pointers[1:]),
-        terms="\n    ".join(lines),
-        at_k=", ".join(f"{name} + k" for name in names),
+    block = make_block(model)
+    outputs = block.signals[: block.outputs]
+    head = _HEAD.format(heading=block.heading(" *"), lag=block.maximum_lag, functions=define_functions(block))
+    pointers = [f"const double *{name}" for name in block.signals]
+    given, at_k = ", ".join(pointers[block.outputs :]), ", ".join(f"{name} + k" for name in block.signals)
+    bodies = ["\n    ".join(_list_terms(block, place)) for place in range(block.outputs)]
+    if block.outputs == 1:
+        (terms,) = bodies
+        return head + _ONE_OUTPUT.format(
+            present=_describe_future(block),
+            signals=", ".join(pointers),
+            inputs=given,
+            terms=terms,
+            at_k=at_k,
+        )
+    predictors = (
+        _PREDICTOR.format(output=output, pointers=", ".join(pointers), terms=terms)
+        for output, terms in zip(outputs, bodies, strict=True)
+    )
+    return head + _SEVERAL_OUTPUTS.format(
+        predictors="".join(predictors),
+        inputs=given,
+        outputs=", ".join(f"double *{name}" for name in outputs),
+        steps="\n        ".join(f"{output}[k] = predict_{output}({at_k});" for output in outputs),
     )
 
 
-def _describe_future(model: Model) -> str:
-    present = [name for name, lead in zip(signals(model), model.leads, strict=True) if lead]
+def _list_terms(block: Block, place: int) -> list[str]:
+    # Compilers warn about unused parameters.
+    unused = [f"(void){name};" for name in block.find_unread(place)]
+    terms = block.terms(place, lambda name, lag: f"{name}[{-lag}]", c_name)
+    return unused + [f"total += {term};" for term in terms]
+
+
+def _describe_future(block: Block) -> str:
+    (model,) = block.models
+    present = [name for name, lead in zip(block.signals, model.leads, strict=True) if lead]
     return f"a later sample than {'[0], '.join(present)}[0]" if present else "sample k or later ones"
+
+
+def define_functions(block: Block) -> str:
+    """Return the definitions of the primitives of a block as C functions.
+
+    Raises
+    ------
+    ModelError
+        A primitive has no C body.
+    """
+    return "".join(f"{definition(primitive, c_name(primitive))}\n" for primitive in block.primitives)
 
 
 def definition(primitive: Primitive, name: str) -> str:
@@ -91,3 +146,68 @@ def c_name(primitive: Primitive) -> str:
     """Return the name of a primitive's C function."""
     # The prefix avoids names of the C library (tanh) and reserved names (leading underscore).
     return f"f_{primitive.name}"
+
+
+_C_BLOCK = """\
+enum {{ OUTPUTS = {outputs}, INPUTS = {inputs}, STATES = {states}, FEEDTHROUGH = {feedthrough} }};
+
+/* Number of past samples of each output and each input in the state, newest first. */
+static const int DEPTHS[OUTPUTS + INPUTS] = {{{depths}}};
+
+/* Sampling time in seconds. */
+static const double STEP = {dt!r};
+
+{functions}/* Compute the outputs of sample k from the past samples and the inputs of sample k. */
+static void compute(const double *state, const double *input, double *output)
+{{
+    double total;
+    (void)input;
+    {equations}
+}}
+
+/* Move on to the next sample: the outputs and inputs of sample k become the newest past samples. */
+static void advance(double *state, const double *output, const double *input)
+{{
+    for (int channel = 0; channel < OUTPUTS + INPUTS; ++channel) {{
+        for (int place = DEPTHS[channel] - 1; place > 0; --place) {{
+            state[place] = state[place - 1];
+        }}
+        if (DEPTHS[channel] > 0) {{
+            state[0] = channel < OUTPUTS ? output[channel] : input[channel - OUTPUTS];
+        }}
+        state += DEPTHS[channel];
+    }}
+}}
+"""
+
+
+def c_block(block: Block) -> str:
+    """Return the functions ``compute`` and ``advance`` of a block in C99, for inclusion in a program.
+
+    Sums and products are evaluated in the same order as in this package's kernels.
+
+    Raises
+    ------
+    ModelError
+        The model has no finite parameters, or a user-defined primitive has no C body.
+    """
+
+    def read(signal: str, lag: int) -> str:
+        if lag:
+            return f"state[{block.position(signal, lag)}]"
+        return f"input[{block.signals.index(signal) - block.outputs}]"
+
+    lines = ["(void)state;"]
+    for place in range(block.outputs):
+        lines += ["total = 0.0;", *(f"total += {term};" for term in block.terms(place, read, c_name))]
+        lines.append(f"output[{place}] = total;")
+    return _C_BLOCK.format(
+        outputs=block.outputs,
+        inputs=len(block.signals) - block.outputs,
+        states=block.size,
+        feedthrough=int(any(block.feedthrough)),
+        depths=", ".join(map(str, block.depths)),
+        dt=block.dt,
+        functions=define_functions(block),
+        equations="\n    ".join(lines),
+    )

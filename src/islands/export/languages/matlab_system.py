@@ -2,7 +2,7 @@
 
 import textwrap
 
-from islands.export.block import SampledBlock, make_block
+from islands.export.block import Block, make_sampled_block
 from islands.export.languages.matlab import matlab_definition
 from islands.model.model import Model
 from islands.simulation.coupled_model import CoupledModel
@@ -100,14 +100,15 @@ def matlab_system_source(model: Model | CoupledModel) -> str:
         The model has no finite parameters or no sampling time, or a user-defined primitive has no MATLAB
         body.
     """
-    block = make_block(model)
+    block = make_sampled_block(model)
     outputs, inputs = block.signals[: block.outputs], block.signals[block.outputs :]
     used = [textwrap.indent(matlab_definition(each), "    ") for each in block.primitives]
     equations = []
-    for place, write in enumerate(block.terms, start=1):
+    for place in range(block.outputs):
         equations += [
-            f"result({place}) = result({place}) + {term};"
-            for term in write(
+            f"result({place + 1}) = result({place + 1}) + {term};"
+            for term in block.terms(
+                place,
                 lambda signal, lag: f"x({block.position(signal, lag) + 1})" if lag else signal,
                 lambda primitive: f"narx_system.f_{primitive.name}",
             )
@@ -120,7 +121,7 @@ def matlab_system_source(model: Model | CoupledModel) -> str:
         assignments="\n      ".join(
             f"{name} = result({place});" for place, name in enumerate(outputs, start=1)
         ),
-        past=block.describe("    %   "),
+        past=block.describe_state("    %   "),
         outputs=block.outputs,
         states=block.size,
         update=_update(block),
@@ -134,7 +135,7 @@ def matlab_system_source(model: Model | CoupledModel) -> str:
     )
 
 
-def _update(block: SampledBlock) -> str:
+def _update(block: Block) -> str:
     """Return the elements of the next state: each signal begins with its present sample."""
     parts, place = [], 1
     for channel, (signal, depth) in enumerate(zip(block.signals, block.depths, strict=True)):

@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 from islands.data.channel_names import parse_unit
 from islands.errors import ModelError
-from islands.export.block import SampledBlock, make_block
+from islands.export.block import Block, make_sampled_block
 from islands.expressions.primitives import LARGEST_EXPONENT
 from islands.expressions.tree import Primitive
 from islands.model.model import Model
@@ -55,9 +55,8 @@ def modelica_source(model: Model | CoupledModel) -> str:
     ModelError
         The model has no finite parameters or no sampling time, or it has a user-defined primitive.
     """
-    block = make_block(model)
+    block = make_sampled_block(model)
     stored = [(name, depth) for name, depth in zip(block.signals, block.depths, strict=True) if depth]
-    outputs = zip(block.signals, block.terms, strict=False)
     return _FILE.format(
         title=_escape(block.title),
         heading=block.heading("  //"),
@@ -70,8 +69,8 @@ def modelica_source(model: Model | CoupledModel) -> str:
         functions="".join(_function(each) for each in block.primitives),
         dt=block.dt,
         equations="\n    ".join(
-            f"{name} = {_join_terms(write(_sample, lambda primitive: f'f_{primitive.name}'))};"
-            for name, write in outputs
+            f"{name} = {_join_terms(block.terms(place, _sample, lambda primitive: f'f_{primitive.name}'))};"
+            for place, name in enumerate(block.signals[: block.outputs])
         ),
         shifts="\n    ".join(
             f"past_{name}[{lag}] = {f'pre(past_{name}[{lag - 1}])' if lag > 1 else name};"
@@ -95,7 +94,7 @@ def _parameter(name: str, depth: int) -> str:
     return f'  parameter Real start_{name}[{depth}] = fill(0.0, {depth}) "{lags}";'
 
 
-def _connector(block: SampledBlock, channel: int) -> str:
+def _connector(block: Block, channel: int) -> str:
     column, kind = block.columns[channel], "RealOutput" if channel < block.outputs else "RealInput"
     unit = parse_unit(column)
     declared = f'(unit = "{_escape(unit)}")' if unit else ""

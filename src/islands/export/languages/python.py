@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from numbers import Integral, Real
 
 from islands.errors import ModelError
-from islands.export.parts import description, functions, signals, terms
+from islands.export.block import make_block
 from islands.expressions.tree import Primitive
-from islands.model.equations import equation
 from islands.model.model import Model
+from islands.simulation.coupled_model import CoupledModel
 
 _MODULE = '''"""NARX model: {equation}
 
@@ -38,9 +38,36 @@ def simulate({inputs}, y0):
     return y
 '''
 
+_COUPLED_MODULE = '''"""Coupled NARX model:
 
-def python_source(model: Model) -> str:
-    """Return a model as the source of a Python module.
+{equations}
+
+{description}
+"""
+
+import math
+
+MAXIMUM_LAG = {lag}
+{constants}
+
+{functions}def predict(k, {signals}):
+    """Return {outputs} at sample k from the preceding samples."""
+{equations_code}
+    return {results}
+
+
+def simulate({inputs}, {starts}):
+    """Return the free run from the inputs and the first MAXIMUM_LAG outputs."""
+    {outputs} = ([float(value) for value in first[:MAXIMUM_LAG]] for first in ({starts}))
+    for k in range(MAXIMUM_LAG, len({first_input})):
+        {results} = predict(k, {signals})
+        {appends}
+    return {outputs}
+'''
+
+
+def python_source(model: Model | CoupledModel) -> str:
+    """Return a model of one or several outputs as the source of a Python module.
 
     The module defines the functions ``predict`` (one sample) and ``simulate`` (free run). It needs only the
     standard library. Its results equal those of this package's kernels bit for bit, because sums and products
@@ -52,20 +79,40 @@ def python_source(model: Model) -> str:
         The model has no finite parameters, or a user-defined primitive cannot be exported: its source is not
         available, or it uses globals other than ``math`` and numbers.
     """
-    used = functions(model)
-    inputs = signals(model)[1:]
-    term_texts = terms(model, lambda name, lag: f"{name}[k-{lag}]" if lag else f"{name}[k]", python_name)
+    block = make_block(model)
+    outputs, inputs, used = block.signals[: block.outputs], block.signals[block.outputs :], block.primitives
+    terms = [block.terms(place, _write_sample, python_name) for place in range(block.outputs)]
     sources = [function_source(primitive) for primitive in used]
-    return _MODULE.format(
-        equation=equation(model),
-        description=description(model, escape_name),
-        lag=model.maximum_lag,
-        constants="".join(f"{name} = {value}\n" for name, value in required_globals(used).items()),
-        functions="\n\n".join(sources) + ("\n\n" if sources else ""),
-        inputs=", ".join(inputs),
-        first_input=inputs[0],
-        terms="\n    ".join(f"total += {term}" for term in term_texts),
+    shared = {
+        "description": block.describe_signals(escape_name),
+        "lag": block.maximum_lag,
+        "constants": "".join(f"{name} = {value}\n" for name, value in required_globals(used).items()),
+        "functions": "\n\n".join(sources) + ("\n\n" if sources else ""),
+        "inputs": ", ".join(inputs),
+        "first_input": inputs[0],
+    }
+    if block.outputs == 1:
+        (equation,), (added,) = block.equations, terms
+        return _MODULE.format(
+            equation=equation, terms="\n    ".join(f"total += {term}" for term in added), **shared
+        )
+    code = []
+    for output, added in zip(outputs, terms, strict=True):
+        code += [f"    next_{output} = 0.0", *(f"    next_{output} += {term}" for term in added)]
+    return _COUPLED_MODULE.format(
+        equations="\n".join(block.equations),
+        signals=", ".join(block.signals),
+        outputs=", ".join(outputs),
+        starts=", ".join(f"first_{output}" for output in outputs),
+        results=", ".join(f"next_{output}" for output in outputs),
+        equations_code="\n".join(code),
+        appends="\n        ".join(f"{output}.append(next_{output})" for output in outputs),
+        **shared,
     )
+
+
+def _write_sample(name: str, lag: int) -> str:
+    return f"{name}[k-{lag}]" if lag else f"{name}[k]"
 
 
 def python_name(primitive: Primitive) -> str:

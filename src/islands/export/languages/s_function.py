@@ -1,6 +1,7 @@
 """Export of a model as a Simulink block: a C MEX S-function in one file."""
 
-from islands.export.block import c_block, make_block
+from islands.export.block import make_sampled_block
+from islands.export.languages.c import c_block
 from islands.model.model import Model
 from islands.simulation.coupled_model import CoupledModel
 
@@ -128,12 +129,12 @@ def s_function_source(model: Model | CoupledModel) -> str:
     ModelError
         The model has no finite parameters or no sampling time, or a user-defined primitive has no C body.
     """
-    block = make_block(model)
+    block = make_sampled_block(model)
     return _FILE.format(
         heading=block.heading(" *"),
         ports=", ".join(block.signals[block.outputs :]),
         results=", ".join(block.signals[: block.outputs]),
-        past=block.describe(" *  "),
+        past=block.describe_state(" *  "),
         block=c_block(block),
         direct=", ".join(str(int(each)) for each in block.feedthrough[block.outputs :]),
         states=block.size,

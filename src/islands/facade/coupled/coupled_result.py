@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 from islands.data.coupled_record import CoupledRecord
 from islands.evolution.progress import Steps
 from islands.export import export, write_export
-from islands.export.coupled.coupled_document import coupled_json
-from islands.export.coupled.coupled_equations import coupled_equation, coupled_signals
 from islands.facade.results.result import Result
+from islands.io.coupled_models import coupled_equation, coupled_json, coupled_signals
 from islands.io.result_folder import record_document
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.simulation.coupled_free_run import CoupledSimulation, coupled_free_run
@@ -60,7 +59,7 @@ class FittedCoupledModel:
         return coupled_free_run(self.model, record, self.warm_up if warm_up is None else warm_up)
 
     def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
-        """Return the coupled model as text in a format of ``COUPLED_EXPORTS``, or write it to a file."""
+        """Return the coupled model as text in a format of ``EXPORTS``, or write it to a file."""
         if path is None:
             return export(self.model, kind)
         write_export(self.model, kind, path)

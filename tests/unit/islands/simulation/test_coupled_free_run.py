@@ -14,7 +14,7 @@ from islands.data.preprocessing import preprocess
 from islands.data.signal_map import match_rate
 from islands.errors import RecordError, SettingsError
 from islands.export import export
-from islands.export.coupled.coupled_document import read_coupled_model, write_coupled_model
+from islands.io.coupled_models import read_coupled_model, write_coupled_model
 from islands.simulation.coupled_free_run import CoupledSimulator, coupled_free_run, match_coupled
 from islands.simulation.coupled_model import CoupledModel, measured_coupled_model
 from islands.simulation.outcome import Status

@@ -1,11 +1,11 @@
 """Simulations in discrete time in C."""
 
+from islands.export.block import make_block
 from islands.export.equations.c.signals import find_unused
 from islands.export.equations.equation_code import EquationCode
 from islands.export.equations.extended_equations import SampledCore
 from islands.export.equations.sampled_core import MEASURED, RECORDED
-from islands.export.languages.c import c_name, definition
-from islands.export.parts import functions, terms
+from islands.export.languages.c import c_name, define_functions
 
 _FUNCTION = """\
 /* Write the simulated output. */
@@ -44,13 +44,14 @@ def _write_model(core: SampledCore, u: str, measured: str) -> str:
     model = core.model
     assert model is not None
     lag = model.maximum_lag
-    added = terms(model, lambda name, lag: f"{name}[k - {lag}]", c_name)
+    block = make_block(model)
+    added = block.terms(0, lambda name, lag: f"{name}[k - {lag}]", c_name)
     start = f"for (size_t k = 0; k < r->samples && k < {lag}; ++k) y[k] = {measured}[k];"
     each = ["double total = 0.0;", *(f"total += {each};" for each in added), "y[k] = total;"]
     lines = [*([start] if lag else []), *_loop(str(lag), each)]
     if any(channel for item in model.regressors for channel, _ in item.lags):
         lines.insert(0, f"const double *const u = {u};")
-    return "".join(f"{definition(each, c_name(each))}\n" for each in functions(model)) + _write(lines)
+    return define_functions(block) + _write(lines)
 
 
 def _loop(first: str, lines: list[str]) -> list[str]:

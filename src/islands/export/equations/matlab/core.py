@@ -1,10 +1,10 @@
 """Simulations in discrete time in MATLAB."""
 
+from islands.export.block import make_block
 from islands.export.equations.equation_code import EquationCode
 from islands.export.equations.extended_equations import SampledCore
 from islands.export.equations.sampled_core import MEASURED, RECORDED
 from islands.export.languages.matlab import matlab_definition, matlab_name
-from islands.export.parts import functions, terms
 
 _FUNCTION = """\
 function y = simulate_core(p, s, r)
@@ -36,7 +36,8 @@ def _write_model(core: SampledCore, u: str, measured: str) -> str:
     model = core.model
     assert model is not None
     lag = model.maximum_lag
-    added = terms(model, lambda name, lag: f"{name}(k-{lag})", matlab_name)
+    block = make_block(model)
+    added = block.terms(0, lambda name, lag: f"{name}(k-{lag})", matlab_name)
     each = ["total = 0;", *(f"total = total + {each};" for each in added), "y(k) = total;"]
     lines = [
         f"u = {u};",
@@ -45,7 +46,7 @@ def _write_model(core: SampledCore, u: str, measured: str) -> str:
         f"y(1:given) = {measured}(1:given);",
         *_loop(str(lag + 1), each),
     ]
-    return _write(lines) + "".join(f"{matlab_definition(each)}\n" for each in functions(model))
+    return _write(lines) + "".join(f"{matlab_definition(each)}\n" for each in block.primitives)
 
 
 def _loop(first: str, lines: list[str]) -> list[str]:

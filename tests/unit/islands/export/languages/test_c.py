@@ -12,7 +12,7 @@ import islands
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.export import export
-from islands.export.parts import functions
+from islands.export.block import make_block
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
 from islands.performance.benchmark.compiled_c import compile_model
@@ -39,7 +39,7 @@ def folder(tmp_path_factory):
 
 
 def of_the_library(exported):
-    return any(entry.name in OF_THE_LIBRARY for entry in functions(exported))
+    return any(entry.name in OF_THE_LIBRARY for entry in make_block(exported).primitives)
 
 
 @pytest.mark.ci

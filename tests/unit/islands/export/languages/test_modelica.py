@@ -9,7 +9,6 @@ import pytest
 import islands
 from islands.errors import ModelError
 from islands.export import export
-from islands.export.coupled import export_coupled
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
@@ -83,7 +82,7 @@ def test_the_block_has_the_units_and_the_columns():
 
 @pytest.mark.parametrize("exported", [PREY, TWO_MASSES], ids=["prey", "two masses"])
 def test_a_block_of_two_outputs_has_an_equation_for_each(exported):
-    text = export_coupled(exported, "modelica")
+    text = export(exported, "modelica")
     samples = np.random.default_rng(0).normal(size=(3, 5))
     for place, written in enumerate(body(text)[:2]):
         left, _, right = " ".join(written.split()).partition(" = ")

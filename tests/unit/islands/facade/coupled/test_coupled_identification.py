@@ -11,10 +11,10 @@ from islands.data.averaging import average_samples
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import join
 from islands.errors import ModelError, RecordError, SettingsError
-from islands.export.coupled.coupled_document import read_coupled_model
 from islands.facade.coupled.coupled_identification import fit_coupled, identify_coupled
 from islands.facade.coupled.coupled_selection import measure_error
 from islands.facade.results.saved_result import read_result
+from islands.io.coupled_models import read_coupled_model
 from islands.simulation.coupled_free_run import coupled_free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from islands.errors import ModelError
-from islands.export.coupled.coupled_document import (
+from islands.io.coupled_models import (
     coupled_json,
     read_coupled_model,
     write_coupled_model,
