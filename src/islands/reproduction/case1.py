@@ -366,10 +366,7 @@ def _tabulate_seeds(literal: Sequence[Document], short: str) -> ComparisonTable:
                 str(selected["size"]),
                 *(format_error(errors[record]["mape"], 4) for record in _RECORDS),
                 share,
-                f"another random sequence: {ratio:.2f} times the published error with {abs(terms)} "
-                f"{'more' if terms > 0 else 'fewer'} terms"
-                if terms
-                else f"another random sequence: {ratio:.2f} times the published error with as many terms",
+                f"another random sequence: {ratio:.2f} times the published error, {_compare_sizes(terms)}",
             )
         )
     columns = (
@@ -380,6 +377,14 @@ def _tabulate_seeds(literal: Sequence[Document], short: str) -> ComparisonTable:
         WHY,
     )
     return ComparisonTable(f"The literal search, seed by seed{short}", tuple(rows), columns)
+
+
+def _compare_sizes(difference: int) -> str:
+    """Compare a number of terms with another one in words."""
+    if not difference:
+        return "as many terms"
+    noun = "term" if abs(difference) == 1 else "terms"
+    return f"{abs(difference)} {'more' if difference > 0 else 'fewer'} {noun}"
 
 
 def _tabulate_preset(preset: Document, quick: bool) -> ComparisonTable:

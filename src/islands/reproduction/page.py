@@ -36,6 +36,7 @@ th, td { border-bottom: 1px solid var(--line); }
 th { font-weight: 600; }
 th:first-child, td:first-child, th:last-child, td:last-child { text-align: left; }
 td:last-child { color: var(--soft); min-width: 18rem; }
+td:not(:first-child, :last-child) { white-space: nowrap; }
 figure { margin: 1.5rem 0; break-inside: avoid; } img { max-width: 100%; }
 figcaption { color: var(--soft); font-size: .9rem; }
 """
