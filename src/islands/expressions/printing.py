@@ -125,9 +125,8 @@ class Printer:
 
     def join(self, operator: Operator, arguments: Sequence[Expression]) -> str:
         """Write an operator between its operands."""
-        first, *others = arguments
-        parts = [self.write_operand(each, operator.others) for each in others]
-        return operator.text.join([self.write_operand(first, operator.first), *parts])
+        least = [operator.first, *[operator.others] * (len(arguments) - 1)]
+        return operator.text.join(map(self.write_operand, arguments, least))
 
     def call(self, primitive: Primitive, arguments: Sequence[str]) -> str:
         """Write a function of arguments that are written."""
