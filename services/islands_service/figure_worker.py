@@ -10,6 +10,7 @@ import json
 import resource
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from errno import EAGAIN, EINVAL, EIO, ENODATA, ENOSPC, EROFS
 from typing import Any
 
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from islands.data.split import average_split, match_split, split_data
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import AUTO, resolve_settings
-from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics
+from islands.evolution.search_result import SearchResult, SearchStatistics
 from islands.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
 from islands.figures.style import save
 from islands.io.checkpoints import history_from_document
@@ -28,7 +29,7 @@ from islands.io.models import model_from_json
 from islands.io.result_models import read_shooting_interval
 from islands.reports.identification import identification_report
 from islands.simulation.predictors import free_run
-from islands.validation.assessment import assess
+from islands.validation.assessment import Assessment, assess
 from islands_service.domain.job import REPORT, Job
 from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
@@ -127,7 +128,7 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
             warm_up = resolve_settings(preset, spec.changes).maximum_lag
         assessment = assess(model, split, shooting, warm_up, document["settings"]["constraints"])
         bands = bands_from_document(entry.document.get("bands"), ensemble)
-        assessed.append(RankedModel(model, assessment, bands))
+        assessed.append(replace(assessment, bands=bands))
     search = _search(document["search"], store.results.history(job.id))
     return SearchResult(
         record, split, spec.seed, document["settings"], search, tuple(assessed), ensemble, average
@@ -171,10 +172,10 @@ def _svg(figure: Any) -> bytes:
     return stream.getvalue()
 
 
-def _free_run_document(entry: RankedModel, found: SearchResult) -> bytes:
+def _free_run_document(entry: Assessment, found: SearchResult) -> bytes:
     """Return the validation data and the free run of a model as JSON, downsampled to `MAX_POINTS`."""
     data = found.split.validation
-    simulated = free_run(entry.model, data, entry.assessment.warm_up)
+    simulated = free_run(entry.model, data, entry.warm_up)
     every = max(1, -(-data.samples // MAX_POINTS))
     kept = slice(None, None, every)
     time = data.start + data.dt * np.arange(data.samples)
@@ -187,7 +188,7 @@ def _free_run_document(entry: RankedModel, found: SearchResult) -> bytes:
         "free_run": _finite_values(simulated.y[kept]),
     }
     if entry.bands is not None:
-        band = entry.bands.predict(entry.model, data, warm_up=entry.assessment.warm_up)
+        band = entry.bands.predict(entry.model, data, warm_up=entry.warm_up)
         document["band"] = {
             "level": band.level,
             "lower": _finite_values(band.lower[kept]),

@@ -21,9 +21,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import islands
 from islands.data.dataset import Dataset
-from islands.evolution.search_result import RankedModel, SearchResult
+from islands.evolution.search_result import SearchResult
 from islands.facade.results.fitted_model import FittedModel
 from islands.simulation.predictors import free_run
+from islands.validation.assessment import Assessment
 from islands.validation.metrics import metrics
 from islands.validation.recommendation import ROUNDING, compare_blocks, is_sound
 from support.laws import LAWS, Law
@@ -71,16 +72,14 @@ class Case:
 
 def sound(found: SearchResult) -> list[int]:
     """Return the positions of the models that every rule may choose."""
-    bounded = [at for at, entry in enumerate(found.models) if entry.assessment.squared_errors.size]
-    checked = [
-        at for at in bounded if is_sound(found.models[at].assessment.physics, found.requires_property_1)
-    ]
+    bounded = [at for at, entry in enumerate(found.models) if entry.squared_errors.size]
+    checked = [at for at in bounded if is_sound(found.models[at].physics, found.requires_property_1)]
     return checked or bounded or [0]
 
 
-def error(entry: RankedModel) -> float:
+def error(entry: Assessment) -> float:
     """Return the RMSE of the free run on the validation data as a fraction of the output range."""
-    squared = entry.assessment.squared_errors
+    squared = entry.squared_errors
     return sqrt(np.mean(compare_blocks(squared, squared)[0])) if squared.size else inf
 
 
@@ -91,7 +90,7 @@ def least_error(found: SearchResult) -> int:
 
 def one_standard_error(found: SearchResult) -> int:
     """Choose the smallest model within one standard error of the least error (Breiman)."""
-    squared = found.models[least_error(found)].assessment.squared_errors
+    squared = found.models[least_error(found)].squared_errors
     blocks = compare_blocks(squared, squared)[0]
     limit = max(ROUNDING**2, blocks.mean() + blocks.std(ddof=1) / sqrt(len(blocks)))
     return min(
@@ -105,10 +104,10 @@ def paired(standard_errors: float) -> Rule:
 
     def choose(found: SearchResult) -> int:
         best = least_error(found)
-        least = found.models[best].assessment.squared_errors
+        least = found.models[best].squared_errors
         equal = []
         for at in sound(found):
-            blocks = compare_blocks(found.models[at].assessment.squared_errors, least)
+            blocks = compare_blocks(found.models[at].squared_errors, least)
             excess = blocks[0] - blocks[1]
             limit = standard_errors * excess.std(ddof=1) / sqrt(len(excess))
             if excess.mean() <= max(limit, 0.0) or error(found.models[at]) <= ROUNDING:
@@ -132,7 +131,7 @@ def description_length(effective: bool) -> Rule:
     def choose(found: SearchResult) -> int:
         best = found.models[least_error(found)]
         data = found.split.validation
-        residual = data.y - free_run(best.model, data, best.assessment.warm_up).y
+        residual = data.y - free_run(best.model, data, best.warm_up).y
         residual = residual[~np.isnan(residual)]
         known = effective and np.ptp(residual) > 0
         count = effective_samples(residual) if known else len(residual)

@@ -18,10 +18,9 @@ from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.history import HistoryPoint
 from islands.evolution.progress import Steps
 from islands.model.equations import equation
-from islands.model.model import Model
 from islands.validation.assessment import MODES, Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
-from islands.validation.prediction_bands import PredictionBands, calibrate_bands
+from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import Recommendation, recommend, recommend_fittest
 
 #: Name of the step that makes the ensemble and the prediction bands.
@@ -29,23 +28,6 @@ _BANDS = "prediction bands"
 
 #: Kind of simulation of each fitness function.
 _FITNESS_MODES = dict(zip(FITNESSES, MODES, strict=True))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RankedModel:
-    """Model with its assessment.
-
-    Attributes
-    ----------
-    model : Model
-    assessment : Assessment
-    bands : PredictionBands or None
-        Prediction bands of its free run. None without an ensemble, or if its free runs diverge.
-    """
-
-    model: Model
-    assessment: Assessment
-    bands: PredictionBands | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +98,7 @@ class SearchResult:
     settings : mapping
         Settings that determine the result, together with the record and the seed.
     search : SearchStatistics
-    models : tuple of RankedModel
+    models : tuple of Assessment
         Models, least validation error first; see `rank_models`.
     ensemble : Ensemble or None
         Models that the data do not exclude. They give the inclusion probabilities of terms and the prediction
@@ -131,7 +113,7 @@ class SearchResult:
     seed: int
     settings: Mapping[str, Any]
     search: SearchStatistics
-    models: tuple[RankedModel, ...]
+    models: tuple[Assessment, ...]
     ensemble: Ensemble | None = None
     average: int = 1
 
@@ -154,7 +136,7 @@ class SearchResult:
     @property
     def claims_hysteresis(self) -> bool:
         """Whether the search is for models of hysteresis, or found a model with Property 1."""
-        return self.requires_property_1 or any(entry.assessment.physics.property_1 for entry in self.models)
+        return self.requires_property_1 or any(entry.physics.property_1 for entry in self.models)
 
     @property
     def has_loop(self) -> bool:
@@ -164,16 +146,15 @@ class SearchResult:
     @property
     def recommendation(self) -> Recommendation:
         """Rank of the recommended model, and the reasons."""
-        assessments = [entry.assessment for entry in self.models]
         unit = self.record.output_unit
         if self.settings.get("select") == "fitness":  # a setting of evolution only
             mode = _FITNESS_MODES[self.settings["fitness"]]
-            return recommend_fittest(assessments, mode, self.requires_property_1, unit)
+            return recommend_fittest(self.models, mode, self.requires_property_1, unit)
         sizes = [entry.model.size for entry in self.models]
-        return recommend(sizes, assessments, self.requires_property_1, unit)
+        return recommend(sizes, self.models, self.requires_property_1, unit)
 
     @property
-    def recommended(self) -> RankedModel:
+    def recommended(self) -> Assessment:
         """Recommended model."""
         return self.models[self.recommendation.rank - 1]
 
@@ -212,7 +193,7 @@ def with_average(found: SearchResult, average: int) -> SearchResult:
     return replace(found, models=models, average=average)
 
 
-def rank_models(models: Sequence[RankedModel]) -> tuple[RankedModel, ...]:
+def rank_models(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
     """Sort models by the RMSE of their free run on the validation data, best first.
 
     Models whose free run diverged come last, sorted by one-step-ahead RMSE; an infinite one comes at the end.
@@ -222,8 +203,8 @@ def rank_models(models: Sequence[RankedModel]) -> tuple[RankedModel, ...]:
     return tuple(sorted(models, key=_ranking_key))
 
 
-def _ranking_key(entry: RankedModel) -> tuple[bool, float, int, str]:
-    errors = entry.assessment.metrics["validation"]
+def _ranking_key(entry: Assessment) -> tuple[bool, float, int, str]:
+    errors = entry.metrics["validation"]
     diverged = bool(np.isnan(errors["free_run"].rmse))
     rmse = errors["one_step_ahead" if diverged else "free_run"].rmse
     return diverged, inf if np.isnan(rmse) else rmse, entry.model.size, equation(entry.model, digits=17)

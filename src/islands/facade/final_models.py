@@ -20,7 +20,7 @@ from islands.evolution.gp.individual import Individual, unique_structures
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.problem import Problem
 from islands.evolution.progress import Steps
-from islands.evolution.search_result import RankedModel, rank_models
+from islands.evolution.search_result import rank_models
 from islands.evolution.settings import Settings
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
@@ -56,7 +56,7 @@ _Sized = TypeVar("_Sized", bound=_HasSize)
 
 def select_final_models(
     candidates: Iterable[ValidatedModel], problem: Problem, split: Split, steps: Steps
-) -> tuple[RankedModel, ...]:
+) -> tuple[Assessment, ...]:
     """Assess the candidates and return the best model of every size, best first.
 
     The best model is that with the least error on the validation data or, if the settings select by fitness,
@@ -66,7 +66,7 @@ def select_final_models(
     """
     settings = problem.settings
     most = max(1, _ASSESSED_SAMPLES // (split.estimation.samples + split.validation.samples))
-    kept: list[RankedModel] = []
+    kept: list[Assessment] = []
     groups = _group_by_size(candidates)
     for entries in sorted(groups, key=lambda group: min(entry.order for entry in group)):
         if len(kept) >= most and steps.skip("assessment of further models"):
@@ -77,7 +77,7 @@ def select_final_models(
                 model = _with_standard_errors(candidate, settings, split.estimation)
             assessment = assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
             if _is_valid(assessment, settings):
-                kept.append(RankedModel(model, assessment))
+                kept.append(assessment)
                 break
     return rank_models(kept)
 

@@ -32,7 +32,6 @@ from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.swap_search import swap_search
 from islands.evolution.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.evolution.search_result import (
-    RankedModel,
     SearchResult,
     SearchStatistics,
     rank_models,
@@ -48,7 +47,7 @@ from islands.facade.trials.rate_selection import select_rate
 from islands.model.candidate_library import full_set
 from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
-from islands.validation.assessment import assess
+from islands.validation.assessment import Assessment, assess
 from islands.validation.ensemble import ValidatedModel
 
 #: Structures of every size that are simulated on the validation data.
@@ -128,7 +127,7 @@ def fit_library(
     swaps = rated.make_settings(settings.max_terms, interval)
     structures, certificates, warm_up = _select(split, rated, swaps, settings.certificate, steps)
     models, outcomes = _estimate(structures, split, settings, swaps, warm_up, steps)
-    best_of_size: dict[int, RankedModel] = {}
+    best_of_size: dict[int, Assessment] = {}
     for ranked in rank_models(models):
         best_of_size.setdefault(ranked.model.size, ranked)
     rows = sum(max(0, length - warm_up) for length in split.estimation.segments)
@@ -152,7 +151,7 @@ def fit_library(
     result = SearchResult(record, split, seed, described, search, tuple(best_of_size.values()))
     minimised = ESTIMATORS[settings.estimator].interval(interval)
     estimates = [
-        ValidatedModel(entry.model, minimised, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
+        ValidatedModel(entry.model, minimised, entry.metrics["validation"]["free_run"].rmse ** 2)
         for entry in models
     ]
     return with_average(with_bands(result, estimates, constraints, warm_up, steps), samples)
@@ -165,14 +164,14 @@ def _estimate(
     swaps: Settings,
     warm_up: int,
     steps: Steps,
-) -> tuple[list[RankedModel], Counter[str]]:
+) -> tuple[list[Assessment], Counter[str]]:
     """Estimate and assess a model of every structure; return the models and the number of each outcome.
 
     Once a stop is requested, only the last structure of every size that has no model is estimated.
     """
     constraints, interval = swaps.constraints, swaps.shooting
     outcomes: Counter[str] = Counter()
-    models: list[RankedModel] = []
+    models: list[Assessment] = []
     last = {len(structure): place for place, (structure, _) in enumerate(structures)}
     for done, (structure, offsets) in enumerate(structures):
         size = len(structure)
@@ -191,8 +190,7 @@ def _estimate(
         if estimated.model.size > settings.max_terms:
             continue
         outcomes["ok"] += 1
-        assessment = assess(estimated.model, split, interval, warm_up, constraints)
-        models.append(RankedModel(estimated.model, assessment))
+        models.append(assess(estimated.model, split, interval, warm_up, constraints))
     if not models:
         raise SettingsError(
             f"no model could be estimated: {dict(outcomes)}; take another library or a longer record"

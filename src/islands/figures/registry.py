@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError, lookup
-from islands.evolution.search_result import RankedModel, SearchResult
+from islands.evolution.search_result import SearchResult
 from islands.figures.convergence import draw_convergence, draw_front, draw_islands
 from islands.figures.free_run import draw_free_run, draw_free_run_panel
 from islands.figures.hold import draw_holds
@@ -20,12 +20,12 @@ from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
 from islands.model.model import Model
 from islands.simulation.predictors import free_run
-from islands.validation.assessment import assess_residual
+from islands.validation.assessment import Assessment, assess_residual
 from islands.validation.predictable_residual import ResidualStructure
 from islands.validation.prediction_bands import PredictionBands
 from islands.validation.residual_tests import ResidualTests
 
-ModelFigure = Callable[[RankedModel, Split], Figure]
+ModelFigure = Callable[[Assessment, Split], Figure]
 
 
 #: Draws a model on a record, with a number of samples before the first prediction and prediction bands.
@@ -103,24 +103,24 @@ def draw_record_figure(
     return cast("Figure", ax.get_figure(root=True))
 
 
-def _free_run(entry: RankedModel, split: Split) -> Figure:
+def _free_run(entry: Assessment, split: Split) -> Figure:
     """Draw the measured output, the free run with its prediction band, and the residual over time."""
-    return _free_run_on(entry.model, split.validation, entry.assessment.warm_up, entry.bands)
+    return _free_run_on(entry.model, split.validation, entry.warm_up, entry.bands)
 
 
-def _loop(entry: RankedModel, split: Split) -> Figure:
+def _loop(entry: Assessment, split: Split) -> Figure:
     """Draw the measured output and the free run against every input."""
-    return _loop_on(entry.model, split.validation, entry.assessment.warm_up, None)
+    return _loop_on(entry.model, split.validation, entry.warm_up, None)
 
 
-def _hold(entry: RankedModel, split: Split) -> Figure:
+def _hold(entry: Assessment, split: Split) -> Figure:
     """Draw the output while the input is held at five levels."""
     return draw_holds(entry.model, split.estimation)
 
 
-def _residuals(entry: RankedModel, _split: Split) -> Figure:
+def _residuals(entry: Assessment, _split: Split) -> Figure:
     """Draw the correlation functions of the residual with their 95 % band, and its verdict."""
-    return _draw_residuals(entry.assessment.residual_tests, entry.assessment.residual_structure)
+    return _draw_residuals(entry.residual_tests, entry.residual_structure)
 
 
 def _draw_residuals(tests: ResidualTests, structure: ResidualStructure) -> Figure:

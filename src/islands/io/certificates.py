@@ -11,7 +11,7 @@ def certificates_document(found: SearchResult) -> list[dict[str, Any]]:
     for entry in sorted(found.models, key=lambda each: each.model.size):
         certificate = found.search.certificates.get(entry.model.size)
         if certificate is not None:
-            error = entry.assessment.metrics["estimation"]["one_step_ahead"].rmse
+            error = entry.metrics["estimation"]["one_step_ahead"].rmse
             documents.append(
                 {
                     "terms": certificate.terms,

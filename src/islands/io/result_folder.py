@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.evolution.search_result import RankedModel, SearchResult
+from islands.evolution.search_result import SearchResult
 from islands.io.certificates import certificates_document
 from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
 from islands.model.equations import equation, latex_equation
 from islands.model.signal_statement import describe_signals
-from islands.validation.assessment import PARTS
+from islands.validation.assessment import PARTS, Assessment
 from islands.validation.ensemble import Ensemble
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure
@@ -99,9 +99,9 @@ def content_sha256(record: Dataset) -> str:
 
 
 def _model_document(
-    rank: int, entry: RankedModel, recommended: bool, ensemble: Ensemble | None
+    rank: int, assessment: Assessment, recommended: bool, ensemble: Ensemble | None
 ) -> dict[str, Any]:
-    model, assessment = entry.model, entry.assessment
+    model = assessment.model
     terms = [
         {**term, "inclusion": None if ensemble is None else ensemble.inclusion(item)}
         for term, item in zip(terms_document(model), model.regressors, strict=True)
@@ -114,7 +114,7 @@ def _model_document(
         "latex": latex_equation(model),
         "signals": describe_signals(model),
         "terms": terms,
-        "bands": bands_document(entry.bands),
+        "bands": bands_document(assessment.bands),
         "metrics": {
             part: {mode: asdict(value) for mode, value in assessment.metrics[part].items()} for part in PARTS
         },

@@ -1,4 +1,4 @@
-"""Assessment of a model: errors, residual tests and physics checks."""
+"""Assessment of a model: errors, residual tests, physics checks and prediction bands."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,6 +18,7 @@ from islands.simulation.predictors import Simulation, multiple_shooting
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure
+from islands.validation.prediction_bands import PredictionBands
 from islands.validation.residual_tests import ResidualTests, residual_tests
 
 #: Parts of a split, as named in a result.
@@ -35,10 +36,11 @@ _MIN_RESIDUALS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assessment:
-    """Errors, residual tests and physics checks of a model.
+    """A model with its errors, residual tests and physics checks.
 
     Attributes
     ----------
+    model : Model
     metrics : mapping
         ``metrics[part][mode]``, NaN if the simulation diverged.
     outcomes : mapping
@@ -62,8 +64,11 @@ class Assessment:
     recordings : mapping
         ``recordings[part][name]``: metrics of the free run on each recording, with the range of the whole
         part as the scale of the MAPE. Empty for a part that consists of one recording.
+    bands : PredictionBands or None
+        Prediction bands of the free run. None without an ensemble, or if its free runs diverge.
     """
 
+    model: Model
     metrics: Mapping[str, Mapping[str, Metrics]]
     outcomes: Mapping[str, Mapping[str, EvaluationOutcome]]
     information: InformationCriteria
@@ -74,6 +79,7 @@ class Assessment:
     squared_errors: NDArray[np.float64]
     constraints: tuple[ConstraintCheck, ...] = ()
     recordings: Mapping[str, Mapping[str, Metrics]] = field(default_factory=dict)
+    bands: PredictionBands | None = None
 
 
 def assess(
@@ -116,6 +122,7 @@ def assess(
         }
         recordings[part] = _compute_recording_metrics(record, runs["free_run"])
     return Assessment(
+        model,
         errors,
         outcomes,
         _compute_information(model, split.estimation, warm_up, constraints),

@@ -14,10 +14,11 @@ from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.progress import Steps, StoppedError
-from islands.evolution.search_result import RankedModel, SearchResult
+from islands.evolution.search_result import SearchResult
 from islands.facade.automatic.kind_trials import NO_DEAD_TIME, ROUNDING, KindTrials, percent, try_kinds
 from islands.facade.trials.library import TrialLibrary
 from islands.inspection.rest import check_rest
+from islands.validation.assessment import Assessment
 from islands.validation.recommendation import recommend
 
 #: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
@@ -204,25 +205,25 @@ def _take_best(results: Mapping[str, SearchResult], missing: Sequence[str]) -> S
 
 
 def _validation_error(result: SearchResult) -> float:
-    error = result.recommended.assessment.metrics["validation"]["free_run"].rmse
+    error = result.recommended.metrics["validation"]["free_run"].rmse
     return error if isfinite(error) else inf
 
 
 def _is_bounded(result: SearchResult) -> bool:
     """Return whether the free run of the recommended model on the validation data does not diverge."""
-    return bool(result.recommended.assessment.outcomes["validation"]["free_run"])
+    return bool(result.recommended.outcomes["validation"]["free_run"])
 
 
-def _measure(model: RankedModel, record: Dataset) -> float:
+def _measure(model: Assessment, record: Dataset) -> float:
     """Return the free-run error of a model on the validation data as a fraction of the output range."""
-    return max(model.assessment.metrics["validation"]["free_run"].rmse / record.output_range, ROUNDING)
+    return max(model.metrics["validation"]["free_run"].rmse / record.output_range, ROUNDING)
 
 
 def _select_kind(
     record: Dataset,
     libraries: Mapping[str, TrialLibrary],
     trials: KindTrials,
-    compared: Mapping[str, RankedModel],
+    compared: Mapping[str, Assessment],
     errors: Mapping[str, float],
 ) -> tuple[str, str]:
     """Return the kind and the reason."""
@@ -244,7 +245,7 @@ def _select_kind(
             f"{_list_others(errors, close[0])}"
         )
     models = list(compared.values())
-    best = recommend([each.model.size for each in models], [each.assessment for each in models], False)
+    best = recommend([each.model.size for each in models], models, False)
     kind = list(compared)[best.rank - 1]
     smallest = "" if errors[kind] == least else ", the smallest without a significantly larger error,"
     return kind, (

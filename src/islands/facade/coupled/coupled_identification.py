@@ -269,7 +269,7 @@ def _couple(
     estimation, validation = (
         part.map(partial(average_samples, count=options["average"])) for part in (estimation, validation)
     )
-    warm_up = max(entry.ranked_model.assessment.warm_up for result in results for entry in result.models)
+    warm_up = max(entry.warm_up for result in results for entry in result.models)
     ranked = [[entry.model for entry in result.models] for result in results]
     best = [result.recommendation.rank for result in results]
     choice = choose_equations(ranked, best, validation, warm_up, partial(steps.skip, _CHOICE))

@@ -14,7 +14,7 @@ from islands.data.signal_map import match_rate
 from islands.errors import ModelError, lookup
 from islands.estimation.constraints.checks import ConstraintCheck
 from islands.estimation.estimators import least_squares_bias
-from islands.evolution.search_result import RankedModel, SearchResult
+from islands.evolution.search_result import SearchResult
 from islands.export import export, write_export
 from islands.facade.results.model_analysis import linearise
 from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
@@ -27,6 +27,7 @@ from islands.model.sympy_expression import to_sympy
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation
 from islands.simulation.step_response import StepResponse, step_response
+from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure
@@ -82,16 +83,15 @@ class FittedModel:
     prediction_bands: PredictionBands | None
     output_unit: str
     document: Mapping[str, Any] = field(default_factory=lambda: _EMPTY)
-    _ranked_model: RankedModel | None = None
+    _assessment: Assessment | None = None
     _search_result: SearchResult | None = None
 
     @classmethod
-    def from_search(cls, rank: int, entry: RankedModel, found: SearchResult) -> "FittedModel":
+    def from_search(cls, rank: int, assessment: Assessment, found: SearchResult) -> "FittedModel":
         """Return a model of a search result."""
-        assessment = entry.assessment
         return cls(
-            *(entry.model, rank, assessment.metrics, assessment.warm_up, found.shooting_interval),
-            *(entry.bands, found.record.output_unit, _EMPTY, entry, found),
+            *(assessment.model, rank, assessment.metrics, assessment.warm_up, found.shooting_interval),
+            *(assessment.bands, found.record.output_unit, _EMPTY, assessment, found),
         )
 
     @classmethod
@@ -100,17 +100,17 @@ class FittedModel:
         return cls(model, None, _EMPTY, model.maximum_lag, SHOOTING, None, "")
 
     @property
-    def ranked_model(self) -> RankedModel:
-        """Model with its errors, residual tests and physics checks.
+    def assessment(self) -> Assessment:
+        """Errors, residual tests and physics checks of the search.
 
         Raises
         ------
         ModelError
             The model was read from a file or a folder.
         """
-        if self._ranked_model is None:
+        if self._assessment is None:
             raise _missing_search()
-        return self._ranked_model
+        return self._assessment
 
     @property
     def search_result(self) -> SearchResult:
@@ -216,22 +216,22 @@ class FittedModel:
     @property
     def physics(self) -> PhysicsChecks:
         """Physics checks: cluster sums, holds, minor loops, other amplitudes and rates."""
-        return self.ranked_model.assessment.physics
+        return self.assessment.physics
 
     @property
     def constraints(self) -> tuple[ConstraintCheck, ...]:
         """Constraints of the search, each with its target and the value of this model."""
-        return self.ranked_model.assessment.constraints
+        return self.assessment.constraints
 
     @property
     def residual_tests(self) -> ResidualTests:
         """Correlation tests of the one-step-ahead residual."""
-        return self.ranked_model.assessment.residual_tests
+        return self.assessment.residual_tests
 
     @property
     def residual_structure(self) -> ResidualStructure:
         """Predictable part of the residuals, and a verdict: adequate, minor or inadequate."""
-        return self.ranked_model.assessment.residual_structure
+        return self.assessment.residual_structure
 
     @property
     def inclusion(self) -> tuple[float, ...]:
@@ -385,7 +385,7 @@ class FittedModel:
 
         kind = kind.replace("_", "-")
         if record is None and ax is None:
-            return lookup(FIGURES, kind, "figure")(self.ranked_model, self.search_result.split)
+            return lookup(FIGURES, kind, "figure")(self.assessment, self.search_result.split)
         if record is None:
             data = self.validation
         else:

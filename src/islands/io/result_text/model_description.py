@@ -6,7 +6,7 @@ from math import floor, isfinite
 import numpy as np
 
 from islands.estimation.constraints.checks import ConstraintCheck
-from islands.evolution.search_result import RankedModel, SearchResult
+from islands.evolution.search_result import SearchResult
 from islands.model.equations import (
     named_equation,
     named_signals,
@@ -15,6 +15,7 @@ from islands.model.equations import (
     signal_names,
 )
 from islands.model.signal_statement import describe_values
+from islands.validation.assessment import Assessment
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE, ResidualStructure
 from islands.validation.prediction_bands import LEVEL
 
@@ -119,8 +120,8 @@ def _describe_rate(found: SearchResult) -> str:
     return f"{statement}, and simulate prepares a record of {dt:g} s in the same way"
 
 
-def _describe_error(found: SearchResult, entry: RankedModel) -> str:
-    free, one = (entry.assessment.metrics["validation"][mode] for mode in ("free_run", "one_step_ahead"))
+def _describe_error(found: SearchResult, entry: Assessment) -> str:
+    free, one = (entry.metrics["validation"][mode] for mode in ("free_run", "one_step_ahead"))
     if not isfinite(free.rmse):
         error = "the free run on the validation data diverges"
     else:
@@ -131,8 +132,8 @@ def _describe_error(found: SearchResult, entry: RankedModel) -> str:
     return f"Error: {error}; one step ahead RMSE {_unit(found, one.rmse)}."
 
 
-def _describe_recordings(found: SearchResult, entry: RankedModel) -> Iterator[str]:
-    errors = entry.assessment.recordings.get("validation", {})
+def _describe_recordings(found: SearchResult, entry: Assessment) -> Iterator[str]:
+    errors = entry.recordings.get("validation", {})
     if errors:
         listed = ", ".join(f"{name} {_unit(found, each.rmse)}" for name, each in errors.items())
         yield f"RMSE of the free run by recording: {listed}."
@@ -144,7 +145,7 @@ def _describe_recordings(found: SearchResult, entry: RankedModel) -> Iterator[st
         )
 
 
-def _describe_uncertainty(found: SearchResult, entry: RankedModel) -> Iterator[str]:
+def _describe_uncertainty(found: SearchResult, entry: Assessment) -> Iterator[str]:
     if entry.bands is None or found.ensemble is None:
         return
     doubtful = [f"{term} {_round_down(share)}" for term, share in _list_doubtful(found, entry)]
@@ -160,7 +161,7 @@ def _round_down(share: float) -> str:
     return f"{floor(100 * share) / 100:.2f}"
 
 
-def _list_doubtful(found: SearchResult, entry: RankedModel) -> list[tuple[str, float]]:
+def _list_doubtful(found: SearchResult, entry: Assessment) -> list[tuple[str, float]]:
     """Return the terms that are not certain, each with the probability of its inclusion."""
     if found.ensemble is None:
         return []
@@ -172,29 +173,29 @@ def _list_doubtful(found: SearchResult, entry: RankedModel) -> list[tuple[str, f
     ]
 
 
-def _describe_constraints(entry: RankedModel) -> Iterator[str]:
+def _describe_constraints(entry: Assessment) -> Iterator[str]:
     met = [named_statement(check.text, entry.model) for check in _list_statements(entry) if check.met]
     if met:
         yield f"Constraints that the model meets: {'; '.join(met)}."
 
 
-def _list_statements(entry: RankedModel) -> list[ConstraintCheck]:
+def _list_statements(entry: Assessment) -> list[ConstraintCheck]:
     """Return the constraints of the user; the physics checks state whether Property 1 holds."""
-    return [check for check in entry.assessment.constraints if check.text != "hysteresis"]
+    return [check for check in entry.constraints if check.text != "hysteresis"]
 
 
 def _unit(found: SearchResult, value: float) -> str:
     return f"{value:.4g} {found.record.output_unit}".rstrip()
 
 
-def _list_uses(entry: RankedModel) -> Iterator[str]:
-    free, one = (entry.assessment.metrics["validation"][mode] for mode in ("free_run", "one_step_ahead"))
+def _list_uses(entry: Assessment) -> Iterator[str]:
+    free, one = (entry.metrics["validation"][mode] for mode in ("free_run", "one_step_ahead"))
     if free.r2 >= _GOOD_R2:
         yield "simulation from the inputs alone"
     elif one.r2 >= _GOOD_R2:
         yield "prediction one step ahead"
-    if entry.assessment.residual_structure.verdict == ADEQUATE:
-        yield _describe_adequate_residual(entry.assessment.residual_structure)
+    if entry.residual_structure.verdict == ADEQUATE:
+        yield _describe_adequate_residual(entry.residual_structure)
 
 
 def _describe_adequate_residual(structure: ResidualStructure) -> str:
@@ -209,16 +210,15 @@ def _describe_adequate_residual(structure: ResidualStructure) -> str:
     return f"no structure is left in the {name} (at most {100 * LARGEST_SHARE:.0f} % is predictable)"
 
 
-def _list_failures(found: SearchResult, entry: RankedModel) -> Iterator[str]:
-    assessment = entry.assessment
-    errors = {part: assessment.metrics[part]["free_run"] for part in ("estimation", "validation")}
+def _list_failures(found: SearchResult, entry: Assessment) -> Iterator[str]:
+    errors = {part: entry.metrics[part]["free_run"] for part in ("estimation", "validation")}
     for check in _list_statements(entry):
         if not check.met:
             value = f"{check.value:.6g}" if isfinite(check.value) else "undefined"
             yield f"the constraint {named_statement(check.text, entry.model)} (value {value})"
     if errors["validation"].r2 < _GOOD_R2:
         yield f"simulation from the inputs alone: R2 {errors['validation'].r2:.3f}"
-    physics = assessment.physics
+    physics = entry.physics
     diverging = [f"{test.name}" for test in physics.excursions if not test.bounded]
     if diverging:
         yield f"diverges at {', '.join(diverging)}"
@@ -231,7 +231,7 @@ def _list_failures(found: SearchResult, entry: RankedModel) -> Iterator[str]:
     if found.claims_hysteresis and opened:
         worst = max(opened, key=lambda test: test.closure_percent)
         yield f"loops do not close at {worst.name}: {worst.closure_percent:.3g} % of the output range"
-    structure = assessment.residual_structure
+    structure = entry.residual_structure
     if structure.verdict != ADEQUATE and isfinite(structure.percent):
         yield (
             f"{100 * structure.free_run_share:.0f} % of the free-run residual is predictable "
@@ -242,7 +242,7 @@ def _list_failures(found: SearchResult, entry: RankedModel) -> Iterator[str]:
         yield f"the free-run error on the validation data is {ratio:.2g} times that on the estimation data"
 
 
-def _list_insignificant(entry: RankedModel) -> list[str]:
+def _list_insignificant(entry: Assessment) -> list[str]:
     model = entry.model
     if model.standard_errors is None:
         return []
@@ -254,15 +254,15 @@ def _list_insignificant(entry: RankedModel) -> list[str]:
     ]
 
 
-def _list_next_steps(found: SearchResult, entry: RankedModel) -> list[str]:
+def _list_next_steps(found: SearchResult, entry: Assessment) -> list[str]:
     steps = []
-    structure = entry.assessment.residual_structure
+    structure = entry.residual_structure
     if structure.verdict != ADEQUATE:
         largest = max(found.models, key=lambda other: other.model.size).model.size
         if entry.model.size == largest and "max_terms" in found.settings:
             steps.append(f"allow more than {largest} terms")
         steps.append(f"try {_suggest_terms(entry)}")
-    errors = [entry.assessment.metrics[part]["free_run"].rmse for part in ("estimation", "validation")]
+    errors = [entry.metrics[part]["free_run"].rmse for part in ("estimation", "validation")]
     if errors[1] > _LARGE_RATIO * errors[0] > 0:
         steps.append("estimate from a record that covers the amplitudes and rates of the validation data")
     weak = _list_insignificant(entry)
@@ -282,9 +282,9 @@ def _list_next_steps(found: SearchResult, entry: RankedModel) -> list[str]:
     return steps
 
 
-def _suggest_terms(entry: RankedModel) -> str:
+def _suggest_terms(entry: Assessment) -> str:
     """Return the hint of the test with an input that exceeds its limit by most, or of the one without."""
-    past, *tests = entry.assessment.residual_tests.tests
+    past, *tests = entry.residual_tests.tests
     # The residual of a slow record is correlated in time whatever term is missing.
     excess = [float(np.abs(test.values).max()) / test.limit for test in tests]
     worst = tests[int(np.argmax(excess))] if max(excess) > 1.0 else past

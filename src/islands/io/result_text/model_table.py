@@ -2,8 +2,8 @@
 
 from math import isfinite
 
-from islands.evolution.search_result import RankedModel, SearchResult
-from islands.validation.assessment import PARTS
+from islands.evolution.search_result import SearchResult
+from islands.validation.assessment import PARTS, Assessment
 
 #: Mark of the recommended model, after its rank.
 MARK = "*"
@@ -39,10 +39,10 @@ def rows(found: SearchResult) -> list[tuple[str, ...]]:
     ]
 
 
-def _row(rank: str, entry: RankedModel, hysteresis: bool) -> tuple[str, ...]:
-    metrics, physics = entry.assessment.metrics, entry.assessment.physics
+def _row(rank: str, entry: Assessment, hysteresis: bool) -> tuple[str, ...]:
+    metrics, physics = entry.metrics, entry.physics
     estimation, validation = metrics["estimation"]["free_run"], metrics["validation"]["free_run"]
-    estimated, validated = (bool(entry.assessment.outcomes[part]["free_run"]) for part in PARTS)
+    estimated, validated = (bool(entry.outcomes[part]["free_run"]) for part in PARTS)
     holds_bounded = all(hold.bounded for hold in physics.holds)
     claims = (
         number(physics.hold_drift_percent, "{:.3f}", holds_bounded),
@@ -55,7 +55,7 @@ def _row(rank: str, entry: RankedModel, hysteresis: bool) -> tuple[str, ...]:
         number(validation.mape, "{:.4f}", validated),
         number(validation.r2, "{:.5f}", validated),
         *(claims if hysteresis else ()),
-        entry.assessment.residual_structure.verdict,
+        entry.residual_structure.verdict,
     )
 
 

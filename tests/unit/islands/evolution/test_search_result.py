@@ -6,7 +6,7 @@ from math import nan
 import pytest
 
 import islands
-from islands.evolution.search_result import RankedModel, SearchStatistics, rank_models
+from islands.evolution.search_result import SearchStatistics, rank_models
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 
@@ -21,7 +21,7 @@ def entry(free_run, one_step=0.1, terms=("y(k-1)",), theta=0.5):
         },
     }
     model = islands.make_model([(islands.parse(text), theta) for text in terms])
-    return RankedModel(model, Assessment(errors, {}, None, None, None, None, 0, ()))
+    return Assessment(model, errors, {}, None, None, None, None, 0, ())
 
 
 def assert_ranked_in_any_order(*expected):

@@ -284,7 +284,7 @@ def test_models_that_diverge_one_step_ahead_are_ranked_last(tmp_path, drawing):
     calm, u = tank(), tank().u.copy()
     u[200] = 1e5
     made = islands.fit(calm, validation=Dataset(u, calm.y, 1.0), library="polynomial", max_terms=6)
-    lost = [m for m in made.models if not m.ranked_model.assessment.outcomes["validation"]["one_step_ahead"]]
+    lost = [m for m in made.models if not m.assessment.outcomes["validation"]["one_step_ahead"]]
     assert 0 < len(lost) < len(made.models)
     assert [m.rank for m in lost] == list(range(len(made.models) - len(lost) + 1, len(made.models) + 1))
     assert not any(m.residual_tests.passed for m in lost)

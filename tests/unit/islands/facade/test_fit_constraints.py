@@ -204,7 +204,7 @@ def test_information_criteria_of_a_result_count_free_parameters():
     data = record()
     for found in (islands.fit(data, library="phi-polynomial", max_terms=3), identify(data, **BUDGET, seed=0)):
         for fitted in found.models:
-            assessment = fitted.ranked_model.assessment
+            assessment = fitted.assessment
             criteria, free = assessment.information, fitted.model.size - len(fitted.physics.clusters)
             samples = found.search_result.split.estimation.samples - assessment.warm_up
             # BIC - AIC = p (log N - 2).

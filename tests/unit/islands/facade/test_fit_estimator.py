@@ -40,7 +40,7 @@ def test_identify_estimates_all_models_with_the_chosen_estimator(estimator):
     record = make_noisy_record("arma", 0, 800)
     result = identify(record, **BUDGET, estimator=estimator)
     part = result.search_result.split.estimation
-    warm_up = result.best.ranked_model.assessment.warm_up
+    warm_up = result.best.warm_up
     for entry in result.models:
         start = estimate(entry.model.regressors, part, "none", warm_up)
         expected = estimate_with(estimator, start, part, "none", warm_up, BUDGET["shooting"])

@@ -33,7 +33,7 @@ def test_several_recordings_are_fitted_together():
     made = islands.fit(join(parts), library="polynomial", max_terms=4)
     assert made.search_result.record.segments == (100, 3, 160, 2, 140)
     assert made.search_result.split.estimation.segments == (75, 2, 120, 2, 105)
-    assert list(made.search_result.recommended.assessment.recordings["validation"]) == ["1", "2", "3", "5"]
+    assert list(made.search_result.recommended.recordings["validation"]) == ["1", "2", "3", "5"]
     # Each recording has a warm-up of three samples.
     assert made.search_result.search.full_set["bytes"] == 8 * 84 * (72 + 117 + 102)
     check_law(made)

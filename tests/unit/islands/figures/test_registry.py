@@ -7,7 +7,6 @@ from math import nan
 import pytest
 
 from islands.data.split import Split
-from islands.evolution.search_result import RankedModel
 from islands.expressions.parsing import parse
 from islands.figures.registry import FIGURES
 from islands.model.model import make_model
@@ -21,13 +20,13 @@ MODEL = make_model([(parse("y(k-1)"), 0.999), (parse("u(k-1)"), 0.3)], ("u",))
 @pytest.mark.ci
 def test_the_figure_of_the_residual_gives_its_verdict_before_the_tests():
     split = Split(record(400), record(300, seed=1))
-    entry = RankedModel(MODEL, assess(MODEL, split, 50))
-    structure = replace(entry.assessment.residual_structure, one_step_share=0.04, free_run_share=0.314)
+    entry = assess(MODEL, split, 50)
+    structure = replace(entry.residual_structure, one_step_share=0.04, free_run_share=0.314)
     for shares, words in (
         (structure, f"residual {structure.verdict}: predictable part 4 % one step ahead, 31 % in free run"),
         (replace(structure, free_run_share=nan), "predictable part 4 % one step ahead"),
     ):
-        assessed = replace(entry, assessment=replace(entry.assessment, residual_structure=shares))
+        assessed = replace(entry, residual_structure=shares)
         verdict, tests = FIGURES["residuals"](assessed, split).get_suptitle().split("\n")
         assert verdict.endswith(words)
         assert tests.startswith("residual tests ")
@@ -37,8 +36,8 @@ def test_the_figure_of_the_residual_gives_its_verdict_before_the_tests():
 @pytest.mark.parametrize("warm_up", [None, 60])
 def test_free_run_figure_has_the_error_of_the_assessment(warm_up):
     split = Split(record(400), record(300, seed=1))
-    assessed = RankedModel(MODEL, assess(MODEL, split, 50, warm_up))
+    assessed = assess(MODEL, split, 50, warm_up)
     figure = FIGURES["free-run"](assessed, split)
     texts = [text.get_text() for text in figure.findobj(match=lambda artist: hasattr(artist, "get_text"))]
     (drawn,) = re.findall(r"RMSE ([0-9.e-]+)", " ".join(texts))
-    assert float(drawn) == pytest.approx(assessed.assessment.metrics["validation"]["free_run"].rmse, rel=5e-3)
+    assert float(drawn) == pytest.approx(assessed.metrics["validation"]["free_run"].rmse, rel=5e-3)

@@ -39,7 +39,7 @@ def test_a_result_folder_reproduces_the_bands_bit_for_bit(folder):
         file = folder / "models" / f"{model.rank:02d}.json"
         bands = islands.load(file).prediction_bands
         expected = result().search_result.ensemble
-        own = model.ranked_model.bands
+        own = model.prediction_bands
         assert (bands.noise, bands.width, bands.factors) == (own.noise, own.width, own.factors)
         for found, each in zip(bands.ensemble.structures, expected.structures, strict=True):
             assert (found.model, found.weight) == (each.model, each.weight)
@@ -77,6 +77,6 @@ def test_a_damaged_ensemble_is_refused(damage):
 
 
 def test_damaged_bands_are_refused():
-    document = {**bands_document(result().best.ranked_model.bands), "levels": [0.9]}
+    document = {**bands_document(result().best.prediction_bands), "levels": [0.9]}
     with pytest.raises(ModelError, match="damaged"):
         bands_from_document(document, result().search_result.ensemble)

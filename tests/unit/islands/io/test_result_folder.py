@@ -10,7 +10,6 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
-from islands.evolution.search_result import RankedModel
 from islands.io.models import read_model, terms_document
 from islands.io.result_folder import content_sha256, result_json, write_result
 from islands.io.result_text.summary_text import summary
@@ -45,8 +44,7 @@ def loaded(findings):
 def with_best(findings, **changes):
     """Return the result with changed fields of the best model."""
     best, *others = findings.models
-    changed = RankedModel(best.model, replace(best.assessment, **changes))
-    return replace(findings, models=(changed, *others))
+    return replace(findings, models=(replace(best, **changes), *others))
 
 
 # The contract: the fields that issue 2 lists, and those that docs/reference/result-json.md adds.
@@ -140,15 +138,15 @@ def test_models_are_in_rank_order_with_their_numbers(findings):
         assert model["size"] == entry.model.size == len(model["terms"])
         for term, expected in zip(model["terms"], terms_document(entry.model), strict=True):
             assert term == {**expected, "inclusion": term["inclusion"]}
-        free_run = entry.assessment.metrics["validation"]["free_run"]
+        free_run = entry.metrics["validation"]["free_run"]
         assert model["metrics"]["validation"]["free_run"]["mape"] == free_run.mape
-        assert model["physics"]["hold_drift_percent"] == entry.assessment.physics.hold_drift_percent
+        assert model["physics"]["hold_drift_percent"] == entry.physics.hold_drift_percent
         assert model["outcomes"]["validation"]["free_run"] == "ok"
-        assert model["warm_up"] == entry.assessment.warm_up == 3
+        assert model["warm_up"] == entry.warm_up == 3
 
 
 def test_numbers_that_json_cannot_represent_become_null(findings):
-    best = findings.models[0].assessment
+    best = findings.models[0]
     lost = replace(best.metrics["validation"]["free_run"], mape=nan, r2=-inf, rmse=inf)
     metrics = {**best.metrics, "validation": {**best.metrics["validation"], "free_run": lost}}
     outcomes = {**best.outcomes, "validation": {**best.outcomes["validation"], "free_run": LOST}}

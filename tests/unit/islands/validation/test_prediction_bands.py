@@ -32,7 +32,7 @@ def test_a_band_contains_its_free_run():
         band = model.bands(data)
         assert band.y == pytest.approx(model.simulate(data).y, nan_ok=True)
         known = ~np.isnan(band.y)
-        assert known.sum() == data.samples - model.ranked_model.assessment.warm_up
+        assert known.sum() == data.samples - model.warm_up
         assert (band.lower < band.y)[known].all()
         assert (band.y < band.upper)[known].all()
 

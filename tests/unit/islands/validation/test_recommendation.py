@@ -36,6 +36,7 @@ class Candidate:
         known = len(self.blocks) > 0
         rmse = sqrt(np.mean(self.blocks)) if known else nan
         return Assessment(
+            None,
             {
                 "estimation": {"one_step_ahead": Metrics(nan, nan, self.trained, nan)},
                 "validation": {"free_run": Metrics(nan, nan, rmse, nan)},

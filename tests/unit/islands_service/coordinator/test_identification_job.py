@@ -67,7 +67,7 @@ def test_job_finds_the_models_of_a_single_process(
     assert ended.progress is not None
     assert ended.progress["generation"] == ended.progress["generations"]
     drawn = read_search_result(ended, store, blobs, None)
-    errors = [asdict(entry.assessment.metrics["validation"]["multiple_shooting"]) for entry in drawn.models]
+    errors = [asdict(entry.metrics["validation"]["multiple_shooting"]) for entry in drawn.models]
     assert errors == [model["metrics"]["validation"]["multiple_shooting"] for model in undisturbed[0]]
 
 

@@ -98,7 +98,7 @@ def demo(
     stop.end(out, (*result.left_out, *drawing.left_out, _COMPARISON), "repeat the command")
 
     # All models start after the same warm-up.
-    warm_up = result.best.ranked_model.assessment.warm_up
+    warm_up = result.best.warm_up
     table = Table("model", "terms", "MAPE est. %", "MAPE val. %", "R2 est.", "R2 val.", title=_TITLE)
     for number in ("12", "13"):
         entry = PUBLISHED[number]

@@ -89,7 +89,7 @@ def test_promising_kinds_are_compared_by_their_recommended_models():
     choice, result = choose(data)
     least = min(choice.trials.values())
     assert set(choice.errors) == {kind for kind, error in choice.trials.items() if error <= 3.0 * least}
-    error = result.recommended.assessment.metrics["validation"]["free_run"].rmse
+    error = result.recommended.metrics["validation"]["free_run"].rmse
     assert choice.errors[choice.kind] == pytest.approx(error / split(data).estimation.output_range)
 
 

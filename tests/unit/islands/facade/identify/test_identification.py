@@ -217,10 +217,7 @@ def test_other_engine_gives_the_same_result(data, result):
 
 def test_simulations_of_the_parts_have_the_reported_errors(result):
     split = result.search_result.split
-    assert (
-        max(fitted.model.maximum_lag for fitted in result.models)
-        < result.best.ranked_model.assessment.warm_up
-    )
+    assert max(fitted.model.maximum_lag for fitted in result.models) < result.best.warm_up
     for fitted in result.models:
         for part, data in (("estimation", split.estimation), ("validation", split.validation)):
             for name, mode in zip(MODES, SIMULATION_MODES, strict=True):

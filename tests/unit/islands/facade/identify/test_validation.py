@@ -219,7 +219,7 @@ def test_select_fitness_recommends_the_model_of_least_training_error():
     assert set(chosen.model.regressors) == set(fittest.regressors)
     error = chosen.metrics["estimation"]["one_step_ahead"].rmse
     assert error**2 == pytest.approx(fittest.fitness, rel=1e-9)
-    assert not chosen.ranked_model.assessment.outcomes["validation"]["free_run"]
+    assert not chosen.assessment.outcomes["validation"]["free_run"]
     assert found["fitness"].search_result.settings["select"] == "fitness"
-    assert found["validation"].best.ranked_model.assessment.outcomes["validation"]["free_run"]
+    assert found["validation"].best.assessment.outcomes["validation"]["free_run"]
     assert found["validation"].best.metrics["estimation"]["one_step_ahead"].rmse > error

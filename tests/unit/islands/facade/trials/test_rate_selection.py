@@ -112,7 +112,7 @@ def test_simulation_of_the_validation_data_has_the_reported_errors(averaged):
     assert run.mean_squared_error**0.5 == pytest.approx(best.metrics["validation"]["free_run"].rmse)
     again = model_from_json(model_json(best.model))
     assert again == best.model
-    same = islands.simulate(again, validation, warm_up=best.ranked_model.assessment.warm_up)
+    same = islands.simulate(again, validation, warm_up=best.warm_up)
     assert np.array_equal(same.y, run.y, equal_nan=True)
     means = average_samples(validation, best.model.average)
     assert np.array_equal(best.simulate(means).y, run.y, equal_nan=True)

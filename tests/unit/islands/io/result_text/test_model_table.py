@@ -6,7 +6,6 @@ from math import inf, nan
 import pytest
 
 import islands
-from islands.evolution.search_result import RankedModel
 from islands.io.result_text.model_table import columns, number, rows, table
 from islands.simulation.outcome import EvaluationOutcome, Status
 from support.searches import record
@@ -22,8 +21,7 @@ def findings():
 def with_first(findings, **changes):
     """Return the result with a changed assessment of its first model."""
     first, *others = findings.models
-    changed = RankedModel(first.model, replace(first.assessment, **changes))
-    return replace(findings, models=(changed, *others))
+    return replace(findings, models=(replace(first, **changes), *others))
 
 
 def first_cells(findings, **changes):
@@ -38,7 +36,7 @@ def test_the_table_has_a_row_per_model_and_aligned_columns(findings):
     first = findings.models[0]
     cells = first_cells(findings)
     assert cells["terms"] == str(first.model.size)
-    assert cells["MAPE est. %"] == f"{first.assessment.metrics['estimation']['free_run'].mape:.4f}"
+    assert cells["MAPE est. %"] == f"{first.metrics['estimation']['free_run'].mape:.4f}"
     assert cells["Property 1"] == "yes"
 
 
@@ -50,7 +48,7 @@ def test_only_the_recommended_model_has_a_mark(findings):
 
 def test_columns_of_hysteresis_need_a_model_that_claims_it(findings):
     plain = islands.fit(record(300), library="polynomial", degree=1, max_terms=2).search_result
-    assert not any(entry.assessment.physics.property_1 for entry in plain.models)
+    assert not any(entry.physics.property_1 for entry in plain.models)
     assert not {"drift %", "Property 1"} & set(columns(plain))
     assert {"drift %", "Property 1"} <= set(columns(findings))
     free = replace(findings, settings={**findings.settings, "constraints": "none"})
@@ -59,7 +57,7 @@ def test_columns_of_hysteresis_need_a_model_that_claims_it(findings):
 
 
 def test_the_table_distinguishes_divergence_from_an_undefined_number(findings):
-    first = findings.models[0].assessment
+    first = findings.models[0]
     flat = replace(first.metrics["validation"]["free_run"], mape=nan, r2=nan)
     without = {**first.metrics, "validation": {**first.metrics["validation"], "free_run": flat}}
     cells = first_cells(findings, metrics=without)

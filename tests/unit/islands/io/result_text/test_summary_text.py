@@ -32,14 +32,13 @@ def findings():
 
 def said(findings, **changes):
     """Return the sentences by first word, for a result with one model whose assessment is changed."""
-    entry = findings.recommended
-    changed = replace(entry, assessment=replace(entry.assessment, **changes))
+    changed = replace(findings.recommended, **changes)
     lines = describe(replace(findings, models=(changed,)))
     return {line.partition(":")[0]: line for line in lines if not line.startswith(" ")}
 
 
 def errors(findings, validation, **others):
-    metrics = findings.recommended.assessment.metrics
+    metrics = findings.recommended.metrics
     return {
         "estimation": metrics["estimation"] | others,
         "validation": metrics["validation"] | {"free_run": validation},
@@ -75,7 +74,7 @@ def test_the_equation_has_the_names_and_units_of_the_record(findings):
     assert text.strip().startswith("y_um(k) = y_um(k-1) ")
     assert "(u_V(k-1) - u_V(k-2))" in text
     assert units.strip() == "y_um in um, u_V in V; k counts samples of 0.1 s."
-    rmse = findings.recommended.assessment.metrics["validation"]["free_run"].rmse
+    rmse = findings.recommended.metrics["validation"]["free_run"].rmse
     assert f"RMSE {rmse:.4g} um" in error
 
 
@@ -102,7 +101,7 @@ def test_an_error_that_grows_on_validation_data_is_a_failure(findings):
 
 
 def test_excursions_and_holds_that_diverge_are_failures(findings):
-    physics = findings.recommended.assessment.physics
+    physics = findings.recommended.physics
     fast = (*physics.excursions[:-1], replace(physics.excursions[-1], bounded=False))
     found = said(findings, physics=replace(physics, excursions=fast))
     assert "diverges at rate x 5" in found["Fails at"]
@@ -118,7 +117,7 @@ def test_excursions_and_holds_that_diverge_are_failures(findings):
 
 
 def test_structure_in_the_residual_is_a_failure_with_a_hint(findings):
-    tests = findings.recommended.assessment.residual_tests
+    tests = findings.recommended.residual_tests
     worst = tests.tests[3]
     assert worst.name == "u2_xi"
     values = worst.values.copy()
@@ -191,7 +190,7 @@ def test_constraints_of_the_user_are_stated_with_the_names_of_the_record(finding
     assert "Constraints that the model meets: [valve(k-1)] >= 0; gain(valve) = 0." in lines
     checks = [
         replace(check, value=value, met=False)
-        for check, value in zip(found.recommended.assessment.constraints, (-0.5, nan), strict=True)
+        for check, value in zip(found.recommended.constraints, (-0.5, nan), strict=True)
     ]
     failed = said(found, constraints=tuple(checks))
     assert "Constraints that the model meets" not in failed
