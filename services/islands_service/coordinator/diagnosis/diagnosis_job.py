@@ -1,5 +1,6 @@
 """Discrepancy job: diagnose a simulation, write the report and the extended simulation."""
 
+from collections.abc import Callable
 from time import sleep
 
 import structlog
@@ -18,6 +19,7 @@ from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState
 from islands_service.domain.job_spec import parse_discrepancy
 from islands_service.intake.job_inputs import read_record_and_columns
 from islands_service.runtime.parallel_map import ray_map
+from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
 
 log = structlog.get_logger()
@@ -71,10 +73,10 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
         found = DiagnosisResult.from_diagnosis(diagnosed, formula, wall_s=report.spent)
         report("writing the report", 0.98)
         names = ", ".join(datasets[part.dataset].name for part in spec.parts)
-        artefacts[REPORT] = _keep(found.write_report(names), run)
+        artefacts[REPORT] = _keep(found.write_report(names), run.blobs, run.check)
         left_out.remove(REPORT)
         if (extended := found.extended_document) is not None:
-            artefacts[EXTENDED] = _keep(extended.encode(), run)
+            artefacts[EXTENDED] = _keep(extended.encode(), run.blobs, run.check)
         ended = JobState.SUCCEEDED
     except JobCancelled:
         so_far = interim.make_diagnosis(spec.seed)
@@ -88,14 +90,14 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
     return JobOutcome(ended, found.document, summary=summary, artefacts=artefacts)
 
 
-def _keep(data: bytes, run: JobRun) -> str:
+def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
     """Store a blob. Retry while the store is unavailable: the work is done."""
     while True:
         try:
-            return run.blobs.write(data)
+            return blobs.write(data)
         except StoreError as error:
             log.warning("cannot store yet", reason=str(error))
-            run.check()
+            check()
             sleep(_RETRY_SECONDS)
 
 
