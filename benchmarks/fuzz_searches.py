@@ -33,7 +33,7 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.errors import IslandsError
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.facade.coupled.coupled_result import CoupledResult
+from islands.facade.coupled.result import CoupledResult
 from islands.facade.results.result import Result
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.result_folder import result_json

@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.epoch import run_epoch
-from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import Island
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem

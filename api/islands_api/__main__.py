@@ -12,7 +12,7 @@ from islands_api.web.app import create_app
 from islands_api.web.auth import make_verifier
 from islands_service.liveness import FAILED, MISCONFIGURED, UNAVAILABLE
 from islands_service.logging_config import configure_logs
-from islands_service.process.process_settings import freeze_garbage_collector, raise_file_limit
+from islands_service.process.settings import freeze_garbage_collector, raise_file_limit
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.store.backends.cached_blobs import open_blobs

@@ -15,9 +15,9 @@ import reference_rest
 from tables import attributes, code, codes, entries, escape, page, section, summarise, table
 
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.gp.fitness import FITNESSES
-from islands.evolution.gp.gene_structure import STRUCTURES
-from islands.evolution.gp.island_profiles import ISLAND_PROFILES
+from islands.evolution.fitness import FITNESSES
+from islands.evolution.gene_structure import STRUCTURES
+from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE
 from islands.evolution.presets import PRESET_SUMMARIES, PRESETS

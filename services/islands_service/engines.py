@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from islands.distribution import describe_missing_extra
 from islands.evolution.engine import Engine, SerialEngine
-from islands.evolution.progress import ProgressCallback
+from islands.progress import ProgressCallback
 
 
 @contextmanager

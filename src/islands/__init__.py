@@ -31,7 +31,7 @@ _PUBLIC = {
     "expressions.parsing": ("parse",),
     "expressions.primitives": ("PRIMITIVES",),
     "expressions.user_primitive": ("primitive",),
-    "facade.coupled.coupled_identification": ("fit_coupled", "identify_coupled"),
+    "facade.coupled.identification": ("fit_coupled", "identify_coupled"),
     "facade.coupled.coupled_result": ("CoupledResult", "FittedCoupledModel"),
     "facade.diagnose": ("diagnose", "function_simulator", "plan_experiment"),
     "facade.engine_choice": ("Ray",),

@@ -22,10 +22,10 @@ from islands.evolution.settings import Settings as Settings
 from islands.expressions.parsing import parse as parse
 from islands.expressions.primitives import PRIMITIVES as PRIMITIVES
 from islands.expressions.user_primitive import primitive as primitive
-from islands.facade.coupled.coupled_identification import fit_coupled as fit_coupled
-from islands.facade.coupled.coupled_identification import identify_coupled as identify_coupled
-from islands.facade.coupled.coupled_result import CoupledResult as CoupledResult
-from islands.facade.coupled.coupled_result import FittedCoupledModel as FittedCoupledModel
+from islands.facade.coupled.identification import fit_coupled as fit_coupled
+from islands.facade.coupled.identification import identify_coupled as identify_coupled
+from islands.facade.coupled.result import CoupledResult as CoupledResult
+from islands.facade.coupled.result import FittedCoupledModel as FittedCoupledModel
 from islands.facade.diagnose import diagnose as diagnose
 from islands.facade.diagnose import function_simulator as function_simulator
 from islands.facade.diagnose import plan_experiment as plan_experiment

@@ -14,7 +14,7 @@ import pytest
 import yaml
 from prometheus_client import generate_latest
 
-from islands_service.coordinator.coordinator_metrics import CoordinatorMetrics
+from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.domain.job import ProgressReport
 from islands_service.settings import ServiceSettings
 from support.repository import ROOT

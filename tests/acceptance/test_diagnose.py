@@ -12,10 +12,10 @@ import pytest
 
 from islands.discrepancy.detectability import NOTHING, SelfTest, SurrogateOutcome, self_test
 from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.surrogates import SurrogateCase
 from islands.io.records import write_record
+from islands.parallel import ParallelMap
 from islands.performance.trials.injection.measurement import inject
 from support.command_line import fail, succeed, write_offset
 from support.undrawn import undrawn_figures

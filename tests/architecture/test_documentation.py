@@ -13,8 +13,8 @@ from tables import attributes, summarise
 from islands.discrepancy.effects import CATALOGUE, OF_EACH
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.gp.fitness import FITNESSES
-from islands.evolution.gp.gene_structure import STRUCTURES
+from islands.evolution.fitness import FITNESSES
+from islands.evolution.gene_structure import STRUCTURES
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.migration.topology import TOPOLOGIES
 from islands.evolution.presets import PRESET_SUMMARIES, PRESETS

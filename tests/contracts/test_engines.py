@@ -15,7 +15,7 @@ from islands.errors import RecordError
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.epoch import run_epoch, select_migrants
-from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import merge
 from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings

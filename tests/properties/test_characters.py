@@ -5,11 +5,11 @@ from math import inf
 
 import pytest
 
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.individual import Individual
-from islands.evolution.gp.island_profiles import ISLAND_PROFILES
+from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame
+from islands.evolution.individual import Individual
 from islands.evolution.island import Island
+from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.problem import Problem
 from islands.evolution.settings import Settings
 from support.migrations import (

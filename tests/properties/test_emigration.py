@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.epoch import select_migrants
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.rng import Purpose, Stream
+from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.island import Island, select_elite
 from islands.evolution.migration.policies import SELECTION_POLICIES
 from islands.evolution.problem import Problem
+from islands.evolution.rng import Purpose, Stream
 from islands.expressions.tree import Apply, Lagged, height, walk
 from islands.simulation.outcome import Status
 from support.migrations import (

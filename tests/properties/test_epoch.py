@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from islands.evolution.epoch import next_stop, receive_migrants, run_epoch, select_migrants
-from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.island import Island, first_generation, step
 from islands.evolution.problem import Problem, make_problem

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.generation import evaluation
-from islands.evolution.generation.evaluation import Evaluator, Limits
-from islands.evolution.generation.variation import random_genes
-from islands.evolution.gp.individual import Individual
-from islands.evolution.gp.rng import Purpose, Stream
+from islands.evolution import evaluation
+from islands.evolution.evaluation import Evaluator, Limits
+from islands.evolution.individual import Individual
 from islands.evolution.island import first_generation
+from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
+from islands.evolution.variation import random_genes
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Constant, Lagged
 from islands.simulation.outcome import Status

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.generation.evaluation import Evaluator, Limits
-from islands.evolution.generation.variation import random_gene
-from islands.evolution.gp.gene_index import GeneIndex
-from islands.evolution.gp.individual import Individual
-from islands.evolution.gp.rng import Purpose, Stream
+from islands.evolution.evaluation import Evaluator, Limits
+from islands.evolution.gene_index import GeneIndex
+from islands.evolution.individual import Individual
 from islands.evolution.island import first_generation, step
+from islands.evolution.rng import Purpose, Stream
+from islands.evolution.variation import random_gene
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from support.searches import SMALL, evolved, islands_of, record

@@ -9,12 +9,12 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares, null_space
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.generation.variation import random_genes
-from islands.evolution.gp.fitness import FITNESSES
-from islands.evolution.gp.individual import Individual
-from islands.evolution.gp.rng import Purpose, Stream
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.fitness import FITNESSES
+from islands.evolution.individual import Individual
+from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
+from islands.evolution.variation import random_genes
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.model.model import Model, canonical_order

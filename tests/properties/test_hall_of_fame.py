@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.gp.individual import Individual, make_regressor
 from islands.evolution.hall_of_fame import DEPTH, HallOfFame, merge, pareto_front, with_entries
+from islands.evolution.individual import Individual, make_regressor
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged, Shift
 from islands.model.model import canonical_order

@@ -6,8 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.generation.variation import (
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.gene_structure import phi
+from islands.evolution.individual import Individual, make_regressor
+from islands.evolution.island import first_generation, step
+from islands.evolution.problem import make_problem
+from islands.evolution.rng import Purpose, Stream
+from islands.evolution.settings import Settings
+from islands.evolution.variation import (
     high_level_crossover,
     inner_mutation,
     low_level_crossover,
@@ -17,12 +23,6 @@ from islands.evolution.generation.variation import (
     repair_genes,
     with_required_genes,
 )
-from islands.evolution.gp.gene_structure import phi
-from islands.evolution.gp.individual import Individual, make_regressor
-from islands.evolution.gp.rng import Purpose, Stream
-from islands.evolution.island import first_generation, step
-from islands.evolution.problem import make_problem
-from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.printing import plain

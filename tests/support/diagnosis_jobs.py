@@ -5,9 +5,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.io.records.preview import preview
-from islands_service.coordinator.diagnosis.diagnosis_job import run_diagnosis_job
+from islands.parallel import ParallelMap
+from islands_service.coordinator.diagnosis.job import run_diagnosis_job
 from islands_service.domain.job import DISCREPANCY, Job, JobOutcome, Lease, Submission
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.epoch import IslandEpoch
-from islands.evolution.gp.individual import Individual
+from islands.evolution.individual import Individual
 from islands.evolution.migration.schedule import Schedule
 from islands.evolution.migration.topology import parse_topology
 from islands.evolution.problem import Problem

@@ -3,8 +3,8 @@
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.individual import make_regressor
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import make_regressor
 from islands.evolution.island import first_generation, step
 from islands.evolution.settings import Settings
 

@@ -228,7 +228,7 @@ def hidden(folder: Path, seconds: float = 4.0) -> bytes:
 
 def run_diagnosis(service: Service, content: bytes, /, **changes: Any) -> str:
     """Upload a record, submit a diagnosis and execute it in this process; return the id of the job."""
-    from islands_service.coordinator.diagnosis.diagnosis_job import run_diagnosis_job
+    from islands_service.coordinator.diagnosis.job import run_diagnosis_job
     from support.job_runs import make_run
 
     dataset = service.upload(content).json()["id"]

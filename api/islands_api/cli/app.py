@@ -16,7 +16,7 @@ from islands.errors import IslandsError, SettingsError, suggest
 from islands_api.cli.console import errors, exit_with_closed_output
 from islands_api.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
 from islands_api.cli.stop_requests import exit_code, ignore_signals, raise_on_signals
-from islands_service.process.process_settings import limit_threads
+from islands_service.process.settings import limit_threads
 
 #: Commands and their descriptions, in the order of the help. Each is a file with a function or a group of the
 #: command's name. The help shows these descriptions, so that it does not import the commands.

@@ -95,7 +95,7 @@ def compile_kernels() -> None:
     # Imported here because it loads most of the core: other commands must start fast.
     from islands.facade.warm_up import warm_up  # noqa: PLC0415
     from islands_api.cli.stop_requests import end_at_once  # noqa: PLC0415 - it imports this module
-    from islands_service.process.process_settings import freeze_garbage_collector  # noqa: PLC0415
+    from islands_service.process.settings import freeze_garbage_collector  # noqa: PLC0415
 
     with ExitStack() as stack:
 

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 import typer
 
-from islands.evolution.progress import StoppedError
+from islands.progress import StoppedError
 from islands_api.cli.console import errors
 
 #: How to get the complete result of a command that cannot be resumed.

@@ -9,7 +9,7 @@ from functools import partial
 
 from islands.errors import IslandsError
 from islands_service.coordinator.coordinator import Coordinator
-from islands_service.coordinator.coordinator_metrics import CoordinatorMetrics
+from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.coordinator.process_restart import restart_process
 from islands_service.liveness import (
     FAILED,
@@ -20,8 +20,8 @@ from islands_service.liveness import (
     watch_supervisor,
 )
 from islands_service.logging_config import configure_logs
-from islands_service.process.process_metrics import serve_metrics
-from islands_service.process.process_settings import limit_threads
+from islands_service.process.metrics import serve_metrics
+from islands_service.process.settings import limit_threads
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import service_settings
 from islands_service.store.database import DatabaseDamagedError, StoreError

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import structlog
 
 from islands.errors import IslandsError
-from islands_service.coordinator.coordinator_metrics import CoordinatorMetrics
 from islands_service.coordinator.heartbeat import CoordinatorStopping, HangGuard, Heartbeat, JobCancelled
 from islands_service.coordinator.job_failures import (
     RETRY_BACKOFF,
@@ -25,6 +24,7 @@ from islands_service.coordinator.job_failures import (
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.coordinator.job_run import JobRun
 from islands_service.coordinator.job_runners import JOB_RUNNERS
+from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.coordinator.sweeper import Sweeper
 from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
 from islands_service.liveness import StopRequest, stop_on_signals
@@ -287,7 +287,7 @@ class Coordinator:
 
     def _connect(self) -> None:
         from islands.facade.warm_up import warm_up  # noqa: PLC0415
-        from islands_service.process.process_settings import freeze_garbage_collector  # noqa: PLC0415
+        from islands_service.process.settings import freeze_garbage_collector  # noqa: PLC0415
         from islands_service.runtime.cluster import cluster  # noqa: PLC0415
 
         self._ray.enter_context(cluster(self._find_address()))

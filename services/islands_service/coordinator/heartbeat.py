@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from islands.evolution.archipelago import Archipelago
     from islands.evolution.engine import ArchipelagoEpoch, Engine
     from islands.evolution.problem import Problem
-    from islands.evolution.progress import Stop
+    from islands.progress import Stop
 
 log = structlog.get_logger()
 

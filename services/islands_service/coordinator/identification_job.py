@@ -11,7 +11,6 @@ import structlog
 from islands.data.dataset import Dataset
 from islands.evolution.engine import Engine
 from islands.evolution.presets import AUTO
-from islands.evolution.progress import StoppedError
 from islands.evolution.search_result import SearchResult
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
@@ -24,6 +23,7 @@ from islands.io.models import model_json
 from islands.io.result_folder import result_document
 from islands.io.result_text.model_description import describe
 from islands.model.equations import equation
+from islands.progress import StoppedError
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart

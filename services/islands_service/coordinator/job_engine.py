@@ -6,7 +6,7 @@ from sys import maxsize
 import structlog
 
 from islands.evolution.engine import Engine
-from islands.evolution.progress import ProgressCallback
+from islands.progress import ProgressCallback
 from islands_service.domain.job import IDENTIFICATION, Job, Lease
 from islands_service.domain.job_memory import estimate_memory, machine_memory
 from islands_service.domain.job_spec import parse_identification

@@ -19,7 +19,7 @@ def _run_identification(run: JobRun) -> JobOutcome:
 
 
 def _run_diagnosis(run: JobRun) -> JobOutcome:
-    from islands_service.coordinator.diagnosis.diagnosis_job import run_diagnosis_job  # noqa: PLC0415
+    from islands_service.coordinator.diagnosis.job import run_diagnosis_job  # noqa: PLC0415
 
     return run_diagnosis_job(run)
 

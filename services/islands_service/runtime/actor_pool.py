@@ -12,8 +12,8 @@ from ray.actor import ActorHandle
 from ray.exceptions import RayActorError, RayTaskError
 
 from islands.evolution.problem import Problem
-from islands.evolution.progress import ProgressCallback
 from islands.expressions.primitives import PRIMITIVES
+from islands.progress import ProgressCallback
 from islands_service.runtime.cluster import LOSS_ERRORS, check_version, cluster_cpus, reserved_cpus
 from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.island_actor import IslandActor

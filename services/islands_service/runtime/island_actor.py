@@ -10,11 +10,11 @@ import ray
 
 from islands.distribution import read_version
 from islands.evolution.epoch import run_epoch
-from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.facade.warm_up import warm_up
-from islands_service.process.process_settings import freeze_garbage_collector
+from islands_service.process.settings import freeze_garbage_collector
 from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack_emigrants, unpack_island
 
 

@@ -16,7 +16,7 @@ from typing import Any, overload
 
 from islands.evolution.engine import Caches
 from islands.evolution.epoch import IslandEpoch
-from islands.evolution.gp.individual import Population
+from islands.evolution.individual import Population
 from islands.evolution.island import Island, StepInfo
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import ray
 from ray.exceptions import RayError, RayTaskError
 
-from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.parallel import ParallelMap
 from islands_service.runtime.cluster import cluster, cluster_cpus, reserved_cpus
 from islands_service.runtime.errors import ClusterError
 

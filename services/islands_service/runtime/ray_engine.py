@@ -7,8 +7,8 @@ from ray.exceptions import RayError
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.problem import Problem
-from islands.evolution.progress import ProgressCallback, Stop, ignore_progress
 from islands.expressions.tree import Primitive
+from islands.progress import ProgressCallback, Stop, ignore_progress
 from islands_service.runtime.actor_pool import IslandActorPool, ignore_placement
 from islands_service.runtime.cluster import cluster_cpus
 from islands_service.runtime.epoch_deadline import EpochDeadlines

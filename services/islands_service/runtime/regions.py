@@ -17,7 +17,7 @@ from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, make_topology
 from islands.evolution.epoch import next_stop
 from islands.evolution.problem import Problem
-from islands.evolution.progress import ProgressCallback
+from islands.progress import ProgressCallback
 from islands_service.runtime.actor_pool import ignore_placement, put_problem
 from islands_service.runtime.cluster import LOSS_ERRORS, check_version
 from islands_service.runtime.epoch_scheduler import MAX_EPOCHS_AHEAD, begin_epoch

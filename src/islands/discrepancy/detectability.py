@@ -16,7 +16,6 @@ from scipy.special import betaincinv
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.surrogates import (
     Injection,
@@ -25,7 +24,8 @@ from islands.discrepancy.surrogates import (
     injection_strengths,
     make_surrogates,
 )
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.parallel import ParallelMap
+from islands.progress import ProgressCallback, ignore_progress
 
 #: Number of clean surrogates.
 CLEAN_SURROGATES = 40

@@ -23,9 +23,9 @@ from islands.discrepancy.calibration.preparation import (
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis_assembly import extend_equations, make_diagnosis, make_gross_diagnosis
 from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.discovery.discovery import explain_all, find_missing_terms, replaces_effects
 from islands.discrepancy.discovery.equation_simulator import find_equations
 from islands.discrepancy.discovery.form_search import compare_with_free_forms
+from islands.discrepancy.discovery.missing_terms import explain_all, find_missing_terms, replaces_effects
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.gross_errors.channel_admission import admit_channels
 from islands.discrepancy.gross_errors.closed_loop import find_closed_loop
@@ -43,7 +43,6 @@ from islands.discrepancy.inference.strategies import (
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator, find_read_channels, get_tolerances
 from islands.discrepancy.interim_findings import (
     EVIDENCE,
@@ -55,7 +54,8 @@ from islands.discrepancy.interim_findings import (
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.output_equation import add_output_equation
 from islands.errors import RecordError
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.parallel import ParallelMap
+from islands.progress import ProgressCallback, ignore_progress
 
 #: Maximum number of intersample behaviours and step sizes with which effects are searched for.
 MAX_SEARCHES = 3

@@ -10,8 +10,8 @@ from islands.discrepancy.calibration.initial_states import fit_initial_states
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
-from islands.discrepancy.discovery.discovery import MISSING_TERM, MissingTerms, describe_terms
 from islands.discrepancy.discovery.effect_shape import compare_shapes
+from islands.discrepancy.discovery.missing_terms import MISSING_TERM, MissingTerms, describe_terms
 from islands.discrepancy.findings import describe_gross_errors, describe_noise, list_record_findings
 from islands.discrepancy.gross_errors.gross_error import GrossError
 from islands.discrepancy.inference.experiment_design import suggest_experiment

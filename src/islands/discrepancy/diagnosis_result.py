@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
-from islands.discrepancy.discovery.discovery import Discovery
 from islands.discrepancy.discovery.effect_shape import EffectShape
+from islands.discrepancy.discovery.missing_terms import Discovery
 from islands.discrepancy.gross_errors.record_finding import RecordFinding
 from islands.discrepancy.inference.finding import Finding
 from islands.discrepancy.inference.holdout import HoldoutGain

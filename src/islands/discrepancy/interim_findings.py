@@ -16,7 +16,7 @@ from islands.discrepancy.calibration.starts_calibrator import (
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.diagnosis_assembly import make_diagnosis
 from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.discovery.discovery import MissingTerms
+from islands.discrepancy.discovery.missing_terms import MissingTerms
 from islands.discrepancy.gross_errors.closed_loop import find_closed_loop
 from islands.discrepancy.gross_errors.record_finding import RecordFinding
 from islands.discrepancy.inference.hypothesis import Hypothesis
@@ -25,7 +25,7 @@ from islands.discrepancy.inference.strategies import SearchOutcome, analyse_resi
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap, intercepted_map
+from islands.parallel import ParallelMap, intercepted_map
 
 #: Steps of a diagnosis after the calibration of the simulation, in their order.
 STEPS = (

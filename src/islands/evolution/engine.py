@@ -6,11 +6,11 @@ from typing import Protocol
 
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
-from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import StepInfo
 from islands.evolution.migration.topology import Topology, parse_topology
 from islands.evolution.problem import Problem
-from islands.evolution.progress import Stop
+from islands.progress import Stop
 
 #: Bytes in use and byte limit of each cache, by name.
 Caches = Mapping[str, tuple[int, int]]

@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.individual import Population, unique_structures
-from islands.evolution.gp.rng import Purpose, Stream
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import Population, unique_structures
 from islands.evolution.island import Island, StepInfo, first_generation, select_elite, step
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.problem import Problem
+from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
 from islands.simulation.outcome import Status
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from math import inf, isfinite
 
-from islands.evolution.gp.individual import Individual
+from islands.evolution.individual import Individual
 
 #: Models kept for every size; validation selects among them.
 DEPTH = 8

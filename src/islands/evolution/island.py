@@ -6,9 +6,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import inf, isfinite
 
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.generation.selection import run_tournaments
-from islands.evolution.generation.variation import (
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.hall_of_fame import HallOfFame, with_entries
+from islands.evolution.individual import Individual, Population, unique_niches, unique_structures
+from islands.evolution.rng import Purpose, Stream
+from islands.evolution.selection import run_tournaments
+from islands.evolution.settings import Settings
+from islands.evolution.variation import (
     Genes,
     high_level_crossover,
     inner_mutation,
@@ -18,10 +22,6 @@ from islands.evolution.generation.variation import (
     repair_genes,
     with_required_genes,
 )
-from islands.evolution.gp.individual import Individual, Population, unique_niches, unique_structures
-from islands.evolution.gp.rng import Purpose, Stream
-from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.settings import Settings
 from islands.expressions.tree import Expression
 
 #: Quantile of the parents' fitness that defines the abandon threshold.

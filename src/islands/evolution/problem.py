@@ -8,15 +8,15 @@ from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import make_selection_problem, select_forward, select_pool
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_ranking import screen_candidates
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.generation.swap_search import swap_search
-from islands.evolution.generation.variation import Genes
-from islands.evolution.gp.gene_structure import with_phi
-from islands.evolution.gp.island_profiles import ISLAND_PROFILES
-from islands.evolution.progress import Steps
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.gene_structure import with_phi
+from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.settings import Settings
+from islands.evolution.swap_search import swap_search
+from islands.evolution.variation import Genes
 from islands.expressions.tree import Expression, height
 from islands.model.regressor import Regressor
+from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 
 

@@ -14,10 +14,10 @@ from islands.data.dataset import Dataset
 from islands.data.loops import has_loops
 from islands.data.split import Split
 from islands.estimation.structure_selection.certificate import Certificate
-from islands.evolution.gp.fitness import FITNESSES
+from islands.evolution.fitness import FITNESSES
 from islands.evolution.history import HistoryPoint
-from islands.evolution.progress import Steps
 from islands.model.equations import equation
+from islands.progress import Steps
 from islands.validation.assessment import MODES, Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
 from islands.validation.prediction_bands import calibrate_bands

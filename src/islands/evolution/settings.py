@@ -13,10 +13,10 @@ from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.estimation.structure_selection.input_delays import check_delays
-from islands.evolution.gp.err_targets import ERR_TARGETS
-from islands.evolution.gp.fitness import FITNESSES
-from islands.evolution.gp.gene_structure import STRUCTURES
-from islands.evolution.gp.island_profiles import ISLAND_PROFILES
+from islands.evolution.err_targets import ERR_TARGETS
+from islands.evolution.fitness import FITNESSES
+from islands.evolution.gene_structure import STRUCTURES
+from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.migration.schedule import Schedule, parse_schedule
 from islands.evolution.migration.topology import TOPOLOGIES, parse_topology

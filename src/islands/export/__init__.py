@@ -5,6 +5,7 @@ are written from it.
 """
 
 from collections.abc import Callable, Mapping
+from functools import wraps
 from pathlib import Path
 from types import MappingProxyType
 
@@ -26,10 +27,16 @@ from islands.simulation.coupled_model import CoupledModel, measured_coupled_mode
 def _choose(
     of_one: Callable[[Model], str], of_several: Callable[[CoupledModel], str]
 ) -> Callable[[Model | CoupledModel], str]:
-    """Return a format of models of one or several outputs."""
-    return lambda model: of_several(model) if isinstance(model, CoupledModel) else of_one(model)
+    """Return a format of models of one or several outputs, with the description of that of one."""
+
+    @wraps(of_one)
+    def write(model: Model | CoupledModel) -> str:
+        return of_several(model) if isinstance(model, CoupledModel) else of_one(model)
+
+    return write
 
 
+#: Text formats by name.
 EXPORTS: Mapping[str, Callable[[Model | CoupledModel], str]] = MappingProxyType(
     {
         "plain": _choose(plain_text, coupled_text),

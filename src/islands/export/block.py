@@ -36,7 +36,7 @@ class Block:
     signals : tuple of str
         Their names in programs: y and u, or y1, y2, u1, u2 ..
     names : tuple of mapping
-        For each equation, the name in ``signals`` of each of its own signals, ``{"y": "y2", "u2": "y1"}``.
+        For each equation, the name in ``signals`` of each of its signals, ``{"y": "y2", "u2": "y1"}``.
     maximum_lag : int
     dt : float or None
         Sampling time in seconds; None for any.

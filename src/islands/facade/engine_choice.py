@@ -12,7 +12,7 @@ from importlib.metadata import entry_points
 from islands.distribution import describe_missing_extra
 from islands.errors import SettingsError, lookup
 from islands.evolution.engine import Engine, SerialEngine
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.progress import ProgressCallback, ignore_progress
 
 #: Entry point group of the factories of engines.
 GROUP = "islands.engines"

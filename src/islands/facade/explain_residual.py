@@ -11,11 +11,11 @@ from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
 from islands.evolution.engine import Engine
-from islands.evolution.progress import ProgressCallback, Stop, ignore_progress, never_stop
 from islands.evolution.search_state import SearchState
 from islands.facade.engine_choice import Ray
 from islands.facade.identify import SearchCallback, identify
 from islands.model.equations import named_equation
+from islands.progress import ProgressCallback, Stop, ignore_progress, never_stop
 from islands.simulation.predictors import free_run
 
 #: Name of this step of a diagnosis.

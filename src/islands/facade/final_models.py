@@ -14,15 +14,15 @@ from islands.estimation.estimators import estimate_with
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import refine
 from islands.estimation.structure_selection.deviations import Offsets, estimate_deviations, subtract_offsets
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.fitness import FITNESSES
-from islands.evolution.gp.individual import Individual, unique_structures
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.fitness import FITNESSES
 from islands.evolution.hall_of_fame import HallOfFame
+from islands.evolution.individual import Individual, unique_structures
 from islands.evolution.problem import Problem
-from islands.evolution.progress import Steps
 from islands.evolution.search_result import rank_models
 from islands.evolution.settings import Settings
 from islands.model.model import Model
+from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.assessment import Assessment, assess

@@ -9,18 +9,18 @@ from numpy.typing import ArrayLike
 from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
-from islands.evolution.progress import (
-    ProgressCallback,
-    Stop,
-    ignore_progress,
-    never_stop,
-)
 from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.library_fit import FitSettings
 from islands.facade.results.result import Result
 from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
+from islands.progress import (
+    ProgressCallback,
+    Stop,
+    ignore_progress,
+    never_stop,
+)
 
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries

@@ -25,14 +25,6 @@ from islands.evolution.engine import Engine
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.presets import AUTO, resolve_kind, resolve_settings, with_tuples
 from islands.evolution.problem import Problem, make_problem
-from islands.evolution.progress import (
-    ProgressCallback,
-    Steps,
-    Stop,
-    StoppedError,
-    ignore_progress,
-    never_stop,
-)
 from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
@@ -52,6 +44,14 @@ from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set
 from islands.program.primitive_functions import row_address
+from islands.progress import (
+    ProgressCallback,
+    Steps,
+    Stop,
+    StoppedError,
+    ignore_progress,
+    never_stop,
+)
 
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries

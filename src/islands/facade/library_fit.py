@@ -28,9 +28,7 @@ from islands.estimation.structure_selection.deviations import (
     no_offsets,
     subtract_offsets,
 )
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.generation.swap_search import swap_search
-from islands.evolution.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
+from islands.evolution.evaluation import Evaluator
 from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
@@ -39,6 +37,7 @@ from islands.evolution.search_result import (
     with_bands,
 )
 from islands.evolution.settings import Settings
+from islands.evolution.swap_search import swap_search
 from islands.facade.final_models import screen
 from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.trials.feedthrough_selection import select_feedthrough
@@ -46,6 +45,7 @@ from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.rate_selection import select_rate
 from islands.model.candidate_library import full_set
 from islands.model.regressor import Regressor
+from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import Assessment, assess
 from islands.validation.ensemble import ValidatedModel

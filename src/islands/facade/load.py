@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 from islands.errors import ModelError
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
-from islands.facade.coupled.coupled_result import FittedCoupledModel
+from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.result import Result
 from islands.facade.results.saved_result import read_result

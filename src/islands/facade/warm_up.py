@@ -17,7 +17,7 @@ from islands.data.dataset import Dataset
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
 from islands.estimation.structure_selection.certificate import certify
-from islands.evolution.generation.evaluation import Evaluator, Limits
+from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.presets import resolve_settings
 from islands.expressions.tree import Lagged
 from islands.facade.fit import fit

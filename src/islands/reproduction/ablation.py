@@ -29,7 +29,7 @@ class Switch:
     changes : mapping
         Settings that differ from the preset ``paper-case1``.
     root_rule : bool
-        See `islands.evolution.generation.evaluation.Evaluator`.
+        See `islands.evolution.evaluation.Evaluator`.
     """
 
     text: str

@@ -20,13 +20,13 @@ from scipy import stats
 from islands.data.dataset import Dataset
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.gp.individual import Individual
+from islands.evolution.individual import Individual
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import make_problem
-from islands.evolution.progress import never_stop
 from islands.figures.monte_carlo import MonteCarloGroup, ScanLine, draw_groups, draw_scan
 from islands.model.equations import equation
 from islands.model.model import Model
+from islands.progress import never_stop
 from islands.reproduction.section import WHY, ComparisonTable, Section, SectionFigure
 from islands.reproduction.tasks import Document, ReproductionOptions, Task
 from islands.simulation.predictors import Simulation, free_run, one_step_ahead

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from islands.data.dataset import Dataset
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.individual import Individual
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import Individual
 from islands.evolution.island import Island, first_generation, step
 from islands.evolution.presets import resolve_settings, with_tuples
 from islands.expressions.parsing import parse

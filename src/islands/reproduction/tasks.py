@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import islands
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.distribution import read_version
 from islands.errors import SettingsError
-from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.io.checkpoints.writing import replace_file
+from islands.parallel import ParallelMap
+from islands.progress import ProgressCallback, ignore_progress
 
 #: Result of a task as a JSON document.
 Document = dict[str, Any]

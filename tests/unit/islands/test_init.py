@@ -4,9 +4,9 @@ import inspect
 from collections import defaultdict
 
 import islands
-from islands.evolution.progress import ProgressCallback
 from islands.facade.fit import fit
 from islands.facade.identify import SearchCallback, identify
+from islands.progress import ProgressCallback
 from support.repository import ROOT
 
 

@@ -12,14 +12,14 @@ import typer
 from rich.table import Table
 
 from islands.errors import IslandsError
-from islands.evolution.progress import ProgressCallback
 from islands.performance.benchmark.report import BenchmarkReport, check_goals, to_document
 from islands.performance.benchmark.run import measure
 from islands.performance.benchmark.scaling import save_scalings
+from islands.progress import ProgressCallback
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_service.process.blocked_signals import block_sigint
-from islands_service.process.process_settings import THREADS
+from islands_service.process.settings import THREADS
 
 
 def bench(

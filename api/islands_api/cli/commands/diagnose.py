@@ -22,7 +22,6 @@ from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.interim_findings import InterimFindings
 from islands.discrepancy.planning.experiment_plan import plan_experiment
 from islands.errors import SettingsError
-from islands.evolution.progress import Steps, StoppedError
 from islands.facade.explain_residual import FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, REPORT_FILE, DiagnosisResult
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
@@ -30,13 +29,14 @@ from islands.io.result_text.diagnosis_text import summarise_self_test
 from islands.io.result_text.text_layout import wrap
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import ColumnSpec, innermost, parse_spec
+from islands.progress import Steps, StoppedError
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings
 from islands_api.cli.runs.diagnosis_fits import explain_continuation, keep_fits, say_to_continue, write_fits
-from islands_api.cli.runs.plan_run import (
+from islands_api.cli.runs.plan import (
     PLAN,
     PlanOptions,
     read_input,
@@ -45,7 +45,7 @@ from islands_api.cli.runs.plan_run import (
     write_plan,
 )
 from islands_api.cli.stop_requests import REPEAT, StopRequests, stop_requests
-from islands_service.process.process_pool import process_pool
+from islands_service.process.pool import process_pool
 
 #: Name of a step without which a diagnosis is complete.
 SELF_TEST = "self-test"

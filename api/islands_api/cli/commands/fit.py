@@ -14,16 +14,16 @@ from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.progress import Steps
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.model.candidate_library import LIBRARIES
+from islands.progress import Steps
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, progress
 from islands_api.cli.output_folder import check_folder, show_result
 from islands_api.cli.preprocessing_options import with_preprocessing_options
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings, measured_names
-from islands_api.cli.runs.coupled_run import couple_data, coupled_options, join_columns, keep_coupled
+from islands_api.cli.runs.coupled import couple_data, coupled_options, join_columns, keep_coupled
 from islands_api.cli.stop_requests import REPEAT, stop_requests
 
 #: Default library for several outputs.

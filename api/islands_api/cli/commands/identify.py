@@ -16,8 +16,8 @@ from islands_api.cli.output_folder import check_folder
 from islands_api.cli.preprocessing_options import with_preprocessing_options
 from islands_api.cli.record_options import with_reading_options
 from islands_api.cli.recordings import Recordings, measured_names
-from islands_api.cli.runs.coupled_run import couple_data, identify_several, join_columns
-from islands_api.cli.runs.identify_run import RunOptions, load_run, run
+from islands_api.cli.runs.coupled import couple_data, identify_several, join_columns
+from islands_api.cli.runs.identify import RunOptions, load_run, run
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, with_search_options
 from islands_service.engines import ENGINES
 

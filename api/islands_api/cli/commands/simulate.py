@@ -15,7 +15,7 @@ from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import DETREND
 from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
-from islands.facade.coupled.coupled_result import FittedCoupledModel
+from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.load import load
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.model_simulation import SHOOTING

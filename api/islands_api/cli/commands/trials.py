@@ -14,7 +14,6 @@ import typer
 from rich.table import Table
 
 from islands.errors import SettingsError, lookup
-from islands.evolution.progress import Steps, StoppedError
 from islands.figures.confusion import draw_confusion
 from islands.figures.style import save
 from islands.performance.trials.cases import CASES, SimulatedCase
@@ -28,6 +27,7 @@ from islands.performance.trials.scoring import (
     score,
 )
 from islands.performance.trials.trial import Trial, TrialOutcome, run_trial
+from islands.progress import Steps, StoppedError
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.stop_requests import stop_requests
 

@@ -6,7 +6,7 @@ from time import monotonic
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, Engine
 from islands.evolution.problem import Problem
-from islands.evolution.progress import Stop
+from islands.progress import Stop
 
 
 class TimedEngine:

@@ -14,7 +14,7 @@ from islands.discrepancy.calibration.starts_calibrator import (
     StartsCalibrator,
 )
 from islands.discrepancy.interfaces.effect import Signal
-from islands.discrepancy.interfaces.parallel import ParallelMap, intercepted_map
+from islands.parallel import ParallelMap, intercepted_map
 
 
 @dataclass(frozen=True, slots=True, eq=False)

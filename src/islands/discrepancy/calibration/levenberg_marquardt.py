@@ -6,17 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.discrepancy.calibration.calibration_problem import (
-    CalibrationProblem,
-    FittedPoint,
-    Simulated,
-    simulate_together,
-)
 from islands.discrepancy.calibration.noise_model import (
     NoiseModel,
     fit_noise,
     fit_whitening,
     white_noise,
+)
+from islands.discrepancy.calibration.problem import (
+    CalibrationProblem,
+    FittedPoint,
+    Simulated,
+    simulate_together,
 )
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.effect import Signal

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from islands.discrepancy.calibration.calibration_problem import DIFFERENCE_STEP
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, prior_precision
+from islands.discrepancy.calibration.problem import DIFFERENCE_STEP
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.effect import Signal
 

@@ -18,8 +18,8 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
 )
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.interfaces.effect import Signal
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.parallel import ParallelMap
 
 #: Iterations of each start of a rough calibration, if the residual is noise and if it is model error, which
 #: causes many minima: the first iterations do not show which is the best.

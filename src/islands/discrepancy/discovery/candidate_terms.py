@@ -16,7 +16,7 @@ from islands.expressions.parsing import parse_expression
 from islands.expressions.printing import render
 from islands.expressions.tree import FMU, Apply, Expression, Symbol, find_symbols, substitute
 from islands.systems.ode.equation_parser import TIME
-from islands.systems.ode.ode_system import OUTPUT, OdeSystem
+from islands.systems.ode.system import OUTPUT, OdeSystem
 from islands.systems.ode.system_parts import OdeParameter
 
 #: Functions of one signal ``a``.

@@ -12,7 +12,7 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import ResampledSimulator
 from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.discrepancy.simulators.output_equation import OutputEquation
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.system import OdeSystem
 
 
 def find_equations(simulator: Simulator) -> OdeSimulator | OutputEquation | None:

@@ -29,7 +29,7 @@ from islands.discrepancy.inference.strategies import SearchOutcome, assess_evide
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
-from islands.evolution.progress import ignore_progress
+from islands.progress import ignore_progress
 
 #: Fraction of the misfit that free forms explain, from which named effects are claimed. A form of the
 #: catalogue is an idealisation, such as a smoothed sign for dry friction.

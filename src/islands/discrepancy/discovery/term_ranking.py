@@ -12,7 +12,7 @@ from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.discovery.candidate_terms import CandidateTerm, find_free_numbers
 from islands.discrepancy.discovery.equation_simulator import add_terms, find_used_names, get_system
 from islands.discrepancy.interfaces.context import Signal
-from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.parallel import ParallelMap
 
 #: Number of terms whose responses are simulated in one call. The equations of every lane contain all of them:
 #: more terms in a call save nothing.

@@ -36,8 +36,8 @@ from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.expressions.printing import render
-from islands.systems.ode.ode_system import OUTPUT, OdeSystem
 from islands.systems.ode.output_system import SYMBOL_MEANINGS
+from islands.systems.ode.system import OUTPUT, OdeSystem
 
 #: Maximum number of terms.
 MAX_TERMS = 3

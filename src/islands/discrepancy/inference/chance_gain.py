@@ -10,8 +10,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from islands.discrepancy.calibration.calibration_problem import DIFFERENCE_STEP
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.calibration.problem import DIFFERENCE_STEP
 from islands.discrepancy.calibration.projection import Projection
 from islands.discrepancy.calibration.target import Target
 from islands.discrepancy.effects import catalogue_order

@@ -18,7 +18,7 @@ from islands.discrepancy.inference.screening import (
 )
 from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.parallel import ParallelMap
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,7 +21,7 @@ from islands.discrepancy.inference.hypothesis import (
 from islands.discrepancy.inference.screening import SCORE_TIE, ScreenedEffect
 from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.parallel import ParallelMap
 
 #: Minimum score gain of an effect, in minus twice the log-likelihood: six is a likelihood ratio of twenty.
 MIN_GAIN = 6.0

@@ -41,7 +41,7 @@ from islands.discrepancy.inference.verdict import (
 )
 from islands.discrepancy.interfaces.diagnosis_run import DiagnosisRun
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import memoised_map
+from islands.parallel import memoised_map
 
 #: Fraction of the misfit that some single effect has to explain before pairs are searched for; no effect
 #: explains as much of noise.

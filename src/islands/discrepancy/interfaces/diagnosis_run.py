@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.parallel import ParallelMap
+from islands.progress import ProgressCallback, ignore_progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)

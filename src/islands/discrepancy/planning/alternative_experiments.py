@@ -12,7 +12,6 @@ import numpy as np
 
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.coordinates import peak_amplitude
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.planning.experiment import Experiment, MeasuredChannel
 from islands.discrepancy.planning.pair_separation import CausePair, PairSeparation, separate_pairs
 from islands.discrepancy.planning.planned_input import (
@@ -26,6 +25,7 @@ from islands.discrepancy.planning.planned_input import (
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.ode import OdeSimulator
 from islands.expressions.tree import Symbol
+from islands.parallel import ParallelMap
 
 #: Factors of the duration of a record.
 LENGTH_FACTORS = (2, 4, 8)

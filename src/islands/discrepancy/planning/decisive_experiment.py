@@ -7,7 +7,6 @@ import numpy as np
 import scipy
 
 from islands.discrepancy.interfaces.context import Signal
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.planning.experiment import Experiment
 from islands.discrepancy.planning.pair_separation import CausePair, PairSeparation, separate_pairs
 from islands.discrepancy.planning.planned_input import (
@@ -17,7 +16,8 @@ from islands.discrepancy.planning.planned_input import (
     InputLimits,
     PlannedInput,
 )
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.parallel import ParallelMap
+from islands.progress import ProgressCallback, ignore_progress
 
 #: Forms of the input that are optimised.
 FORMS = (InputForm.MULTISINE, InputForm.STEPS)

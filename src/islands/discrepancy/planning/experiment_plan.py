@@ -14,7 +14,6 @@ from islands.discrepancy.calibration.preparation import (
 )
 from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator, get_tolerances
 from islands.discrepancy.planning.alternative_experiments import AlternativeExperiment, compare_alternatives
 from islands.discrepancy.planning.channel_noise import ChannelNoise
@@ -25,7 +24,8 @@ from islands.discrepancy.planning.pair_separation import CausePair
 from islands.discrepancy.planning.planned_input import find_limits
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.errors import SettingsError, lookup
-from islands.evolution.progress import ProgressCallback, StoppedError, ignore_progress
+from islands.parallel import ParallelMap
+from islands.progress import ProgressCallback, StoppedError, ignore_progress
 
 #: Maximum number of pairs that an experiment is optimised for, if none is given.
 MAX_PAIRS = 8

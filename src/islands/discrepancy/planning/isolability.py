@@ -15,13 +15,13 @@ from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
 
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.planning.cause import Cause, CauseScale
 from islands.discrepancy.planning.experiment import Experiment
 from islands.discrepancy.planning.noise_free_fit import NoiseFreeFit, fit_noise_free
 from islands.discrepancy.planning.response_dictionary import ResponseDictionary
 from islands.discrepancy.planning.separation import require_detection, require_separation
-from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.parallel import ParallelMap
+from islands.progress import ProgressCallback, ignore_progress
 
 #: Misfit in standard deviations of the noise at which expected ratios are reported.
 REFERENCE_MISFIT = 1.0

@@ -13,7 +13,7 @@ from operator import attrgetter
 import numpy as np
 import scipy
 
-from islands.discrepancy.calibration.calibration_problem import DIFFERENCE_STEP
+from islands.discrepancy.calibration.problem import DIFFERENCE_STEP
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.planning.experiment import ExperimentModel
 

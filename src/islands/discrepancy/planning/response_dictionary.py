@@ -5,7 +5,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from islands.discrepancy.calibration.calibration_problem import DIFFERENCE_STEP
+from islands.discrepancy.calibration.problem import DIFFERENCE_STEP
 from islands.discrepancy.inference.screening import MAX_SCALING, get_starting_points
 from islands.discrepancy.interfaces.context import Signal
 from islands.discrepancy.interfaces.effect import Effect

@@ -17,9 +17,9 @@ from islands.discrepancy.simulators.shooting import smooth
 from islands.errors import RecordError
 from islands.systems.ode.lane_simulation import simulate_lanes
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_program import generate_program
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.program import generate_program
 from islands.systems.ode.sampled_signal import interpolate_linearly
+from islands.systems.ode.system import OdeSystem
 from islands.systems.second_order import estimate_second_order
 
 #: Trial values of the time in which the lower tank empties, relative to the duration of the record.

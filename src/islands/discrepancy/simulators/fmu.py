@@ -21,8 +21,8 @@ from islands.systems.fmu.instance import FmuRun, load_fmu
 from islands.systems.fmu.model import FmuModel
 from islands.systems.fmu.simulation import simulate_fmu
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_program import OdeProgram, generate_program
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.program import OdeProgram, generate_program
+from islands.systems.ode.system import OdeSystem
 
 #: Numbers of steps of the integrator per sample that are tried until a nominal simulation does not diverge.
 STEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256)

@@ -27,9 +27,9 @@ from islands.expressions.tree import Expression, Symbol
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.lane_simulation import simulate_lanes
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_program import OdeProgram, generate_program
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.program import OdeProgram, generate_program
 from islands.systems.ode.sampled_signal import SampledSignal, interpolate_linearly, make_time
+from islands.systems.ode.system import OdeSystem
 from islands.systems.ode.system_parts import OdeEffect, OdeParameter
 
 #: Name of the factor of the parameter that is the gain; no name in equations has brackets.

@@ -20,7 +20,7 @@ from islands.expressions.primitives import ADD
 from islands.expressions.tree import Apply, Expression, Symbol, substitute
 from islands.systems.mechanics import WIDTH
 from islands.systems.ode.equation_parser import FORCE
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.system import OdeSystem
 from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeParameter
 
 #: Effects of the catalogue that a term can describe.

@@ -12,7 +12,7 @@ from islands.discrepancy.simulators.record_channels import find_channel, make_no
 from islands.discrepancy.simulators.shooting import make_shots
 from islands.errors import RecordError
 from islands.expressions.tree import Symbol
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.system import OdeSystem
 from islands.systems.ode.system_document import MAX_STEPS
 from islands.systems.ode.system_parts import OdeState
 

@@ -17,8 +17,8 @@ from islands.discrepancy.simulators.intersample import SimulatorWrapper
 from islands.discrepancy.simulators.ode import make_parameter
 from islands.expressions.evaluation import evaluate
 from islands.systems.ode.equation_parser import TIME
-from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.output_system import INPUT, SIMULATED, make_output_system
+from islands.systems.ode.system import OdeSystem
 
 #: Rate of the input in the equation, by central differences.
 RATE = f"rate({INPUT})"

@@ -18,8 +18,8 @@ from islands.errors import RecordError
 from islands.expressions.tree import Symbol
 from islands.systems.ode.interval_simulation import IntervalSimulation
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_program import OdeProgram
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.program import OdeProgram
+from islands.systems.ode.system import OdeSystem
 
 #: Smallest number of samples in a shooting interval.
 MIN_SAMPLES = 20

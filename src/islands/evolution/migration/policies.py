@@ -8,9 +8,9 @@ from math import isfinite
 from types import MappingProxyType
 from typing import TypeVar
 
-from islands.evolution.gp.individual import Population, unique_structures
-from islands.evolution.gp.rng import Stream
 from islands.evolution.hall_of_fame import pareto_front
+from islands.evolution.individual import Population, unique_structures
+from islands.evolution.rng import Stream
 
 T = TypeVar("T")
 

@@ -11,7 +11,7 @@ from math import isqrt
 from types import MappingProxyType
 
 from islands.errors import SettingsError, lookup
-from islands.evolution.gp.rng import Purpose, Stream
+from islands.evolution.rng import Purpose, Stream
 
 #: In-neighbours of every island.
 Sources = list[set[int]]

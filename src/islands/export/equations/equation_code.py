@@ -23,8 +23,8 @@ from islands.expressions.tree import (
     substitute,
 )
 from islands.systems.ode.equation_parser import TIME
-from islands.systems.ode.ode_system import sort_variables
 from islands.systems.ode.output_system import SIMULATED
+from islands.systems.ode.system import sort_variables
 
 #: Functions that are not functions of every language, and the names of their definitions in programs.
 DEFINED = {

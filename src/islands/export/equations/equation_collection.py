@@ -35,7 +35,7 @@ from islands.expressions.tree import Apply, Constant, Expression, Primitive, Sym
 from islands.io.simulator_spec.document import read_scales
 from islands.io.simulator_spec.spec_base import EffectSpec
 from islands.io.simulator_spec.specification import ExtendedSpec
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.system import OdeSystem
 from islands.systems.ode.system_parts import OdeEffect
 
 #: Signal that is the factor of the gain; no name in equations has brackets.

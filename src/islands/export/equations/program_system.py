@@ -10,7 +10,7 @@ from islands.expressions.tree import Apply, Constant, Expression, Symbol
 from islands.io.simulator_spec.ode_spec import OdeSpec, read_built_in
 from islands.io.simulator_spec.specification import SIMULATORS, ExtendedSpec, PhysicalSpec
 from islands.systems.ode.equation_parser import FORCE
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.system import OdeSystem
 
 
 def refuse(what: str) -> ModelError:

@@ -14,8 +14,8 @@ from islands.io.models import model_from_json
 from islands.io.simulator_spec.specification import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
 from islands.model.equations import equation
 from islands.model.model import measured_model
-from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.output_system import INPUT, SIMULATED, make_output_system
+from islands.systems.ode.system import OdeSystem
 
 #: Names of the columns that a program reads besides the input: the measured and a simulated output.
 MEASURED, RECORDED = "y_measured", "simulated"

@@ -13,11 +13,11 @@ from typing import Any
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.progress import Steps, StoppedError
 from islands.evolution.search_result import SearchResult
 from islands.facade.automatic.kind_trials import NO_DEAD_TIME, ROUNDING, KindTrials, percent, try_kinds
 from islands.facade.trials.library import TrialLibrary
 from islands.inspection.rest import check_rest
+from islands.progress import Steps, StoppedError
 from islands.validation.assessment import Assessment
 from islands.validation.recommendation import recommend
 

@@ -10,10 +10,10 @@ from types import MappingProxyType
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
-from islands.evolution.progress import Steps
 from islands.facade.trials.held_out_error import hold_out, measure_library
 from islands.facade.trials.library import TrialLibrary
 from islands.inspection.dead_time import estimate_dead_time
+from islands.progress import Steps
 
 #: Kinds up to this factor of the least error are compared with larger models.
 PROMISING = 3.0

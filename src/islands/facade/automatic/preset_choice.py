@@ -10,11 +10,11 @@ from islands.data.split import Split, split_data
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_delays import check_delays
 from islands.evolution.presets import AUTO, resolve_kinds, with_tuples
-from islands.evolution.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.evolution.search_result import SearchResult
 from islands.facade.automatic.kind_choice import Choice, choose_kind
 from islands.facade.library_fit import FitSettings, fit_library
 from islands.facade.trials.library import make_trial_library, take_library
+from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 
 
 def choose_preset(

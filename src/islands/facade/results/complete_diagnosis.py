@@ -12,13 +12,13 @@ from islands.discrepancy.detectability import SelfTest
 from islands.discrepancy.diagnosis_result import Diagnosis
 from islands.discrepancy.findings import ResidualFormula
 from islands.errors import ModelError, lookup
-from islands.evolution.progress import Steps
 from islands.facade.results.notebook_html import render_sentences
 from islands.facade.results.saved_simulation import SavedSimulation
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.result_text.diagnosis_text import summarise_diagnosis
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.specification import EXTENDED_FILE, LocalExtendedSpec
+from islands.progress import Steps
 from islands.simulation.predictors import Simulation
 
 if TYPE_CHECKING:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import ModelError, SettingsError
-from islands.evolution.progress import Steps
 from islands.evolution.search_result import SearchResult
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
@@ -20,6 +19,7 @@ from islands.facade.results.result_comparison import ResultComparison, compare_m
 from islands.io.result_folder import content_sha256, write_result
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.summary_text import summary
+from islands.progress import Steps
 from islands.simulation.predictors import Simulation
 from islands.validation.recommendation import Recommendation
 

@@ -20,11 +20,11 @@ from islands.estimation.structure_selection.deviations import (
     no_offsets,
     subtract_offsets,
 )
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.generation.swap_search import swap_search
-from islands.evolution.progress import Steps, StoppedError
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.swap_search import swap_search
 from islands.facade.trials.library import TrialLibrary
 from islands.model.regressor import Regressor
+from islands.progress import Steps, StoppedError
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
 

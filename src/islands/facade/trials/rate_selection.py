@@ -25,10 +25,10 @@ from islands.estimation.structure_selection.deviations import (
     no_offsets,
     subtract_offsets,
 )
-from islands.evolution.progress import Steps
 from islands.facade.trials.library import TrialLibrary
 from islands.inspection.oversampling import COUNTS, is_noisy, keeps_bandwidth
 from islands.model.model import Model
+from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, free_run
 

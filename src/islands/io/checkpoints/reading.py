@@ -10,8 +10,8 @@ from typing import Any, TextIO
 
 from islands.errors import ModelError
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.gp.individual import Individual
 from islands.evolution.hall_of_fame import HallOfFame
+from islands.evolution.individual import Individual
 from islands.evolution.island import Island
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES

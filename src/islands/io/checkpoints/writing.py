@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.gp.individual import Individual
 from islands.evolution.hall_of_fame import HallOfFame
+from islands.evolution.individual import Individual
 from islands.evolution.island import Island
 from islands.expressions.printing import plain
 

@@ -19,7 +19,7 @@ from islands.systems.fmu.fmi_description import read_description
 from islands.systems.fmu.model import FmuModel, FmuParameterChoice, choose_variables
 from islands.systems.fmu.system import make_fmu_system, render_extension
 from islands.systems.ode.equation_parser import MAX_CHARACTERS
-from islands.systems.ode.ode_system import OdeSystem
+from islands.systems.ode.system import OdeSystem
 from islands.systems.ode.system_document import MAX_PARAMETERS, describe_system, make_force, make_parameter
 
 _Name = Annotated[str, Field(min_length=1, max_length=500)]

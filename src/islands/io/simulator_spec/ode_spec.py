@@ -13,8 +13,8 @@ from pydantic_core import PydanticCustomError
 from islands.errors import ModelError, SettingsError
 from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
 from islands.systems.ode.equation_parser import MAX_CHARACTERS
-from islands.systems.ode.ode_system import OdeSystem
 from islands.systems.ode.output_system import make_output_system
+from islands.systems.ode.system import OdeSystem
 from islands.systems.ode.system_document import (
     MAX_PARAMETERS,
     MAX_STATES,

@@ -7,8 +7,8 @@ from functools import partial
 from multiprocessing import get_context
 
 from islands.data.dataset import Dataset
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.individual import Individual, Population
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import Individual, Population
 from islands.evolution.island import first_generation, step
 from islands.evolution.settings import Settings
 from islands.performance.benchmark import kernel_evaluator

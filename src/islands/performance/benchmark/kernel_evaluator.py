@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.gene_index import GeneIndex
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.gene_index import GeneIndex
 from islands.expressions.tree import Lagged
 from islands.kernels.err_selection import OUTPUT
 from islands.kernels.gram import gram

@@ -6,7 +6,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from islands.data.dataset import Dataset
-from islands.evolution.progress import ProgressCallback
 from islands.performance.benchmark import kernel_evaluator
 from islands.performance.benchmark.clock import refuse_threads
 from islands.performance.benchmark.comparison import Comparison, compare
@@ -27,6 +26,7 @@ from islands.performance.benchmark.workload import (
     fingerprint,
     workload,
 )
+from islands.progress import ProgressCallback
 
 
 @dataclass(frozen=True, slots=True)

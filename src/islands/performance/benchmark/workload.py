@@ -12,8 +12,8 @@ from math import isfinite
 
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.individual import Individual, Population
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import Individual, Population
 from islands.evolution.island import first_generation, step
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings

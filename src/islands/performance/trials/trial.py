@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.discovery.discovery import MISSING_TERM
+from islands.discrepancy.discovery.missing_terms import MISSING_TERM
 from islands.discrepancy.effects import CATALOGUE, model_form
 from islands.discrepancy.effects.free_forms import FREE_FORMS
 from islands.discrepancy.interfaces.simulator import Simulator

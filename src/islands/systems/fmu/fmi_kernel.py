@@ -22,8 +22,8 @@ from islands.systems.fmu.fmi_calls import (
     set_time,
     update_discrete_states,
 )
+from islands.systems.ode.kernel import execute_code
 from islands.systems.ode.kernel_arguments import LANES, Instructions, LaneForces, LaneLimits
-from islands.systems.ode.ode_kernel import execute_code
 
 
 class FmuEquations(NamedTuple):

@@ -9,7 +9,7 @@ from typing import TypeVar
 from islands.errors import SettingsError, suggest
 from islands.systems.fmu.fmi_description import FmiDescription, FmiInterface, FmiVariable
 from islands.systems.ode.equation_parser import is_free_name
-from islands.systems.ode.ode_system import OUTPUT
+from islands.systems.ode.system import OUTPUT
 
 T = TypeVar("T")
 

@@ -11,7 +11,7 @@ from islands.systems.fmu.model import FmuModel
 from islands.systems.ode.kernel_arguments import LANES
 from islands.systems.ode.lane_simulation import pack_signals
 from islands.systems.ode.lane_values import LaneInput, LaneValues
-from islands.systems.ode.ode_program import OdeProgram
+from islands.systems.ode.program import OdeProgram
 
 
 def simulate_fmu(

@@ -12,7 +12,7 @@ from islands.expressions.printing import render
 from islands.expressions.tree import FMU, Apply, Expression, Symbol, find_symbols, walk
 from islands.systems.fmu.model import FmuModel
 from islands.systems.ode.equation_parser import FORCE, Equation, parse_equations
-from islands.systems.ode.ode_system import OUTPUT, OdeSystem, check_symbols, sort_variables
+from islands.systems.ode.system import OUTPUT, OdeSystem, check_symbols, sort_variables
 from islands.systems.ode.system_parts import OdeForce, OdeParameter, OdeState
 
 

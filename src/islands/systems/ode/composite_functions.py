@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from math import factorial
 
 from islands.kernels.interpreter import ADD, MULTIPLY, SUBTRACT
-from islands.systems.ode import ode_kernel
+from islands.systems.ode import kernel as ode_kernel
 
 #: Sixth convergent of Lambert's continued fraction of tanh: coefficients of its numerator and denominator, in
 #: powers of the square of the argument.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from islands.systems.ode.kernel_arguments import LANES, MANY_LANES, LaneRestarts, LaneSignals
 from islands.systems.ode.lane_simulation import count_samples, integrate_group, list_signals
 from islands.systems.ode.lane_values import LaneInput, LaneValues
-from islands.systems.ode.ode_program import OdeProgram
+from islands.systems.ode.program import OdeProgram
 from islands.systems.ode.sampled_signal import SampledSignal, Signal, chain_signals
 
 #: Time of a call of the kernel, in intervals of `LANES` lanes.

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.expressions.tree import Apply, Constant, Expression, Primitive, Symbol
+from islands.systems.ode.kernel import integrate
 from islands.systems.ode.kernel_arguments import LANES, LaneRestarts, LaneSignals
 from islands.systems.ode.lane_values import LaneInput, LaneValues
-from islands.systems.ode.native.native_code import find_native_code
-from islands.systems.ode.ode_kernel import integrate
-from islands.systems.ode.ode_program import OdeProgram
+from islands.systems.ode.native.code import find_native_code
+from islands.systems.ode.program import OdeProgram
 from islands.systems.ode.sampled_signal import SampledSignal, chain_signals, stack_signals
 
 _NO_RESTARTS = LaneRestarts(np.empty(0, dtype=np.int64), np.empty((0, 0)))

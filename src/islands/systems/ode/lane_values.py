@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from islands.kernels.simd import padded_size
 from islands.systems.mechanics import WIDTH, Elements
 from islands.systems.ode.kernel_arguments import LaneForces, LaneLimits
-from islands.systems.ode.ode_program import OdeProgram
+from islands.systems.ode.program import OdeProgram
 from islands.systems.ode.sampled_signal import SampledSignal
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from islands.expressions.parsing import parse_expression
-from islands.systems.ode.ode_system import OdeSystem, check_symbols
+from islands.systems.ode.system import OdeSystem, check_symbols
 from islands.systems.ode.system_document import make_parameter
 
 #: Names in the equation: the input, and the output of the simulation.

@@ -11,7 +11,7 @@ from islands.expressions.parsing import parse_expression
 from islands.expressions.printing import render
 from islands.expressions.tree import Symbol, find_symbols
 from islands.systems.ode.equation_parser import Equation, check_name, parse_equations
-from islands.systems.ode.ode_system import OUTPUT, OdeSystem, check_symbols, sort_variables
+from islands.systems.ode.system import OUTPUT, OdeSystem, check_symbols, sort_variables
 from islands.systems.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeForce, OdeParameter, OdeState
 
 #: Largest number of states.

@@ -8,9 +8,9 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.forward_selection import forward_selection
-from islands.evolution.gp.gene_structure import with_phi
-from islands.evolution.gp.individual import make_regressor
-from islands.evolution.gp.island_profiles import ISLAND_PROFILES
+from islands.evolution.gene_structure import with_phi
+from islands.evolution.individual import make_regressor
+from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.problem import Problem, make_problem
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse

@@ -3,7 +3,7 @@
 import pytest
 
 from islands import fit
-from islands.evolution.progress import StoppedError
+from islands.progress import StoppedError
 from islands.systems.catalogue import make_record
 
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 import islands
-from islands.facade.coupled.coupled_result import FittedCoupledModel
+from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
 from islands.io.models import write_model
 from islands.io.records import write_record

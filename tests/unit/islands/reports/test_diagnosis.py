@@ -10,7 +10,7 @@ import scipy
 import islands
 from islands.discrepancy.detectability import SelfTest, estimate_rate
 from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.discovery.discovery import Discovery
+from islands.discrepancy.discovery.missing_terms import Discovery
 from islands.discrepancy.inference.finding import Value
 from islands.discrepancy.inference.verdict import Verdict
 from islands.io.result_text.diagnosis_text import summarise_diagnosis, summarise_self_test

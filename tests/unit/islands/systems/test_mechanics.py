@@ -14,7 +14,7 @@ from islands.systems.mechanics import WIDTH, Elements, compile_law, integrate_al
 from islands.systems.ode.interval_simulation import IntervalSimulation
 from islands.systems.ode.lane_simulation import simulate_lanes
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_program import generate_program
+from islands.systems.ode.program import generate_program
 from islands.systems.ode.sampled_signal import SampledSignal
 from islands.systems.ode.system_document import make_system
 

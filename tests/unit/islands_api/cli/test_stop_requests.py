@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from islands.evolution.progress import StoppedError
+from islands.progress import StoppedError
 from islands_api.cli.stop_requests import Terminated, raise_on_signals, stop_requests
 
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from islands.evolution.progress import StoppedError
+from islands.progress import StoppedError
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ import pytest
 
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.epoch import IslandEpoch
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.individual import Individual, make_regressor
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import Individual, make_regressor
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Apply, Lagged
 from islands_service.runtime import packed_epoch

@@ -13,9 +13,9 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.errors import SettingsError, lookup
-from islands.evolution.progress import Steps, StoppedError
+from islands.parallel import ParallelMap
+from islands.progress import Steps, StoppedError
 from islands.reproduction import appendix_a, case1, case2
 from islands.reproduction.page import write_reproduction
 from islands.reproduction.section import ComparisonTable, Section
@@ -24,7 +24,7 @@ from islands_api.cli.console import compile_kernels, errors, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.stop_requests import INTERRUPTED, TERMINATED, stop_requests
 from islands_service.engines import has_ray
-from islands_service.process.process_pool import process_pool
+from islands_service.process.pool import process_pool
 
 
 @dataclass(frozen=True, slots=True)

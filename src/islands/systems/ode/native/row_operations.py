@@ -6,7 +6,7 @@ from typing import Any
 from llvmlite import ir
 
 from islands.kernels.interpreter import ADD, MULTIPLY, SIGN, SUBTRACT
-from islands.systems.ode import ode_kernel
+from islands.systems.ode import kernel as ode_kernel
 
 _DOUBLE = ir.DoubleType()
 _PLACE = ir.IntType(32)
@@ -16,7 +16,7 @@ EXPONENTIAL = "numba_exp"
 
 
 class RowOperations:
-    """Operations on rows at the position of a builder; the instructions are those of `ode_kernel`.
+    """Operations on rows at the position of a builder; the instructions are those of `islands.systems.ode.kernel`.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from islands.discrepancy.interfaces.simulator import SimulationRun
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.output_equation import OutputEquation, add_output_equation
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
-from islands.systems.ode.ode_system import OUTPUT
+from islands.systems.ode.system import OUTPUT
 from islands.systems.ode.system_parts import OdeParameter
 
 DT = 0.1

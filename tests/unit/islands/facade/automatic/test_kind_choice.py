@@ -10,12 +10,12 @@ from islands.data.dataset import Dataset
 from islands.data.split import split
 from islands.errors import SettingsError
 from islands.evolution.presets import KINDS, resolve_kind, resolve_kinds
-from islands.evolution.progress import ignore_progress, never_stop
 from islands.facade.automatic.kind_choice import choice_from_document
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
 from islands.facade.library_fit import FitSettings
 from islands.facade.trials.held_out_error import hold_out, measure_library
 from islands.facade.trials.library import take_library
+from islands.progress import ignore_progress, never_stop
 from support.portfolio_records import KINDS as RECORDS
 
 #: Smallest search, for the settings of its result.

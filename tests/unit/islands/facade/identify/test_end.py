@@ -10,8 +10,8 @@ from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.history import HistoryPoint
 from islands.evolution.island import StepInfo
 from islands.evolution.presets import resolve_settings
-from islands.evolution.progress import StoppedError
 from islands.evolution.search_state import SearchState, advance, stop_reason
+from islands.progress import StoppedError
 from support.identifications import BUDGET, RecordingEngine, identify, record_states
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import first_generation, step
 from islands.evolution.problem import Problem
 from islands.performance.benchmark.full_runs import Run, run_in_processes, run_island

@@ -6,8 +6,8 @@ from math import isfinite
 import pytest
 
 from islands.errors import ModelError
-from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.individual import Individual
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import Individual
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Apply, Lagged, height
 from islands.model.model import Model

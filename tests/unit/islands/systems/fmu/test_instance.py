@@ -19,7 +19,7 @@ from islands.systems.fmu.model import FmuParameterChoice, choose_variables
 from islands.systems.fmu.simulation import simulate_fmu
 from islands.systems.fmu.system import make_fmu_system
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_program import generate_program
+from islands.systems.ode.program import generate_program
 from islands.systems.ode.sampled_signal import interpolate_linearly
 from support.oscillator_fmus import write_oscillator
 

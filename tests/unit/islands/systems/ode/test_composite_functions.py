@@ -7,7 +7,7 @@ import pytest
 
 from islands.systems.ode.lane_simulation import simulate_lanes
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_program import generate_program
+from islands.systems.ode.program import generate_program
 from islands.systems.ode.sampled_signal import interpolate_linearly
 from islands.systems.ode.system_document import make_system
 

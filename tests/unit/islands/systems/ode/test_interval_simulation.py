@@ -9,8 +9,8 @@ from islands.expressions.tree import Symbol
 from islands.systems.ode.interval_simulation import IntervalSimulation
 from islands.systems.ode.lane_simulation import simulate_lanes
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.native import native_code
-from islands.systems.ode.ode_program import OdeProgram, generate_program
+from islands.systems.ode.native import code as native_code
+from islands.systems.ode.program import OdeProgram, generate_program
 from islands.systems.ode.sampled_signal import SampledSignal, make_time
 from islands.systems.ode.system_document import make_system
 

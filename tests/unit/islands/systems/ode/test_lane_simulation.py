@@ -12,9 +12,9 @@ from islands.expressions.evaluation import evaluate
 from islands.expressions.tree import Symbol
 from islands.systems.ode.lane_simulation import simulate_lanes
 from islands.systems.ode.lane_values import LaneInput
-from islands.systems.ode.ode_program import generate_program
-from islands.systems.ode.ode_system import OdeSystem, sort_variables
+from islands.systems.ode.program import generate_program
 from islands.systems.ode.sampled_signal import SampledSignal, interpolate_linearly, make_time
+from islands.systems.ode.system import OdeSystem, sort_variables
 from islands.systems.ode.system_document import make_system
 
 Array = NDArray[np.float64]

@@ -11,9 +11,9 @@ from islands.discrepancy.calibration.fit_journal import FitJournal
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.screening import StartFinder
-from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.io.diagnosis_json import as_json, diagnosis_document
+from islands.parallel import ParallelMap
 from islands_api.cli.runs.diagnosis_fits import CONTINUE, FITS, explain_continuation, keep_fits, write_fits
 from islands_api.cli.stop_requests import REPEAT
 from support.simulated_records import recorded, wave

@@ -21,7 +21,7 @@ from islands.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import LocalExtendedSpec
-from islands.systems.ode.ode_system import OUTPUT
+from islands.systems.ode.system import OUTPUT
 from islands.systems.ode.system_parts import OdeParameter
 from support.equation_programs import compare, extend, fix_states, list_effects, run_c
 from support.simulated_records import EQUATIONS, made, recorded, wave

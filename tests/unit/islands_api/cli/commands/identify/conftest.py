@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import pytest
 
 from islands.io.records import write_record
-from islands_api.cli.runs import identify_run as command
+from islands_api.cli.runs import identify as command
 from support.identify_runs import record
 from support.undrawn import undrawn_figures
 

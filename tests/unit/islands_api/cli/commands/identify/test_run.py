@@ -14,7 +14,7 @@ from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.io.checkpoints import read_checkpoint, state_document, write_checkpoint
 from islands.io.records import write_record
-from islands_api.cli.runs import identify_run as command
+from islands_api.cli.runs import identify as command
 from islands_api.cli.runs import timed_engine
 from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models, record, refused
 

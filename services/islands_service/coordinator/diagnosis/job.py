@@ -1,0 +1,114 @@
+"""Discrepancy job: diagnose a simulation, write the report and the extended simulation."""
+
+from collections.abc import Callable
+from time import sleep
+
+import structlog
+
+from islands.discrepancy.diagnosis import diagnose
+from islands.discrepancy.interim_findings import InterimFindings
+from islands.facade.explain_residual import FORMULA, explain_residual
+from islands.facade.results.complete_diagnosis import DiagnosisResult
+from islands.io.simulator_spec.factory import make_simulator
+from islands.parallel import ParallelMap
+from islands_service.coordinator.diagnosis.checkpoints import DiagnosisCheckpoints
+from islands_service.coordinator.diagnosis.progress import DiagnosisProgress
+from islands_service.coordinator.heartbeat import JobCancelled
+from islands_service.coordinator.job_run import JobRun
+from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState
+from islands_service.domain.job_spec import parse_discrepancy
+from islands_service.intake.job_inputs import read_record_and_columns
+from islands_service.runtime.parallel_map import ray_map
+from islands_service.store.blobs import Blobs
+from islands_service.store.database import StoreError
+
+log = structlog.get_logger()
+
+#: Seconds between two attempts to store what a diagnosis has found.
+_RETRY_SECONDS = 1.0
+
+
+def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobOutcome:
+    """Run a discrepancy job from its last checkpoint.
+
+    A job that is cancelled ends with its findings so far, without formula and report.
+
+    Parameters
+    ----------
+    run : JobRun
+    map_cases : ParallelMap, optional
+        Fits the effects; by default on the Ray cluster to which this process is connected.
+
+    Raises
+    ------
+    JobCancelled
+        The job was cancelled before the first result.
+    IslandsError
+        The record or the simulation is unusable, or any other error that ``run.check`` raises.
+    """
+    checkpoints = DiagnosisCheckpoints(run.job, run.blobs)
+    state = checkpoints.read()
+    report = DiagnosisProgress(run, checkpoints, state)
+    spec = parse_discrepancy(run.job.spec)
+    datasets = {part.dataset: run.get_dataset(part.dataset) for part in spec.parts}
+    report("reading the record", 0.0)
+    record, columns = read_record_and_columns(spec, datasets, run.blobs)
+    simulator = make_simulator(spec.simulation, record, columns)
+    fits = state.journal.record(map_cases or ray_map(check=run.check))
+    interim, artefacts = InterimFindings(), dict[str, str]()
+    formula, left_out = None, [FORMULA, REPORT]
+
+    def stop() -> bool:
+        run.check()
+        return False
+
+    try:
+        diagnosed = diagnose(
+            record, simulator, spec.tolerance, spec.seed, report, report.count(fits), interim=interim
+        )
+        report(FORMULA, 0.95)
+        start = state.begin_search(diagnosed)
+        formula = explain_residual(diagnosed, spec.seed, on_epoch=report.count_epochs, stop=stop, start=start)
+        left_out.remove(FORMULA)
+        found = DiagnosisResult.from_diagnosis(diagnosed, formula, wall_s=report.spent)
+        report("writing the report", 0.98)
+        names = ", ".join(datasets[part.dataset].name for part in spec.parts)
+        artefacts[REPORT] = _keep(found.write_report(names), run.blobs, run.check)
+        left_out.remove(REPORT)
+        if (extended := found.extended_document) is not None:
+            artefacts[EXTENDED] = _keep(extended.encode(), run.blobs, run.check)
+        ended = JobState.SUCCEEDED
+    except JobCancelled:
+        so_far = interim.make_diagnosis(spec.seed)
+        if so_far is None:
+            raise
+        found = DiagnosisResult.from_diagnosis(so_far, formula, wall_s=report.spent, left_out=left_out)
+        ended = JobState.CANCELLED
+        if EXTENDED not in artefacts and (extended := found.extended_document) is not None:
+            artefacts[EXTENDED] = run.blobs.write(extended.encode())
+    summary = _make_summary(found, simulator.name, state.note)
+    return JobOutcome(ended, found.document, summary=summary, artefacts=artefacts)
+
+
+def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
+    """Store a blob. Retry while the store is unavailable: the work is done."""
+    while True:
+        try:
+            return blobs.write(data)
+        except StoreError as error:
+            log.warning("cannot store yet", reason=str(error))
+            check()
+            sleep(_RETRY_SECONDS)
+
+
+def _make_summary(found: DiagnosisResult, simulation: str, note: str) -> dict[str, object]:
+    words = found.summary
+    return {
+        "simulation": simulation,
+        "verdict": str(found.verdict),
+        "effects": [finding.name for finding in found.effects],
+        "reduction_percent": None if found.gain is None else found.gain.reduction_percent,
+        "words": f"{words}\nNote: {note}." if note else words,
+        "wall_s": found.wall_s,
+        **({"note": note} if note else {}),
+    }

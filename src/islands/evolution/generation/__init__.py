@@ -1,1 +1,0 @@
-"""Steps of one generation: selection, variation, evaluation. Read `evaluation` first."""

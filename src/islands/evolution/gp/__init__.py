@@ -1,1 +1,0 @@
-"""Genetic programming: individuals, genes, fitnesses, random streams. Read `individual` first."""

@@ -1,0 +1,138 @@
+"""Swap search: forward steps and exchanges of single genes by the shooting error.
+
+Forward selection ranks candidates by the one-step-ahead error and never revises a choice. The swap search
+adds the gene that reduces the shooting error most, exchanges single genes as long as the error falls, and
+continues with the next size. Its structures seed the evolution, which is not bound to the pool.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from math import inf, isfinite
+
+import numpy as np
+
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import Individual, Population
+from islands.evolution.variation import Genes, with_required_genes
+from islands.expressions.tree import Expression
+from islands.progress import Steps
+
+#: Smallest relative reduction of the squared error for which an exchange continues.
+_MIN_GAIN = 1e-3
+
+#: Squared error relative to the mean square of the output below which it is a rounding error.
+_ROUNDING = 1e-26
+
+#: A structure whose squared error exceeds that of the current one by this factor is abandoned.
+_ABANDON_FACTOR = 4.0
+
+#: Maximum number of evaluations; the search then ends with the structures found so far.
+MAX_EVALUATIONS = 60_000
+
+
+def swap_search(
+    evaluator: Evaluator,
+    pool: Sequence[Expression],
+    starts: Iterable[Genes] = (),
+    depth: int = 40,
+    steps: Steps | None = None,
+) -> tuple[Population, ...]:
+    """Search structures over a pool of genes.
+
+    Parameters
+    ----------
+    evaluator : Evaluator
+        Evaluates structures; its settings limit their number of genes.
+    pool : sequence of Expression
+        Genes to choose from.
+    starts : iterable of genes
+        Further structures; the exchanges start from one of them if it is better than the forward step.
+    depth : int
+        Number of structures that are returned for every size.
+    steps : Steps, optional
+        The search is an optional step, which ends with the structures so far before a size or an exchange.
+
+    Returns
+    -------
+    tuple of populations
+        Evaluated individuals of every size found, smallest size first and best first.
+    """
+    search = _SwapSearch(evaluator, pool)
+    search.evaluate(starts, inf)
+    best = with_required_genes((), evaluator.settings)
+    exact = _ROUNDING * float(np.mean(evaluator.record.y**2))
+    first = search.evaluate([best], inf) if best else None
+    error = inf if first is None else first.fitness
+    steps = steps or Steps()
+    skip = partial(steps.skip, f"swap search among {len(pool)} candidates")
+    while error > exact > 0.0 and len(best) < evaluator.settings.max_terms and not search.is_exhausted:
+        if skip():
+            break
+        steps.report(f"swap search among {len(pool)} candidates: {len(best) + 1} terms", None)
+        found = search.evaluate(((*best, gene) for gene in pool if gene not in best), inf)
+        start = min((each for each in (found, search.best(len(best) + 1)) if each), key=_order, default=None)
+        if start is None or start.size <= len(best):
+            break
+        exchanged = search.exchange(start, skip)
+        best, error = exchanged.genes, exchanged.fitness
+    return search.ranked(depth)
+
+
+class _SwapSearch:
+    """Structures that were evaluated, by size and structure."""
+
+    def __init__(self, evaluator: Evaluator, pool: Sequence[Expression]) -> None:
+        self._evaluator, self._pool = evaluator, pool
+        self._seen: dict[int, dict[tuple[str, ...], Individual]] = {}
+        self._evaluations = 0
+
+    @property
+    def is_exhausted(self) -> bool:
+        """Whether the budget of evaluations is used up."""
+        return self._evaluations >= MAX_EVALUATIONS
+
+    def evaluate(self, structures: Iterable[Genes], threshold: float) -> Individual | None:
+        """Evaluate structures and return the best one; None if all fail or exceed the threshold."""
+        individuals = [(Individual(genes), False) for genes in structures]
+        thresholds = [threshold] * (self._evaluator.settings.max_terms + 1)
+        evaluated, _ = self._evaluator.evaluate(individuals, thresholds)
+        self._evaluations += len(individuals)
+        found = [each for each in evaluated if isfinite(each.fitness)]
+        for each in found:
+            self._seen.setdefault(each.size, {}).setdefault(each.key, each)
+        return min(found, key=_order, default=None)
+
+    def exchange(self, start: Individual, skip: Callable[[], bool]) -> Individual:
+        """Exchange single genes, each time the best exchange of all, as long as the error falls."""
+        best = start
+        required = with_required_genes((), self._evaluator.settings)
+        while not (self.is_exhausted or skip()):
+            genes = best.genes
+            free = [place for place, gene in enumerate(genes) if gene not in required]
+            exchanged = self.evaluate(
+                (
+                    (*genes[:place], gene, *genes[place + 1 :])
+                    for place in free
+                    for gene in self._pool
+                    if gene not in genes
+                ),
+                _ABANDON_FACTOR * best.fitness,
+            )
+            if exchanged is None or not exchanged.fitness < (1.0 - _MIN_GAIN) * best.fitness:
+                break
+            best = exchanged
+        return best
+
+    def best(self, size: int) -> Individual | None:
+        """Return the best structure of a size."""
+        return min(self._seen.get(size, {}).values(), key=_order, default=None)
+
+    def ranked(self, depth: int) -> tuple[Population, ...]:
+        """Return the best structures of every size."""
+        return tuple(
+            tuple(sorted(found.values(), key=_order)[:depth]) for _, found in sorted(self._seen.items())
+        )
+
+
+def _order(individual: Individual) -> tuple[int, float, tuple[str, ...]]:
+    return -individual.size, individual.fitness, individual.key

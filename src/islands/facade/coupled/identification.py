@@ -1,0 +1,325 @@
+"""`fit_coupled` and `identify_coupled`: one equation per output, chosen and refined for a common free run."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import inf
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+
+from islands.data.averaging import AUTO, average_samples
+from islands.data.coupled_record import CoupledRecord, check_outputs, couple, split_coupled
+from islands.data.dataset import Dataset
+from islands.data.split import Split
+from islands.errors import SettingsError, suggest
+from islands.estimation.coupled_refinement import refine_coupled
+from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.evolution.engine import Engine
+from islands.evolution.presets import resolve_settings
+from islands.facade.coupled.result import CoupledResult
+from islands.facade.coupled.selection import choose_equations, measure_error
+from islands.facade.engine_choice import Ray
+from islands.facade.fit import fit
+from islands.facade.identify import SearchCallback, identify
+from islands.facade.results.result import Result
+from islands.facade.setting_changes import SettingChanges
+from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
+from islands.facade.trials.rate_selection import select_rate
+from islands.io.data_frames import as_record
+from islands.progress import (
+    ProgressCallback,
+    Steps,
+    Stop,
+    StoppedError,
+    ignore_progress,
+    never_stop,
+)
+from islands.simulation.coupled_model import CoupledModel
+
+if TYPE_CHECKING:
+    from islands.io.data_frames import FrameLike
+
+#: Names of the steps after the searches of the outputs.
+_CHOICE, _REFINEMENT = "choice of the equations", "refinement of all equations"
+
+
+class StoppedCouplingError(StoppedError):
+    """A search was stopped before every output had models.
+
+    Attributes
+    ----------
+    outputs : tuple of str
+        Names of all outputs.
+    found : tuple of Result
+        Results of the first outputs; there may be none.
+    """
+
+    def __init__(self, step: str, outputs: Sequence[str], found: Sequence[Result]) -> None:
+        super().__init__(step)
+        self.outputs, self.found = tuple(outputs), tuple(found)
+
+
+class FitOptions(TypedDict, total=False):
+    """Options of `fit` for every output; `fit` describes each of them."""
+
+    library: str
+    degree: int | None
+    lags: int | None
+    max_terms: int
+    constraints: str | None
+    estimator: str
+    average: int | str
+    feedthrough: str
+    shooting: int | None
+    certificate: int
+
+
+def fit_coupled(
+    record: "CoupledRecord | FrameLike",
+    *,
+    inputs: str | Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    dt: float | None = None,
+    validation: "CoupledRecord | FrameLike | float" = 0.25,
+    refine_together: bool = True,
+    seed: int = 0,
+    progress: ProgressCallback = ignore_progress,
+    stop: Stop = never_stop,
+    **options: Unpack[FitOptions],
+) -> CoupledResult:
+    """Fit one equation per output by subset selection, for a simulation of all outputs together.
+
+    Every output is fitted by `fit` with the measured values of the other outputs as further inputs, which it
+    reads from sample k-1 on. Of the models of each size, `choose_equations` takes those with the least error
+    of the common free run on the validation data. Then all parameters are refined on the common free run of
+    the estimation data; the refined parameters are kept if the error on the validation data is smaller.
+
+    Parameters
+    ----------
+    record : CoupledRecord or data frame
+        Data without missing inputs; a frame needs ``inputs`` and ``outputs``.
+    inputs, outputs
+        Names of the columns of a frame. ``u+1`` is an input that the outputs respond to within the sample.
+    dt : float, optional
+        Sampling time in seconds. A frame with a time does not need it.
+    validation : CoupledRecord, data frame or float
+        Data that choose the equations: a separate record, or the fraction at the end of ``record``.
+    refine_together : bool
+        Whether all parameters are refined together.
+    seed : int
+        Seed of the results.
+    progress : callable, optional
+        Called with a message and the completed fraction.
+    stop : callable, optional
+        Called between all steps. Once it returns true and every output has models, the fit ends with the best
+        ones so far; ``left_out`` of the result names the steps that are missing.
+    **options
+        Options of `fit`. The default library is ``polynomial``; ``constraints`` are an entry of
+        ``CONSTRAINTS`` and hold for every equation; ``feedthrough`` is ``no``.
+
+    Returns
+    -------
+    CoupledResult
+
+    Raises
+    ------
+    StoppedError
+        ``stop`` returned true before every output had models.
+    SettingsError
+        A setting is unknown, out of range or not for several outputs, or an output has no model.
+    RecordError
+        The record is too short or incomplete, an output is given twice or is also an input, or the
+        validation data has other columns or another sampling time.
+    """
+    chosen: dict[str, Any] = {"library": "polynomial", **options}
+    _check_constraints(chosen.get("constraints"), chosen)
+    degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
+    trial = take_library(chosen["library"], degree, lags, constraints)
+    find = partial(fit, seed=seed, stop=stop)
+    data = _read_data(record, inputs, outputs, dt, validation)
+    return _couple(data, chosen, trial, trial.lags + 3, refine_together, Steps(progress, stop), find)
+
+
+def identify_coupled(
+    record: "CoupledRecord | FrameLike",
+    *,
+    inputs: str | Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    dt: float | None = None,
+    validation: "CoupledRecord | FrameLike | float" = 0.25,
+    refine_together: bool = True,
+    preset: str = "narx",
+    seed: int = 0,
+    progress: ProgressCallback = ignore_progress,
+    on_epoch: SearchCallback | None = None,
+    stop: Stop = never_stop,
+    engine: Engine | Ray | str | None = None,
+    **changes: Unpack[SettingChanges],
+) -> CoupledResult:
+    """Identify one equation per output by evolution, for a simulation of all outputs together.
+
+    As `fit_coupled`, with `identify` for every output.
+
+    Parameters
+    ----------
+    record, inputs, outputs, dt, validation, refine_together
+        As for `fit_coupled`.
+    preset : str
+        An entry of ``PRESETS``.
+    seed : int
+        Seed of the random generator; the same seed gives the same result, bit for bit.
+    progress : callable, optional
+        Called with a message and the completed fraction of each stage.
+    on_epoch : callable, optional
+        Called with the `SearchState` and the `Settings` after every epoch of the search of each output.
+    stop : callable, optional
+        As for `fit_coupled`.
+    engine : str, Ray or Engine, optional
+        What runs the islands, as for `identify`.
+    **changes
+        Settings that differ from the preset; ``constraints`` and ``feedthrough`` as for `fit_coupled`.
+
+    Returns
+    -------
+    CoupledResult
+
+    Raises
+    ------
+    SettingsError, RecordError, StoppedError
+        As `fit_coupled`.
+    """
+    chosen: dict[str, Any] = dict(changes)
+    settings = resolve_settings(
+        preset,
+        {name: tuple(value) if isinstance(value, list) else value for name, value in chosen.items()},
+    )
+    _check_constraints(settings.constraints, chosen)
+    if settings.select != "validation":
+        raise SettingsError(
+            "select is 'validation' with several outputs: equations are chosen by their free run together"
+        )
+    chosen.setdefault("average", settings.average)
+    find = partial(identify, preset=preset, seed=seed, on_epoch=on_epoch, stop=stop, engine=engine)
+    trial = make_trial_library(settings)
+    data = _read_data(record, inputs, outputs, dt, validation)
+    return _couple(
+        data, chosen, trial, settings.maximum_lag + 3, refine_together, Steps(progress, stop), find
+    )
+
+
+def _check_constraints(constraints: str | None, options: dict[str, Any]) -> None:
+    if constraints is not None and constraints not in CONSTRAINTS:
+        raise SettingsError(
+            f"the constraints {constraints!r} are for one output: with several, each equation numbers its "
+            f"inputs differently; take {', '.join(CONSTRAINTS)}{suggest(constraints, CONSTRAINTS)}"
+        )
+    if options.setdefault("feedthrough", "no") != "no":
+        raise SettingsError(
+            "feedthrough is 'no' with several outputs, so that they do not depend on each other within a "
+            "sample: name the inputs that act within the sample with +1, as u+1"
+        )
+
+
+def _read_data(
+    record: "CoupledRecord | FrameLike",
+    inputs: str | Sequence[str],
+    outputs: Sequence[str],
+    dt: float | None,
+    validation: "CoupledRecord | FrameLike | float",
+) -> tuple[CoupledRecord, CoupledRecord]:
+    """Return estimation data and validation data, at the sampling time of the record."""
+
+    def as_coupled(data: Any) -> CoupledRecord:
+        if isinstance(data, CoupledRecord):
+            return data
+        if isinstance(data, Dataset):
+            raise SettingsError("a Dataset has one output: give a CoupledRecord, one Dataset per output")
+        columns = [inputs] if isinstance(inputs, str) else list(inputs)
+        check_outputs(columns, outputs)
+        read = as_record(data, None, dt, inputs=[*columns, *outputs[1:]], output=outputs[0])
+        return couple(read, len(outputs))
+
+    held_out = validation if isinstance(validation, int | float) else as_coupled(validation)
+    return split_coupled(as_coupled(record), held_out)
+
+
+def _couple(
+    data: tuple[CoupledRecord, CoupledRecord],
+    options: dict[str, Any],
+    trial: TrialLibrary,
+    least: int,
+    refine_together: bool,
+    steps: Steps,
+    find: Callable[..., Result],
+) -> CoupledResult:
+    """Search every output, choose the equations and refine them."""
+    estimation, validation = data
+    names = estimation.output_names
+    splits = [Split(estimation.separate(place), validation.separate(place)) for place in range(len(names))]
+    steps("sampling rate", 0.0)
+    # The equations have one sampling time: the shortest that one of them needs.
+    average = options.get("average", AUTO)
+    options["average"] = min(select_rate(split, average, trial, least, steps)[1] for split in splits)
+    results = []
+    for name, split in zip(names, splits, strict=True):
+        show = partial(_report, steps.report, name)
+        try:
+            results.append(find(split.estimation, validation=split.validation, progress=show, **options))
+        except StoppedError as stopped:
+            raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
+    steps.report("choice of the equations", 0.0)
+    estimation, validation = (
+        part.map(partial(average_samples, count=options["average"])) for part in (estimation, validation)
+    )
+    warm_up = max(entry.warm_up for result in results for entry in result.models)
+    ranked = [[entry.model for entry in result.models] for result in results]
+    best = [result.recommendation.rank for result in results]
+    choice = choose_equations(ranked, best, validation, warm_up, partial(steps.skip, _CHOICE))
+    model = CoupledModel(tuple(models[rank - 1] for models, rank in zip(ranked, choice.ranks, strict=True)))
+    refined = None
+    if refine_together and choice.error < inf and not steps.skip(_REFINEMENT):
+        steps.report(_REFINEMENT, 0.0)
+        skip = partial(steps.skip, _REFINEMENT)
+        shooting = results[0].search_result.shooting_interval
+        constraints = str(results[0].search_result.settings["constraints"])
+        refined = _refine(model, estimation, validation, shooting, warm_up, constraints, choice.error, skip)
+    left_out = [
+        f"{name}: {step}" for name, found in zip(names, results, strict=True) for step in found.left_out
+    ]
+    return CoupledResult(
+        refined or model,
+        warm_up,
+        tuple(results),
+        choice.ranks,
+        refined is not None,
+        estimation,
+        validation,
+        (*left_out, *steps.left_out),
+    )
+
+
+def _refine(
+    model: CoupledModel,
+    estimation: CoupledRecord,
+    validation: CoupledRecord,
+    shooting: int,
+    warm_up: int,
+    constraints: str,
+    error: float,
+    skip: Callable[[], bool],
+) -> CoupledModel | None:
+    """Refine first over shooting intervals and then over the free run; return the model if it is better."""
+    best, started = None, model
+    for interval in (shooting, None):
+        if skip():
+            break
+        found = refine_coupled(started, estimation, interval, warm_up, constraints, stop=skip)
+        if found is None:
+            continue
+        started = found
+        reached = measure_error(found, validation, warm_up)
+        if reached < error:
+            best, error = found, reached
+    return best
+
+
+def _report(progress: ProgressCallback, name: str, message: str, fraction: float | None = None) -> None:
+    progress(f"{name}: {message}", fraction)

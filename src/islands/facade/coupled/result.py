@@ -1,0 +1,215 @@
+"""Result of an identification of several outputs."""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from islands.data.coupled_record import CoupledRecord
+from islands.export import export, write_export
+from islands.facade.results.result import Result
+from islands.io.coupled_models import coupled_equation, coupled_json, coupled_signals
+from islands.io.result_folder import record_document
+from islands.io.result_text.text_layout import term_table, wrap
+from islands.progress import Steps
+from islands.simulation.coupled_free_run import CoupledSimulation, coupled_free_run
+from islands.simulation.coupled_model import CoupledModel
+from islands.simulation.predictors import one_step_ahead
+from islands.validation.metrics import Metrics, metrics
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+COUPLED_RESULT_SCHEMA = "islands.coupled-result/1"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class FittedCoupledModel:
+    """Model of several outputs, of a result or of a file.
+
+    Attributes
+    ----------
+    model : CoupledModel
+        Equations of all outputs.
+    warm_up : int
+        Number of samples before the first prediction. The errors depend on it.
+    """
+
+    model: CoupledModel
+    warm_up: int
+
+    @property
+    def equation(self) -> str:
+        """Equations with the column names of the record, one line per output."""
+        return coupled_equation(self.model)
+
+    def simulate(self, record: CoupledRecord, warm_up: int | None = None) -> CoupledSimulation:
+        """Simulate all outputs of a record from its first samples.
+
+        Parameters
+        ----------
+        record : CoupledRecord
+            Its samples are averaged as those of the search.
+        warm_up : int, optional
+            Number of samples before the first prediction; by default that of the errors of the result.
+        """
+        return coupled_free_run(self.model, record, self.warm_up if warm_up is None else warm_up)
+
+    def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
+        """Return the coupled model as text in a format of ``EXPORTS``, or write it to a file."""
+        if path is None:
+            return export(self.model, kind)
+        write_export(self.model, kind, path)
+        return None
+
+    def __repr__(self) -> str:
+        names, equations = ", ".join(self.model.output_names), "; ".join(self.equation.splitlines())
+        return f"<{type(self).__name__} of {names}: {equations}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CoupledResult(FittedCoupledModel):
+    """One equation per output, chosen for their common free run.
+
+    Attributes
+    ----------
+    model : CoupledModel
+        Equations of all outputs.
+    warm_up : int
+        Number of samples before the first prediction. The errors depend on it.
+    results : tuple of Result
+        Result of every output, whose models read the measured values of the other outputs.
+    ranks : tuple of int
+        Rank of the chosen model in each of these results.
+    refined : bool
+        Whether the parameters were refined on the common simulation. If not, they are those of the results.
+    estimation, validation : CoupledRecord
+        Data with the sampling time of the model.
+    left_out : tuple of str
+        Steps that a request to stop has left out; empty for a complete result.
+    """
+
+    results: tuple[Result, ...]
+    ranks: tuple[int, ...]
+    refined: bool
+    estimation: CoupledRecord
+    validation: CoupledRecord
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def metrics(self) -> Mapping[str, Mapping[str, Mapping[str, Metrics]]]:
+        """Errors by output, part and prediction: ``metrics["y1"]["validation"]["free_run"].rmse``.
+
+        The free run is that of all equations together; one step ahead, all outputs are measured. NaN if the
+        simulation diverged.
+        """
+        found: dict[str, dict[str, dict[str, Metrics]]] = {name: {} for name in self.model.output_names}
+        for part, record in (("estimation", self.estimation), ("validation", self.validation)):
+            free = self.simulate(record)
+            for place, (name, single) in enumerate(
+                zip(self.model.output_names, self.model.models, strict=True)
+            ):
+                y = record.records[place].y
+                one = one_step_ahead(single, record.separate(place), self.warm_up)
+                runs = {"one_step_ahead": one.y, "free_run": free.y[:, place]}
+                outcomes = {"one_step_ahead": one.outcome, "free_run": free.outcome}
+                found[name][part] = {
+                    mode: metrics(y, run if outcomes[mode] else y * float("nan"))
+                    for mode, run in runs.items()
+                }
+        return found
+
+    def plot(self, output: str) -> "Figure":
+        """Draw the free run of one output on the validation data."""
+        from islands.figures.free_run import draw_free_run  # noqa: PLC0415 - matplotlib takes half a second
+
+        place = self.model.output_names.index(output)
+        return draw_free_run(self.validation.records[place], self.simulate(self.validation).y[:, place])
+
+    def save(self, folder: str | Path, steps: Steps | None = None) -> Path:
+        """Write ``result.json``, ``model.json``, ``summary.txt``, ``figures/`` and ``outputs/``.
+
+        ``outputs/`` has a folder with the complete result of every output. The figures are optional
+        ``steps``, which a stop request leaves out.
+        """
+        steps = steps or Steps()
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        for directory, name, result in zip(
+            list_folders(self.model.output_names), self.model.output_names, self.results, strict=True
+        ):
+            result.save(folder / "outputs" / directory, steps)
+            if not steps.skip("figures"):
+                self._draw_figure(name, folder / "figures" / f"free-run-{directory}.svg")
+        (folder / "model.json").write_text(coupled_json(self.model), encoding="utf-8")
+        (folder / "summary.txt").write_text(f"{self}\n", encoding="utf-8")
+        (folder / "result.json").write_text(f"{json.dumps(self._document(), indent=2)}\n", encoding="utf-8")
+        return folder
+
+    def _draw_figure(self, output: str, path: Path) -> None:
+        from islands.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
+
+        path.parent.mkdir(exist_ok=True)
+        save(self.plot(output), path)
+
+    def _document(self) -> dict[str, Any]:
+        return {
+            "schema": COUPLED_RESULT_SCHEMA,
+            "dt": self.model.dt,
+            "average": self.model.average,
+            "warm_up": self.warm_up,
+            "refined": self.refined,
+            "left_out": list(self.left_out),
+            "equation": self.equation,
+            "signals": coupled_signals(self.model),
+            "outputs": [
+                {
+                    "name": name,
+                    "unit": self.validation.records[place].output_unit,
+                    "folder": f"outputs/{list_folders(self.model.output_names)[place]}",
+                    "rank": self.ranks[place],
+                    "metrics": {
+                        part: {mode: _finite(asdict(each)) for mode, each in by_mode.items()}
+                        for part, by_mode in self.metrics[name].items()
+                    },
+                }
+                for place, name in enumerate(self.model.output_names)
+            ],
+            "estimation": record_document(self.estimation.records[0]) | {"names": self._names()},
+            "validation": record_document(self.validation.records[0]) | {"names": self._names()},
+        }
+
+    def _names(self) -> dict[str, list[str]]:
+        return {"inputs": list(self.model.input_names), "outputs": list(self.model.output_names)}
+
+    def __str__(self) -> str:
+        refined = "refined together on the free run" if self.refined else "those of the separate equations"
+        lines = [
+            f"{len(self.model.models)} outputs, {self.model.size} terms, parameters {refined}:",
+            "",
+            *(line for single in self.model.models for line in [*term_table(single), ""]),
+            *wrap(f"{coupled_signals(self.model) or f'k counts samples of {self.validation.dt:g} s'}."),
+            "",
+            "Validation data; all outputs are simulated together, from the inputs alone:",
+            f"{'output':20} {'free-run RMSE':>18} {'% of range':>10} {'R2':>8} {'one-step RMSE':>18}",
+        ]
+        for record, (name, parts) in zip(self.validation.records, self.metrics.items(), strict=True):
+            free, one = parts["validation"]["free_run"], parts["validation"]["one_step_ahead"]
+            unit = f" {record.output_unit}".rstrip()
+            lines.append(
+                f"{name:20} {f'{free.rmse:.4g}{unit}':>18} {free.mape:10.3g} {free.r2:8.4f} "
+                f"{f'{one.rmse:.4g}{unit}':>18}"
+            )
+        return "\n".join(lines)
+
+
+def list_folders(outputs: Sequence[str]) -> list[str]:
+    """Return the name of the folder of every output, such as ``1-level_cm``."""
+    return [f"{place}-{re.sub(r'[^A-Za-z0-9_.-]', '_', name)}" for place, name in enumerate(outputs, start=1)]
+
+
+def _finite(values: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: value if isfinite(value) else None for name, value in values.items()}

@@ -1,0 +1,224 @@
+"""The two crossovers and the two mutations (the paper, section 5.1, Figure 1)."""
+
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from islands.evolution.rng import Purpose, Stream
+from islands.evolution.settings import Settings
+from islands.evolution.variation import (
+    high_level_crossover,
+    inner_mutation,
+    low_level_crossover,
+    outer_mutation,
+    random_gene,
+    random_genes,
+    repair_genes,
+)
+from islands.expressions.parsing import parse
+from islands.expressions.printing import plain
+from islands.expressions.tree import Lagged, height, walk
+
+SETTINGS = Settings(constraints="none", structure="free", max_terms=6, initial_terms=(1, 6))
+SEEDS = range(300)
+
+
+def stream(seed):
+    return Stream(seed, 0, 1, Purpose.VARIATION)
+
+
+def genes(*texts):
+    return tuple(parse(text) for text in texts)
+
+
+def texts(found):
+    return tuple(plain(gene) for gene in found)
+
+
+LETTERS = genes("y(k-1)", "y(k-2)", "y(k-3)", "y(k-4)")
+NUMBERS = genes("u(k-1)", "u(k-2)")
+
+
+# High-level crossover: whole genes.
+
+
+def test_high_level_crossover_cuts_parents_at_different_positions():
+    lengths = set()
+    for seed in SEEDS:
+        first, second = high_level_crossover(LETTERS, NUMBERS, SETTINGS, stream(seed))
+        lengths.add((len(first), len(second)))
+        # A child is the head of one parent and the tail of the other; no gene is changed or lost.
+        if len(first) + len(second) == 6:
+            assert sorted(texts(first + second)) == sorted(texts(LETTERS + NUMBERS))
+        head = next((place for place, gene in enumerate(first) if gene in NUMBERS), len(first))
+        assert first[:head] == LETTERS[:head] or first == LETTERS
+        assert first[head:] == NUMBERS[len(NUMBERS) - len(first) + head :]
+    # There are fifteen pairs of cuts, some of which leave no genes.
+    assert len(lengths) >= 7
+    assert max(first for first, _ in lengths) == 6
+    assert min(min(pair) for pair in lengths) >= 1
+
+
+def test_child_without_genes_is_replaced_by_the_parent():
+    """A cut before the first gene of one parent and after the last gene of the other leaves no genes."""
+    empty = []
+    for seed in SEEDS:
+        draw = stream(seed)
+        if (draw.randrange(5), draw.randrange(3)) == (0, 2):
+            empty.append(high_level_crossover(LETTERS, NUMBERS, SETTINGS, stream(seed)))
+    assert len(empty) > 5
+    assert set(empty) == {(LETTERS, NUMBERS + LETTERS)}
+
+
+def test_child_with_too_many_genes_is_truncated():
+    tight = replace(SETTINGS, max_terms=4, initial_terms=(1, 4))
+    for seed in SEEDS:
+        for child in high_level_crossover(LETTERS, NUMBERS, tight, stream(seed)):
+            assert 1 <= len(child) <= 4
+
+
+def test_parent_takes_the_place_of_a_child_with_too_many_genes():
+    tight = replace(SETTINGS, max_terms=4, initial_terms=(1, 4), overlong="parent")
+    replaced = 0
+    for seed in SEEDS:
+        expected = high_level_crossover(LETTERS, NUMBERS, SETTINGS, stream(seed))
+        children = high_level_crossover(LETTERS, NUMBERS, tight, stream(seed))
+        for child, whole, parent in zip(children, expected, (LETTERS, NUMBERS), strict=True):
+            assert child == (whole if len(whole) <= 4 else parent)
+            replaced += len(whole) > 4
+    assert replaced > 10
+
+
+# Low-level crossover: subtrees of one gene each.
+
+
+def test_low_level_crossover_exchanges_subtrees_of_one_gene_each():
+    one, other = genes("y(k-1)", "tanh(q1(u(k-1)))"), genes("q2(y(k-1)*u(k-1))")
+    seen = set()
+    for seed in SEEDS:
+        first, second = low_level_crossover(one, other, SETTINGS, stream(seed))
+        assert (len(first), len(second)) == (2, 1)
+        assert sum(a != b for a, b in zip(first, one, strict=True)) <= 1
+        # The children together have the leaves of the parents together.
+        before, after = (
+            Counter(plain(node) for gene in pair for node in walk(gene) if isinstance(node, Lagged))
+            for pair in (one + other, first + second)
+        )
+        assert before == after
+        seen.add((texts(first), texts(second)))
+    # Four nodes each give 16 pairs of positions.
+    assert (("y(k-1)", "tanh(q1(y(k-1)*u(k-1)))"), ("q2(u(k-1))",)) in seen
+    assert (("q2(y(k-1)*u(k-1))", "tanh(q1(u(k-1)))"), ("y(k-1)",)) in seen
+    assert len(seen) >= 14
+
+
+def test_child_above_the_height_limit_keeps_the_gene_of_its_parent():
+    tight = replace(SETTINGS, max_height=2, initial_height=2)
+    one, other = genes("tanh(q1(u(k-1)))"), genes("q2(y(k-1)*u(k-1))")
+    kept = 0
+    for seed in SEEDS:
+        first, second = low_level_crossover(one, other, tight, stream(seed))
+        free_first, free_second = low_level_crossover(one, other, SETTINGS, stream(seed))
+        assert first == (free_first if height(free_first[0]) <= 2 else one)
+        assert second == (free_second if height(free_second[0]) <= 2 else other)
+        kept += height(free_first[0]) > 2
+    assert kept > 20
+
+
+# Mutations.
+
+
+def test_inner_mutation_replaces_one_subtree_of_one_gene():
+    parent = genes("y(k-1)", "tanh(q1(u(k-1)))*u(k-1)")
+    roots = Counter()
+    for seed in SEEDS:
+        child = inner_mutation(parent, SETTINGS, 1, stream(seed))
+        assert len(child) == 2
+        changed = [place for place in (0, 1) if child[place] != parent[place]]
+        assert len(changed) <= 1
+        if changed == [1]:
+            # The root is one of five nodes, so it is kept in four of five cases.
+            roots[plain(child[1]).startswith("tanh(") or plain(child[1]).endswith("*u(k-1)")] += 1
+    assert roots[True] > roots[False] > 0
+
+
+def test_outer_mutation_without_a_pool_replaces_one_gene():
+    changed = Counter()
+    for seed in SEEDS:
+        child = outer_mutation(LETTERS, SETTINGS, 1, stream(seed), ())
+        assert len(child) == 4
+        places = [place for place in range(4) if child[place] != LETTERS[place]]
+        assert len(places) <= 1
+        changed.update(places)
+    assert sorted(changed) == [0, 1, 2, 3]
+
+
+def test_outer_mutation_with_a_pool_replaces_drops_or_adds_a_gene():
+    always = replace(SETTINGS, from_library=1.0)
+    pool = genes("u(k-7)", "u(k-8)")
+    kinds = Counter()
+    for seed in SEEDS:
+        child = outer_mutation(LETTERS, always, 1, stream(seed), pool)
+        kinds[len(child) - len(LETTERS)] += 1
+        new = [gene for gene in child if gene not in LETTERS]
+        assert set(new) <= set(pool)
+        assert len(new) == (0 if len(child) < len(LETTERS) else 1)
+    # Probabilities: drop 1/4, add 1/4, replace 1/2.
+    assert sorted(kinds) == [-1, 0, 1]
+    assert kinds[0] == pytest.approx(150, abs=40)
+    assert kinds[-1] == pytest.approx(75, abs=32)
+
+
+def test_outer_mutation_respects_the_limits_of_the_number_of_genes():
+    always = replace(SETTINGS, from_library=1.0, max_terms=4, initial_terms=(1, 4))
+    for seed in SEEDS:
+        assert len(outer_mutation(LETTERS[:1], always, 1, stream(seed), NUMBERS)) in (1, 2)
+        assert len(outer_mutation(LETTERS, always, 1, stream(seed), NUMBERS)) in (3, 4)
+
+
+# Random genes and repair.
+
+
+def test_random_genes_use_all_leaves_functions_and_back_shifts():
+    setting = replace(SETTINGS, shifts=(2, 5), primitives=("mul", "tanh"), max_terms=6, initial_terms=(2, 4))
+    drawn = [random_genes(setting, 2, stream(seed)) for seed in SEEDS]
+    assert {len(found) for found in drawn} == {2, 3, 4}
+    seen = " ".join(plain(gene, 2) for found in drawn for gene in found)
+    for part in ("y(k-1)", "u1(k-1)", "u2(k-1)", "q2(", "q5(", "tanh(", "*"):
+        assert part in seen
+    for part in ("q1(", "q3(", "phi", "k-2"):
+        assert part not in seen
+
+
+def test_random_phi_functions_have_lags_of_inputs_as_arguments():
+    setting = replace(SETTINGS, structure="phi", primitives=("phi1",), shifts=(1,))
+    found = Counter(plain(random_gene(setting, 1, stream(seed))) for seed in range(2000))
+    phis = {text for text in found if text.startswith("phi1")}
+    assert {"phi1(u(k-1), q1(u(k-1)))", "phi1(q1(q1(u(k-1))), u(k-1))"} <= phis
+    assert not any("y" in text for text in phis)
+
+
+def test_phi_functions_of_free_genes_have_arbitrary_arguments():
+    setting = replace(SETTINGS, structure="free", primitives=("phi1",), shifts=(1,))
+    found = {plain(random_gene(setting, 1, stream(seed))) for seed in range(500)}
+    assert "phi1(y(k-1), u(k-1))" in found
+    assert any("phi1(phi1(" in text for text in found)
+    assert repair_genes((parse("phi1(y(k-1), u(k-1))"),), setting) == (parse("phi1(y(k-1), u(k-1))"),)
+
+
+def test_repair_adds_the_linear_output_if_the_constraint_needs_it():
+    constrained = replace(SETTINGS, constraints="hysteresis", structure="phi")
+    assert texts(repair_genes(NUMBERS, constrained)) == ("y(k-1)", "u(k-1)", "u(k-2)")
+    assert repair_genes(genes("u(k-1)", "q3(y(k-1))"), constrained) == genes("u(k-1)", "q3(y(k-1))")
+    full = genes(*(f"u(k-{lag})" for lag in range(1, 7)))
+    assert repair_genes(full, constrained) == (Lagged(0), *full[:5])
+    assert repair_genes(NUMBERS, replace(constrained, constraints="none")) == NUMBERS
+
+
+def test_repair_for_increment_structure_replaces_linear_outputs():
+    increment = replace(SETTINGS, constraints="hysteresis", structure="increment")
+    repaired = repair_genes(
+        genes("q3(q1(y(k-1)))", "q2(y(k-1)*u(k-1))", "phi1(y(k-1), q1(u(k-1)))"), increment
+    )
+    assert texts(repaired) == ("y(k-1)", "q2(y(k-1)*u(k-1))", "phi1(u(k-1), q1(u(k-1)))")

@@ -1,0 +1,164 @@
+"""Several outputs: the true equations, one free run, and settings that are for one output only."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.averaging import average_samples
+from islands.data.coupled_record import CoupledRecord
+from islands.data.dataset import join
+from islands.errors import ModelError, RecordError, SettingsError
+from islands.facade.coupled.identification import fit_coupled, identify_coupled
+from islands.facade.coupled.selection import measure_error
+from islands.facade.results.saved_result import read_result
+from islands.io.coupled_models import read_coupled_model
+from islands.simulation.coupled_free_run import coupled_free_run
+from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
+from support.undrawn import undrawn_figures
+
+#: A small search.
+FAST = {"degree": 2, "lags": 2, "max_terms": 4, "average": 1, "certificate": 0}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return fit_coupled(make_coupled_record(PREY, samples=150), **FAST)
+
+
+def test_without_noise_the_true_equations_are_found() -> None:
+    linear = fit_coupled(
+        make_coupled_record(TWO_MASSES, samples=150), **(FAST | {"degree": 1, "max_terms": 4})
+    )
+    for chosen, true in zip(linear.model.models, TWO_MASSES.models, strict=True):
+        assert chosen.regressors == true.regressors
+        np.testing.assert_allclose(chosen.parameters, true.parameters, rtol=1e-6)
+
+
+def test_without_noise_the_free_run_has_no_error(found) -> None:
+    assert found.model.size <= 7
+    for errors in found.metrics.values():
+        assert errors["validation"]["free_run"].mape < 1e-6
+        assert errors["estimation"]["one_step_ahead"].mape < 1e-6
+
+
+def test_the_errors_are_those_of_the_common_free_run(found) -> None:
+    simulated = coupled_free_run(found.model, found.validation, found.warm_up)
+    for place, name in enumerate(found.model.output_names):
+        rmse = found.metrics[name]["validation"]["free_run"].rmse
+        assert rmse**2 == pytest.approx(simulated.mean_squared_errors[place], rel=1e-9)
+
+
+@pytest.mark.ci
+def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> None:
+    with undrawn_figures():
+        folder = found.save(tmp_path / "result")
+    assert read_coupled_model(folder) == found.model
+    loaded = islands.load(folder)
+    assert (loaded.model, loaded.warm_up) == (found.model, found.warm_up)
+    document = json.loads((folder / "result.json").read_text())
+    assert [each["name"] for each in document["outputs"]] == ["y1", "y2"]
+    for each in document["outputs"]:
+        assert (
+            json.loads((folder / each["folder"] / "result.json").read_text())["schema"] == "islands.result/1"
+        )
+        assert (folder / "figures" / f"free-run-{each['folder'].removeprefix('outputs/')}.svg").exists()
+    assert "y1(k) =" in (folder / "summary.txt").read_text()
+    with pytest.raises(ModelError, match="several outputs"):
+        read_result(folder)
+    assert read_result(folder / "outputs" / "1-y1").models[0].model.output_name == "y1"
+
+
+@pytest.mark.ci
+def test_a_model_of_means_simulates_the_record_before_averaging() -> None:
+    record = make_coupled_record(TWO_MASSES, samples=300, noise=0.01)
+    result = fit_coupled(record, **(FAST | {"degree": 1, "average": 2}))
+    assert (result.model.average, result.validation.dt) == (2, 0.2)
+    np.testing.assert_array_equal(
+        result.simulate(record).y,
+        result.simulate(record.map(lambda each: average_samples(each, 2))).y,
+    )
+
+
+@pytest.mark.ci
+def test_several_recordings_give_their_ends_to_the_validation_data() -> None:
+    records = [make_coupled_record(TWO_MASSES, samples=120, seed=seed) for seed in (1, 2)]
+    joined = CoupledRecord(tuple(join(each) for each in zip(*(r.records for r in records), strict=True)))
+    result = fit_coupled(joined, **(FAST | {"degree": 1}))
+    assert result.validation.records[0].segments == (30, 30)
+    assert result.metrics["y2"]["validation"]["free_run"].mape < 1e-6
+
+
+@pytest.mark.ci
+def test_a_data_frame_has_the_result_of_a_record(found) -> None:
+    record = make_coupled_record(PREY, samples=150)
+    frame = {"u": record.records[0].u[:, 0], "y1": record.y[:, 0], "y2": record.y[:, 1]}
+    again = fit_coupled(frame, inputs="u", outputs=["y1", "y2"], dt=0.1, **FAST)
+    assert again.model == found.model
+
+
+@pytest.mark.ci
+def test_noise_is_not_amplified_by_the_coupling() -> None:
+    record = make_coupled_record(TWO_MASSES, samples=500, noise=0.02)
+    alone, together = (
+        fit_coupled(record, refine_together=each, library="polynomial", **(FAST | {"degree": 1}))
+        for each in (False, True)
+    )
+    clean = make_coupled_record(TWO_MASSES, samples=500, seed=2)
+
+    def error(result):
+        return np.sqrt(coupled_free_run(result.model, clean).mean_squared_errors).max()
+
+    assert together.refined
+    assert error(together) < 0.5 * error(alone)
+
+
+@pytest.mark.ci
+def test_an_evolution_has_the_same_result_for_the_same_seed() -> None:
+    record = make_coupled_record(PREY, samples=150)
+    settings = {"population": 8, "generations": 1, "max_terms": 3, "average": 1, "library_degree": 2}
+    first, second = (identify_coupled(record, seed=3, **settings) for _ in range(2))
+    assert first.model == second.model
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"constraints": "gain = 2"}, "each equation numbers its inputs differently"),
+        ({"feedthrough": "yes"}, r"as u\+1"),
+        ({"library": "cubic"}, "library"),
+    ],
+)
+def test_settings_for_one_output_are_refused(options, message) -> None:
+    with pytest.raises(SettingsError, match=message):
+        fit_coupled(make_coupled_record(PREY), **options)
+
+
+def test_a_choice_by_fitness_is_refused() -> None:
+    with pytest.raises(SettingsError, match="by their free run together"):
+        identify_coupled(make_coupled_record(PREY), select="fitness")
+
+
+def test_a_record_of_one_output_is_refused() -> None:
+    record = make_coupled_record(PREY)
+    with pytest.raises(SettingsError, match="give a CoupledRecord"):
+        fit_coupled(record.records[0])
+    with pytest.raises(RecordError, match="at least two outputs"):
+        fit_coupled({"u": record.y[:, 0], "y": record.y[:, 1]}, inputs="u", outputs=["y"], dt=0.1)
+
+
+@pytest.mark.ci
+def test_missing_outputs_are_skipped_for_all() -> None:
+    record = make_coupled_record(PREY, samples=150)
+    holed = np.where(np.isin(np.arange(150), (50, 120)), np.nan, record.y[:, 0])
+    found = fit_coupled(CoupledRecord((replace(record.records[0], y=holed), record.records[1])), **FAST)
+    assert found.estimation.samples + found.validation.samples == record.samples - 2
+    assert found.metrics["y2"]["validation"]["free_run"].mape < 1e-6
+
+
+def test_the_error_relative_to_a_tiny_range_of_the_output_is_finite() -> None:
+    record = make_coupled_record(TWO_MASSES, samples=50)
+    tiny = CoupledRecord(tuple(replace(each, u=0.0 * each.u, y=1e-200 * each.y) for each in record.records))
+    assert 0.0 <= measure_error(TWO_MASSES, tiny, 2) < np.inf

@@ -1,0 +1,194 @@
+"""Discrepancy job: progress, result, and unusable input."""
+
+from collections.abc import Callable, Iterable, Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from islands.discrepancy.inference import noise_floor
+from islands.errors import RecordError, SettingsError
+from islands.facade.explain_residual import FORMULA
+from islands_service.coordinator.diagnosis import job as diagnosis_job
+from islands_service.coordinator.heartbeat import JobCancelled
+from islands_service.coordinator.job_failures import make_problem_document
+from islands_service.domain.job import EXTENDED, Job, JobState
+from islands_service.store import Store
+from islands_service.store.backends.object_store import ObjectStoreError
+from islands_service.store.blobs import Blobs
+from islands_service.store.database import StoreUnavailableError
+from support.command_line import write_offset
+from support.diagnosis_jobs import claim, run_job, submit_diagnosis
+from support.stores import ALICE
+from support.undrawn import undrawn_figures
+
+Submit = Callable[..., Job]
+
+COLUMN, PIEZO = {"kind": "column", "column": "theirs_um"}, {"kind": "bouc-wen-piezo"}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A record with a temperature, and a column with a simulation that lacks an offset."""
+    path = write_offset(tmp_path_factory.mktemp("offset") / "record.csv")
+    header, *lines = path.read_text().splitlines()
+    warmth = np.cumsum(np.random.default_rng(1).standard_normal(len(lines)))
+    rows = [f"{line},{kelvin:.6f}" for line, kelvin in zip(lines, warmth, strict=True)]
+    path.write_text("\n".join([f"{header},T_K", *rows]) + "\n")
+    return path
+
+
+@pytest.fixture(autouse=True)
+def _cheap_analysis(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Render no figures, and use few random features in the search for residual structure."""
+    monkeypatch.setattr(noise_floor, "RANDOM_FEATURES", 20)
+    with undrawn_figures():
+        yield
+
+
+@pytest.fixture
+def submit(store: Store, blobs: Blobs, measured: Path) -> Submit:
+    """Submit jobs on the record that differs from its simulation by an offset."""
+    return lambda **changes: submit_diagnosis(store, blobs, measured, **{"channels": ["T_K"], **changes})
+
+
+def phases(store: Store, job: Job) -> list[str]:
+    """Return the phases of a job; one with several reports counts once."""
+    reported = [each.data["phase"] for each in store.jobs.events(job.id) if each.kind == "progress"]
+    return [phase for phase, _ in groupby(reported)]
+
+
+def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs, submit: Submit) -> None:
+    job = submit()
+    document = run_job(claim(store), store, blobs).document or {}
+    assert document["simulation"] == "column theirs_um"
+    assert document["record"]["names"]["inputs"] == ["u_V", "T_K"]
+    assert document["verdict"] == "named"
+    assert phases(store, job)[-1] == "writing the report"
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("phase", "verdict", "left_out"),
+    [
+        ("screening ", "stopped", "combinations of effects"),
+        ("searching for missing terms", "named", "search for missing terms"),
+        (FORMULA, "named", "report.html"),
+    ],
+)
+def test_cancelled_job_keeps_what_its_diagnosis_has_found(
+    store: Store, blobs: Blobs, submit: Submit, phase: str, verdict: str, left_out: str
+) -> None:
+    job = submit()
+
+    def check() -> None:
+        if any(reported.startswith(phase) for reported in phases(store, job)[-1:]):
+            raise JobCancelled("cancelled")
+
+    def checked_map(function: Callable[[Any], Any], arguments: Iterable[Any], /) -> Iterator[Any]:
+        for argument in arguments:
+            check()
+            yield function(argument)
+
+    lease = claim(store)
+    outcome = run_job(lease, store, blobs, check, checked_map)
+    store.leases.finish(lease, outcome)
+    document, summary = outcome.document or {}, outcome.summary or {}
+    assert (outcome.state, document["verdict"], summary["verdict"]) == (JobState.CANCELLED, verdict, verdict)
+    assert left_out in document["left_out"]
+    assert all(step in summary["words"] for step in document["left_out"])
+    assert (EXTENDED in outcome.artefacts) == (verdict == "named")
+    # The resumed job replaces the result.
+    store.jobs.resume(ALICE, job.id)
+    lease = claim(store)
+    store.leases.finish(lease, run_job(lease, store, blobs))
+    resumed = store.results.document(job.id) or {}
+    assert (resumed["verdict"], resumed["left_out"]) == ("named", [])
+
+
+@pytest.mark.ci
+def test_job_that_is_cancelled_before_its_first_result_has_none(
+    store: Store, blobs: Blobs, submit: Submit
+) -> None:
+    submit()
+
+    def cancel() -> None:
+        raise JobCancelled("cancelled")
+
+    with pytest.raises(JobCancelled):
+        run_job(claim(store), store, blobs, cancel)
+
+
+@pytest.mark.ci
+def test_recordings_are_diagnosed_together(store: Store, blobs: Blobs, submit: Submit) -> None:
+    first = submit()
+    store.jobs.cancel(ALICE, first.id)
+    submit(rows="0:150", recordings=[{"dataset": first.spec["dataset"], "rows": "150:"}])
+    document = run_job(claim(store), store, blobs).document or {}
+    assert document["record"]["segments"] == [150, 250]
+    assert [effect["name"] for effect in document["effects"]] == ["offset"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind", "words"),
+    [
+        ({"rows": "0:99"}, RecordError, "99 samples, and a diagnosis needs "),
+        ({"simulation": PIEZO, "tolerance": {"mass": 0.1}}, SettingsError, "has no parameter 'mass'"),
+        (
+            {"simulation": {**PIEZO, "parameters": {"mass": 1.0}}},
+            SettingsError,
+            "there is no parameter mass",
+        ),
+    ],
+)
+def test_unusable_record_or_simulation_becomes_a_problem_of_the_job(
+    store: Store, blobs: Blobs, submit: Submit, changes: dict[str, Any], kind: type, words: str
+) -> None:
+    submit(**changes)
+    with pytest.raises(kind, match=words) as caught:
+        run_job(claim(store), store, blobs)
+    expected = {RecordError: "invalid-record", SettingsError: "invalid-settings"}[kind]
+    assert make_problem_document(caught.value)["type"] == expected
+
+
+class Away:
+    """Leases of a store that is unavailable for reports."""
+
+    def __init__(self, store: Store) -> None:
+        self._store, self.leases = store, self
+
+    def report(self, *_: object) -> None:
+        raise StoreUnavailableError("the database does not answer")
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._store, name)
+
+
+@pytest.mark.ci
+def test_failed_reports_do_not_affect_the_result(store: Store, blobs: Blobs, submit: Submit) -> None:
+    job = submit()
+    outcome = run_job(claim(store), Away(store), blobs)
+    assert outcome.state == JobState.SUCCEEDED
+    assert phases(store, job) == []
+
+
+def test_finished_work_waits_for_an_object_store_that_is_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(diagnosis_job, "_RETRY_SECONDS", 0.0)
+    failures = [ObjectStoreError("away")] * 3
+
+    class Away:
+        def write(self, data: bytes) -> str:
+            if failures:
+                raise failures.pop()
+            return data.decode()
+
+    assert diagnosis_job._keep(b"report", Away(), lambda: None) == "report"  # type: ignore[arg-type]
+
+    def cancel() -> None:
+        raise JobCancelled("cancelled")
+
+    failures.append(ObjectStoreError("away"))
+    with pytest.raises(JobCancelled):
+        diagnosis_job._keep(b"report", Away(), cancel)  # type: ignore[arg-type]
