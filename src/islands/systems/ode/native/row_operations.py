@@ -16,7 +16,7 @@ EXPONENTIAL = "numba_exp"
 
 
 class RowOperations:
-    """Operations on rows at the position of a builder; the instructions are those of `islands.systems.ode.kernel`.
+    """Operations on rows at the position of a builder; the instructions are those of the kernel.
 
     Parameters
     ----------
