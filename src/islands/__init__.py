@@ -32,7 +32,7 @@ _PUBLIC = {
     "expressions.primitives": ("PRIMITIVES",),
     "expressions.user_primitive": ("primitive",),
     "facade.coupled.identification": ("fit_coupled", "identify_coupled"),
-    "facade.coupled.coupled_result": ("CoupledResult", "FittedCoupledModel"),
+    "facade.coupled.result": ("CoupledResult", "FittedCoupledModel"),
     "facade.diagnose": ("diagnose", "function_simulator", "plan_experiment"),
     "facade.engine_choice": ("Ray",),
     "facade.explain_residual": ("explain_residual",),

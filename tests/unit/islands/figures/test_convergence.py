@@ -16,12 +16,10 @@ def make_result(history=(), models=()):
     entries = tuple(
         SimpleNamespace(
             model=SimpleNamespace(size=size),
-            assessment=SimpleNamespace(
-                metrics={
-                    part: {"free_run": SimpleNamespace(mape=error)}
-                    for part, error in (("estimation", estimation), ("validation", validation))
-                }
-            ),
+            metrics={
+                part: {"free_run": SimpleNamespace(mape=error)}
+                for part, error in (("estimation", estimation), ("validation", validation))
+            },
         )
         for size, estimation, validation in models
     )
