@@ -16,9 +16,9 @@ pytestmark = pytest.mark.ci
 
 #: Data files by package, which reports, the dashboard and type checkers need.
 DATA = {
-    "islands": ("py.typed",),
+    "islands": ("py.typed", "reports/templates/report.html", "reports/templates/diagnosis.html"),
     "islands_api": ("py.typed", "dashboard/index.html", "dashboard/islands.css", "dashboard/islands.js"),
-    "islands_service": ("templates/report.html", "templates/diagnosis.html"),
+    "islands_service": ("py.typed",),
 }
 
 
