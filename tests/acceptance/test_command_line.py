@@ -193,8 +193,9 @@ def test_errors_say_what_to_do_and_keep_existing_results(folder: Path) -> None:
     assert "--force" in message
     assert (folder / "fit/result.json").read_bytes() == before
     assert "unknown published model" in fail("show", "published:15")
-    assert "cannot read the model file" in fail("show", folder / "nothing.json")
-    assert "is not a model file" in fail("show", folder / "fit/result.json")
+    assert "there is no file or folder" in fail("show", folder / "nothing.json")
+    (folder / "other.json").write_text("{}")
+    assert "holds no model, result or simulation" in fail("show", folder / "other.json")
     assert "unknown system 'pendulum': take one of bouc-wen-piezo" in fail(
         "systems", "make", "pendulum", "--out", folder / "p.csv"
     )

@@ -70,7 +70,7 @@ class Limits:
 
 
 #: Approximate sizes of a cached evaluation and of a cached selection of terms, in bytes.
-_EVALUATION_BYTES, _SELECTION_BYTES = 1_500, 1_000
+_EVALUATION_BYTES, _SELECTION_BYTES = 1_000, 600
 
 #: A structure and the decision whether to prune it.
 _Key = tuple[frozenset[int], bool]

@@ -8,12 +8,14 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.estimate import estimate
+from islands.evolution.err_targets import ERR_TARGETS
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, make_regressor
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.expressions.tree import height
+from islands.kernels.err_selection import INCREMENT, OUTPUT, OUTPUT_SINGLE
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import Status
 from islands.simulation.predictors import multiple_shooting
@@ -316,6 +318,10 @@ def test_model_13_as_genes_has_the_fitness_of_constrained_least_squares():
     assert found.fitness == pytest.approx(simulated.mean_squared_error, rel=1e-7)
     # The error of its free run is 0.3 % of the range (Table 1); intervals of 0.5 s have no larger error.
     assert 100 * found.fitness**0.5 / data.output_range < 0.4
+
+
+def test_the_targets_of_the_settings_are_those_of_the_kernel():
+    assert tuple(ERR_TARGETS.values()) == (OUTPUT, INCREMENT, OUTPUT_SINGLE)
 
 
 @pytest.mark.parametrize(("number", "shrinks_to"), [("12", 6), ("13", 7)])

@@ -94,7 +94,7 @@ def test_every_row_of_every_table_has_a_reason(section):
 def test_seeds_are_compared_with_the_published_error(section):
     seeds = rows(section, "The literal search, seed by seed")
     assert [row[0] for row in seeds] == ["(13), published", "seed 0", "seed 1", "seed 2"]
-    assert "0.40 times the published error with as many terms" in seeds[1][-1]
+    assert "0.40 times the published error, as many terms" in seeds[1][-1]
     assert "2.00 times" in seeds[2][-1]
     assert "diverges" in seeds[3][-1]
 
