@@ -135,7 +135,7 @@ class Service:
         """Wait until a job has reached a generation; return its current one."""
         return int(str(eventually(lambda: (at := self.generation(job)) >= generation and at)))
 
-    def ended(self, job: str, seconds: float = 120.0) -> dict[str, Any]:
+    def ended(self, job: str, seconds: float = 240.0) -> dict[str, Any]:
         """Wait until a job has ended and return it."""
         deadline, tag = time.monotonic() + seconds, ""
         while True:
