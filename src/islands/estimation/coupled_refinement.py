@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.coupled_record import CoupledRecord
-from islands.estimation.damped_least_squares import Minimum, find_directions, minimise
+from islands.estimation.damped_least_squares import find_directions, minimise
 from islands.estimation.parameter_constraints import constraint
 from islands.simulation.coupled_free_run import CoupledSimulator
 from islands.simulation.coupled_model import CoupledModel
@@ -64,7 +64,7 @@ def refine_coupled(
     if directions is None or error is None:
         return None
     found = minimise(
-        *(residual, Minimum(theta, error, 0), directions), max_steps=max_steps, min_gain=_MIN_GAIN, stop=stop
+        *(residual, theta, error, directions), max_steps=max_steps, min_gain=_MIN_GAIN, stop=stop
     )
     return model.with_parameters(found.theta.tolist()) if found.steps else None
 

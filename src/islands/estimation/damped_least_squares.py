@@ -42,7 +42,8 @@ class Minimum:
 
 def minimise(
     residual: Residual,
-    start: Minimum,
+    theta: NDArray[np.float64],
+    error: NDArray[np.float64],
     directions: NDArray[np.float64],
     *,
     max_steps: int,
@@ -55,8 +56,8 @@ def minimise(
     Parameters
     ----------
     residual : Residual
-    start : Minimum
-        Parameters at which the residual does not diverge.
+    theta, error : ndarray, shapes (terms,) and (samples,)
+        Parameters at the start, and the residual there.
     directions : ndarray, shape (terms, free)
         Directions of the steps. Its columns have the magnitudes of the parameters.
     max_steps : int
@@ -68,8 +69,7 @@ def minimise(
     stop : callable
         Called before each step. Once it returns true, the minimisation ends with the parameters so far.
     """
-    theta, error, steps = start.theta, start.error, start.steps
-    damping = _DAMPING
+    damping, steps = _DAMPING, 0
     normal, gradient = normal_equations(residual, theta, error, directions)
     while steps < max_steps and damping < _MAX_DAMPING and not stop():
         damped = normal + damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))

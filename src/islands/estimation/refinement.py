@@ -14,7 +14,6 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.covariance import sandwich_of_jacobian
 from islands.estimation.damped_least_squares import (
-    Minimum,
     compute_jacobian,
     find_directions,
     mean_square,
@@ -109,7 +108,7 @@ def refine(
     error = residual(theta)
     assert error is not None, "the initial simulation did not diverge"
     found = minimise(
-        *(residual, Minimum(theta, error, 0), directions),
+        *(residual, theta, error, directions),
         max_steps=max_steps,
         min_gain=_MIN_GAIN,
         is_allowed=constrained.has_signs,

@@ -89,6 +89,14 @@ def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> No
     Path(path).write_text(f"{export(model, kind).rstrip()}\n", encoding="utf-8")
 
 
+def export_or_write(model: Model | CoupledModel, kind: str, path: str | Path | None) -> str | None:
+    """Return a model as text, or write it to a file if there is a path; see `export` and `write_export`."""
+    if path is None:
+        return export(model, kind)
+    write_export(model, kind, path)
+    return None
+
+
 def _measure(model: Model | CoupledModel) -> Model | CoupledModel:
     """Return the model of the measured signals, with the offsets in its equation."""
     return measured_coupled_model(model) if isinstance(model, CoupledModel) else measured_model(model)

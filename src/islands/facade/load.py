@@ -24,6 +24,9 @@ from islands.systems.published_models import get_published_model
 #: Values of `load`; each has ``simulate`` and ``export``.
 Loaded: TypeAlias = Result | FittedModel | FittedCoupledModel | SavedSimulation | SavedDiagnosis
 
+#: A JSON object.
+_Document: TypeAlias = dict[str, Any]
+
 #: Files and folders that can be loaded, for messages.
 KINDS = (
     "a result folder, a model file, the folder of a diagnosis, an extended.json, ode:FILE.toml, "
@@ -70,7 +73,7 @@ def load(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> 
     reader = _READERS.get(schema.partition("/")[0])
     if reader is None:
         raise ModelError(f"{file} holds no model, result or simulation: give {KINDS}")
-    return reader(file, primitives)
+    return reader(file, document, primitives)
 
 
 def _find_document(path: Path) -> Path:
@@ -84,7 +87,7 @@ def _find_document(path: Path) -> Path:
     return path
 
 
-def _read_document(file: Path) -> dict[str, Any]:
+def _read_document(file: Path) -> _Document:
     try:
         document = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
@@ -102,11 +105,11 @@ def _read_equations(text: str) -> OdeSpec | FmuSpec:
     return found
 
 
-def _load_result(file: Path, primitives: Mapping[str, Primitive]) -> Result:
+def _load_result(file: Path, _document: _Document, primitives: Mapping[str, Primitive]) -> Result:
     return read_result(file.parent, primitives)
 
 
-def _load_model(file: Path, primitives: Mapping[str, Primitive]) -> FittedModel:
+def _load_model(file: Path, _document: _Document, primitives: Mapping[str, Primitive]) -> FittedModel:
     """Read a model file; a model of a result folder has the errors and the bands of the result."""
     folder = file.absolute().parent.parent
     if file.absolute().parent.name == "models" and (folder / "result.json").is_file():
@@ -116,33 +119,37 @@ def _load_model(file: Path, primitives: Mapping[str, Primitive]) -> FittedModel:
     return FittedModel.from_model(read_model(file, primitives))
 
 
-def _load_coupled(file: Path, primitives: Mapping[str, Primitive]) -> FittedCoupledModel:
+def _load_coupled(file: Path, document: _Document, primitives: Mapping[str, Primitive]) -> FittedCoupledModel:
     """Read a model of several outputs, with the warm-up of the errors of its folder."""
     if file.name == "result.json":
-        warm_up = _read_document(file).get("warm_up")
+        warm_up = document.get("warm_up")
         model = read_coupled_model(file.parent, primitives)
         return FittedCoupledModel(model, model.maximum_lag if warm_up is None else int(warm_up))
     model = read_coupled_model(file, primitives)
     return FittedCoupledModel(model, model.maximum_lag)
 
 
-def _load_extended(file: Path, _primitives: Mapping[str, Primitive]) -> SavedSimulation:
+def _load_extended(file: Path, _document: _Document, _primitives: Mapping[str, Primitive]) -> SavedSimulation:
+    return _read_extended(file)
+
+
+def _read_extended(file: Path) -> SavedSimulation:
     spec = parse_spec(f"model:{file}")
     assert isinstance(spec, LocalExtendedSpec)
     return SavedSimulation(spec)
 
 
-def _load_diagnosis(file: Path, primitives: Mapping[str, Primitive]) -> SavedDiagnosis:
-    folder, document = file.parent, _read_document(file)
+def _load_diagnosis(file: Path, document: _Document, _primitives: Mapping[str, Primitive]) -> SavedDiagnosis:
+    folder = file.parent
     if "verdict" not in document:
         raise ModelError(f"{file} is damaged: it has no verdict. Diagnose again, or give {KINDS}")
     extended = folder / EXTENDED_FILE
-    extension = _load_extended(extended, primitives) if extended.is_file() else None
+    extension = _read_extended(extended) if extended.is_file() else None
     return SavedDiagnosis(folder, MappingProxyType(document), extension)
 
 
 #: Readers by the schema of the document, without its version.
-_READERS: Mapping[str, Callable[[Path, Mapping[str, Primitive]], Loaded]] = MappingProxyType(
+_READERS: Mapping[str, Callable[[Path, _Document, Mapping[str, Primitive]], Loaded]] = MappingProxyType(
     {
         "islands.result": _load_result,
         "islands.model": _load_model,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from islands.data.coupled_record import CoupledRecord
-from islands.export import export, write_export
+from islands.export import export_or_write
 from islands.facade.results.result import Result
 from islands.io.coupled_models import coupled_equation, coupled_json, coupled_signals
 from islands.io.result_folder import record_document
@@ -60,10 +60,7 @@ class FittedCoupledModel:
 
     def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
         """Return the coupled model as text in a format of ``EXPORTS``, or write it to a file."""
-        if path is None:
-            return export(self.model, kind)
-        write_export(self.model, kind, path)
-        return None
+        return export_or_write(self.model, kind, path)
 
     def __repr__(self) -> str:
         names, equations = ", ".join(self.model.output_names), "; ".join(self.equation.splitlines())

@@ -1,6 +1,5 @@
 """`DiagnosisResult`: sentences, files, figures and extended simulation of a diagnosis."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from islands.facade.results.notebook_html import render_sentences
 from islands.facade.results.saved_simulation import SavedSimulation
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.result_text.diagnosis_text import summarise_diagnosis
-from islands.io.simulator_spec.document import extended_json
+from islands.io.simulator_spec.document import extended_document, extended_json
 from islands.io.simulator_spec.specification import EXTENDED_FILE, LocalExtendedSpec
 from islands.progress import Steps
 from islands.simulation.predictors import Simulation
@@ -136,12 +135,12 @@ class DiagnosisResult(Diagnosis):
         ModelError
             The diagnosis added no effect to the simulation.
         """
-        if self.extended_document is None:
+        if self.gain is None:
             raise ModelError(
                 f"there is no extended simulation, because the verdict of the diagnosis is "
                 f"{str(self.verdict)!r}: simulate what was diagnosed, {self.base.simulation.simulator.name}"
             )
-        return SavedSimulation(LocalExtendedSpec.model_validate(json.loads(self.extended_document)))
+        return SavedSimulation(LocalExtendedSpec.model_validate(extended_document(self.best, self.record)))
 
     def simulate(self, record: "RecordLike", columns: Mapping[str, NDArray[Any]] | None = None) -> Simulation:
         """Simulate a record with the extended simulation; see `SavedSimulation.simulate`."""

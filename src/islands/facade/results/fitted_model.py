@@ -14,7 +14,7 @@ from islands.errors import ModelError, lookup
 from islands.estimation.constraints.checks import ConstraintCheck
 from islands.estimation.estimators import least_squares_bias
 from islands.evolution.search_result import SearchResult
-from islands.export import export, write_export
+from islands.export import export_or_write
 from islands.facade.results.model_analysis import linearise
 from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
 from islands.facade.results.notebook_html import render_html
@@ -41,9 +41,6 @@ if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
 
     from islands.io.data_frames import RecordLike
-
-#: Content of a mapping that nothing was read for.
-_EMPTY: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -81,7 +78,7 @@ class FittedModel:
     shooting_interval: int
     prediction_bands: PredictionBands | None
     output_unit: str
-    document: Mapping[str, Any] = field(default_factory=lambda: _EMPTY)
+    document: Mapping[str, Any] = field(default_factory=dict)
     _assessment: Assessment | None = None
     _search_result: SearchResult | None = None
 
@@ -90,13 +87,13 @@ class FittedModel:
         """Return a model of a search result."""
         return cls(
             *(assessment.model, rank, assessment.metrics, assessment.warm_up, found.shooting_interval),
-            *(assessment.bands, found.record.output_unit, _EMPTY, assessment, found),
+            *(assessment.bands, found.record.output_unit, {}, assessment, found),
         )
 
     @classmethod
     def from_model(cls, model: Model) -> "FittedModel":
         """Return a model outside of a result."""
-        return cls(model, None, _EMPTY, model.maximum_lag, SHOOTING, None, "")
+        return cls(model, None, {}, model.maximum_lag, SHOOTING, None, "")
 
     @property
     def assessment(self) -> Assessment:
@@ -406,10 +403,7 @@ class FittedModel:
         SettingsError
             The format is unknown, or is not text and no path is given.
         """
-        if path is None:
-            return export(self.model, kind)
-        write_export(self.model, kind, path)
-        return None
+        return export_or_write(self.model, kind, path)
 
     def __str__(self) -> str:
         return self.equation

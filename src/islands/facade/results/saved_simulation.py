@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
-from islands.export import FILE_EXPORTS, export, write_export
+from islands.export import FILE_EXPORTS, export_or_write
 from islands.export.closed_form import closed_form
 from islands.export.extension import export_extended
 from islands.facade.results.model_simulation import simulate
@@ -102,11 +102,7 @@ class SavedSimulation:
                 f"{self.spec.name} is a simulation that was not diagnosed: give a model or an extended.json"
             )
         if kind in FILE_EXPORTS:
-            model = closed_form(self.spec)
-            if path is None:
-                return export(model, kind)
-            write_export(model, kind, path)
-            return None
+            return export_or_write(closed_form(self.spec), kind, path)
         text = export_extended(self.spec, kind)
         if path is None:
             return text
