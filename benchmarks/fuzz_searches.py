@@ -38,7 +38,7 @@ from islands.facade.results.result import Result
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.result_folder import result_json
 from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.model.candidate_library import LIBRARIES
+from islands.models.candidate_library import LIBRARIES
 
 Generator = np.random.Generator
 Signal = NDArray[np.float64]

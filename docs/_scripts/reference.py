@@ -26,7 +26,7 @@ from islands.export import EXPORTS, FILE_EXPORTS
 from islands.expressions.primitives import PRIMITIVES
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.io.records import READERS
-from islands.model.candidate_library import LIBRARIES
+from islands.models.candidate_library import LIBRARIES
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED
 from islands_service.engines import ENGINES

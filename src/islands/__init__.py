@@ -53,11 +53,11 @@ _PUBLIC = {
     "io.data_frames": ("as_record",),
     "io.models": ("read_model", "write_model"),
     "io.records": ("read_record", "write_record"),
-    "model.model": ("Model", "make_model"),
-    "model.operating_point": ("static_characteristic",),
-    "model.sympy_expression": ("to_sympy",),
+    "models.narx": ("Model", "make_model"),
+    "models.operating_point": ("static_characteristic",),
+    "models.sympy_expression": ("to_sympy",),
     "simulation.step_response": ("step_response",),
-    "simulation.coupled_model": ("CoupledModel",),
+    "models.coupled_narx": ("CoupledModel",),
 }
 _MODULES = {name: module for module, names in _PUBLIC.items() for name in names}
 

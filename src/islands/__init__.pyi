@@ -55,11 +55,11 @@ from islands.io.models import read_model as read_model
 from islands.io.models import write_model as write_model
 from islands.io.records import read_record as read_record
 from islands.io.records import write_record as write_record
-from islands.model.model import Model as Model
-from islands.model.model import make_model as make_model
-from islands.model.operating_point import static_characteristic as static_characteristic
-from islands.model.sympy_expression import to_sympy as to_sympy
-from islands.simulation.coupled_model import CoupledModel as CoupledModel
+from islands.models.coupled_narx import CoupledModel as CoupledModel
+from islands.models.narx import Model as Model
+from islands.models.narx import make_model as make_model
+from islands.models.operating_point import static_characteristic as static_characteristic
+from islands.models.sympy_expression import to_sympy as to_sympy
 from islands.simulation.step_response import step_response as step_response
 
 __version__: str

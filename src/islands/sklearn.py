@@ -17,8 +17,8 @@ from islands.distribution import describe_missing_extra
 from islands.errors import IslandsError, SettingsError, suggest
 from islands.facade.fit import fit
 from islands.facade.identify import identify
-from islands.model.candidate_library import get_library
-from islands.model.model import Model
+from islands.models.candidate_library import get_library
+from islands.models.narx import Model
 from islands.simulation.predictors import free_run
 
 try:

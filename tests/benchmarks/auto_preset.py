@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import islands
 from islands.data.dataset import Dataset
 from islands.errors import IslandsError
-from islands.model.candidate_library import LIBRARIES
+from islands.models.candidate_library import LIBRARIES
 from support.measured_portfolio import MEASURED
 from support.portfolio_records import KINDS
 

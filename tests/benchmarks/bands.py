@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import islands
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.systems.signals import filtered_noise
 
 Signal = NDArray[np.float64]

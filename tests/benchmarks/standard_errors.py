@@ -17,7 +17,7 @@ from islands.estimation.estimate import estimate
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.estimators import estimate_with
 from islands.expressions.parsing import parse
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.simulation.outcome import EvaluationOutcome
 from support.noisy_records import NOISES, TERMS, TRUE, coverage, make_noisy_record
 

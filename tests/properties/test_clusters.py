@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES
 from islands.expressions.tree import Apply, Constant, Lagged, Shift, content, lags
-from islands.model.clusters import OUTPUT_AT_REST, clusters, steady_state
-from islands.model.regressor import canonical, regressor
+from islands.models.clusters import OUTPUT_AT_REST, clusters, steady_state
+from islands.models.regressor import canonical, regressor
 from support.strategies import grid, leaves, nearly, phi_factors, regressors, settled_value, signals
 
 

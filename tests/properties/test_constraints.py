@@ -13,9 +13,9 @@ from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.expressions.tree import Lagged
-from islands.model.clusters import OUTPUT_AT_REST, steady_state
-from islands.model.model import make_model
-from islands.model.regressor import regressor
+from islands.models.clusters import OUTPUT_AT_REST, steady_state
+from islands.models.narx import make_model
+from islands.models.regressor import regressor
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run

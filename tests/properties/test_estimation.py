@@ -20,7 +20,7 @@ from islands.estimation.estimate import estimate
 from islands.estimation.least_squares import least_squares
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from support.regressions import problem, seeds, squares
@@ -334,7 +334,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.estimation.least_squares import factorise, least_squares
 from islands.expressions.tree import (Lagged)
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.expressions.parsing import parse
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix
 

@@ -17,7 +17,7 @@ from islands.evolution.settings import Settings
 from islands.evolution.variation import random_genes
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
-from islands.model.model import Model, canonical_order
+from islands.models.narx import Model, canonical_order
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting

@@ -19,7 +19,7 @@ from islands.expressions.parsing import parse
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
 from islands.expressions.printing import latex, plain
 from islands.expressions.tree import Apply, Constant, Lagged, Shift, content, lags, remove_shifts, walk
-from islands.model.regressor import canonical, regressor
+from islands.models.regressor import canonical, regressor
 from support.strategies import (
     any_number,
     expressions,
@@ -244,10 +244,10 @@ def test_latex_never_puts_an_exponent_on_an_exponent_or_a_fraction(expression):
 
 
 DETERMINED = """
-from islands.model.clusters import clusters
+from islands.models.clusters import clusters
 from islands.expressions.tree import (Lagged, content, lags)
-from islands.model.model import make_model
-from islands.model.equations import equation, latex_equation
+from islands.models.narx import make_model
+from islands.models.equations import equation, latex_equation
 from islands.expressions.parsing import parse
 from islands.expressions.printing import at_rest
 terms = ["max(y(k-3), u2(k-1))*tanh(u1(k-2))", "u1(k-1)*sign(u1(k-1) - u1(k-4))^3", "y(k-1)", "3", "u2(k-7)",
@@ -318,7 +318,7 @@ CARRIED = """
 import pickle, sys
 from islands.expressions.tree import (walk)
 from islands.expressions.parsing import parse
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 trees = [parse(text) for text in sys.argv[1:]]
 regressors = [regressor(tree)[1] for tree in trees]
 carried = sys.stdin.buffer.read()

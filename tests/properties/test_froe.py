@@ -17,7 +17,7 @@ from islands.estimation.structure_selection.froe import froe
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.kernels import err_selection
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix
 from support.regressions import problem, seeds, squares
 

@@ -12,7 +12,7 @@ from islands.evolution.hall_of_fame import DEPTH, HallOfFame, merge, pareto_fron
 from islands.evolution.individual import Individual, make_regressor
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged, Shift
-from islands.model.model import canonical_order
+from islands.models.narx import canonical_order
 
 #: The leaves give more structures of one size than a hall keeps.
 LEAVES = [Lagged(channel, lag) for channel in (0, 1) for lag in (1, 2, 3, 4, 5, 6)]

@@ -17,7 +17,7 @@ from islands.errors import RecordError
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.kernels.summation import total
-from islands.model.model import make_model
+from islands.models.narx import make_model
 from islands.simulation.layout import WIDTHS, layout
 from islands.simulation.linked import LinkedModel
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead

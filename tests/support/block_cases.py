@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.export.block import Block, make_sampled_block
-from islands.model.model import Model
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import Model
 from islands.simulation.coupled_free_run import coupled_free_run
-from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.programs import CASES, model, record, record_of

@@ -6,8 +6,8 @@ from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
-from islands.model.model import make_model
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import make_model
 
 
 def equation(terms, inputs, output, dt=0.1):

@@ -17,8 +17,8 @@ from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES
 from islands.expressions.tree import Apply, Constant, Lagged, Shift
-from islands.model.model import make_model
-from islands.model.regressor import regressor
+from islands.models.narx import make_model
+from islands.models.regressor import regressor
 
 #: Number of inputs.
 INPUTS = 2

@@ -22,7 +22,7 @@ from islands.io.checkpoints import history_document
 from islands.io.models import model_json
 from islands.io.result_folder import result_document
 from islands.io.result_text.model_description import describe
-from islands.model.equations import equation
+from islands.models.equations import equation
 from islands.progress import StoppedError
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError

@@ -7,7 +7,7 @@ from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_delays import expand_delays
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
 from islands.evolution.settings import Settings
-from islands.model.candidate_library import candidates, count_inputs
+from islands.models.candidate_library import candidates, count_inputs
 from islands_service.domain.job_spec import Identification
 
 #: Largest values over REST of settings that would otherwise cost memory rather than time.

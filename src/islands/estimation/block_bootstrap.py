@@ -20,7 +20,7 @@ from islands.data.dataset import Dataset
 from islands.estimation.damped_least_squares import compute_jacobian, find_directions, inner_products
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.shooting_residual import ShootingResidual
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.simulation.outcome import EvaluationOutcome
 
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from islands.data.coupled_record import CoupledRecord
 from islands.estimation.damped_least_squares import find_directions, minimise
 from islands.estimation.parameter_constraints import constraint
+from islands.models.coupled_narx import CoupledModel
 from islands.simulation.coupled_free_run import CoupledSimulator
-from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.outcome import EvaluationOutcome
 
 #: Refinement ends when a step reduces the squared error by a smaller relative amount.

@@ -11,8 +11,8 @@ from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.constraints.constraint import Constrained
 from islands.estimation.parameter_constraints import constraint
 from islands.expressions.tree import Lagged
-from islands.model.model import Model, canonical_order
-from islands.model.regressor import Regressor
+from islands.models.narx import Model, canonical_order
+from islands.models.regressor import Regressor
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import EvaluationOutcome, Status
 

@@ -14,7 +14,7 @@ from islands.estimation.extended_least_squares import extended_least_squares
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import refine
 from islands.expressions.tree import Lagged
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import EvaluationOutcome, Status
 

@@ -16,8 +16,8 @@ from islands.data.dataset import Dataset
 from islands.estimation.constraints.constraint import Direction
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.froe import froe
-from islands.model.model import canonical_order
-from islands.model.regressor import Regressor
+from islands.models.narx import canonical_order
+from islands.models.regressor import Regressor
 from islands.program.regressor_matrix import gram_matrix
 from islands.simulation.outcome import EvaluationOutcome
 

@@ -13,8 +13,8 @@ from islands.estimation.constraints.constraint import Constraint
 from islands.estimation.constraints.parser import parse_statements
 from islands.estimation.constraints.parts import ClusterSums, StaticGain, Symmetry
 from islands.expressions.tree import Expression
-from islands.model.clusters import OUTPUT_AT_REST, steady_state
-from islands.model.regressor import Regressor
+from islands.models.clusters import OUTPUT_AT_REST, steady_state
+from islands.models.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
 
 #: Property 1 (the paper, section 3): with these sums every output is an equilibrium at constant input.

@@ -21,7 +21,7 @@ from islands.estimation.damped_least_squares import (
 )
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.shooting_residual import ShootingResidual
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting
 

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.kernels.simulate import DIVERGED, Layout, simulate
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.program.term_pool import link
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound

@@ -22,7 +22,7 @@ from islands.evolution.settings import Settings
 from islands.expressions.tree import Expression, Lagged
 from islands.kernels import population as kernel
 from islands.kernels.pair_table import PLACE_BYTES, clear, complete_pairs, pair_table
-from islands.model.regressor import Regressor
+from islands.models.regressor import Regressor
 from islands.program.regressor_matrix import select_rows
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status

@@ -9,7 +9,7 @@ from islands.evolution.individual import make_regressor
 from islands.expressions.tree import Expression
 from islands.kernels.codegen import NodeArrays
 from islands.kernels.parameter_reduction import Groups
-from islands.model.regressor import Regressor
+from islands.models.regressor import Regressor
 from islands.program.term_pool import Term, TermPool
 
 #: Approximate size of a gene in the index, in bytes.

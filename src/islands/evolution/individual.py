@@ -8,7 +8,7 @@ from math import inf, isnan
 
 from islands.errors import ModelError
 from islands.expressions.tree import Expression
-from islands.model.regressor import Regressor, regressor
+from islands.models.regressor import Regressor, regressor
 from islands.simulation.outcome import OK, EvaluationOutcome
 
 

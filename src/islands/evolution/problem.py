@@ -15,7 +15,7 @@ from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
 from islands.evolution.variation import Genes
 from islands.expressions.tree import Expression, height
-from islands.model.regressor import Regressor
+from islands.models.regressor import Regressor
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 

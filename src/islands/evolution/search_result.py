@@ -16,7 +16,7 @@ from islands.data.split import Split
 from islands.estimation.structure_selection.certificate import Certificate
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.history import HistoryPoint
-from islands.model.equations import equation
+from islands.models.equations import equation
 from islands.progress import Steps
 from islands.validation.assessment import MODES, Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble

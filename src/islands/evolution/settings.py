@@ -23,7 +23,7 @@ from islands.evolution.migration.topology import TOPOLOGIES, parse_topology
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.expressions.user_primitive import primitive_table
-from islands.model.candidate_library import get_library
+from islands.models.candidate_library import get_library
 
 #: Maximum number of islands, limited by the memory of a coordinator.
 MOST_ISLANDS = 10_000

@@ -19,9 +19,9 @@ from islands.export.languages.python import python_source
 from islands.export.languages.s_function import s_function_source
 from islands.io.coupled_models import coupled_json, coupled_latex, coupled_mathml, coupled_text
 from islands.io.models import model_json
-from islands.model.equations import latex_equation, mathml_equation, plain_text
-from islands.model.model import Model, measured_model
-from islands.simulation.coupled_model import CoupledModel, measured_coupled_model
+from islands.models.coupled_narx import CoupledModel, measured_coupled_model
+from islands.models.equations import latex_equation, mathml_equation, plain_text
+from islands.models.narx import Model, measured_model
 
 
 def _choose(

@@ -17,10 +17,10 @@ from islands.errors import ModelError
 from islands.expressions.printing import BRACKETED_OPERATORS, program_text
 from islands.expressions.tree import Apply, Constant, Primitive, walk
 from islands.io.coupled_models import equation_signals, input_signals, output_signals
-from islands.model.equations import equation
-from islands.model.model import Model
-from islands.model.signal_statement import describe_values, symbols
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.coupled_narx import CoupledModel
+from islands.models.equations import equation
+from islands.models.narx import Model
+from islands.models.signal_statement import describe_values, symbols
 
 
 @dataclass(frozen=True)

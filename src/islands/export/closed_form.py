@@ -24,7 +24,7 @@ from islands.io.simulator_spec.specification import (
     ModelSpec,
     SimulationSpec,
 )
-from islands.model.model import Model, make_model, measured_model
+from islands.models.narx import Model, make_model, measured_model
 
 _Terms = list[tuple[Expression, float]]
 _Values = Mapping[str, float]

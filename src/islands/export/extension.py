@@ -14,7 +14,7 @@ from islands.export.equations.matlab.equations import matlab_equations
 from islands.io.simulator_spec.ode_spec import OdeParameterSpec, OdeSpec
 from islands.io.simulator_spec.spec_base import ValueSpec
 from islands.io.simulator_spec.specification import LocalExtendedSpec
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.systems.ode.output_system import SYMBOL_MEANINGS
 
 

@@ -18,7 +18,7 @@ from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.data_frames import as_record
 from islands.io.simulator_spec.factory import make_model_simulator, make_simulator
 from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.parallel import ParallelMap
 from islands.progress import ProgressCallback, ignore_progress
 

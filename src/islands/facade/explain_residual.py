@@ -14,7 +14,7 @@ from islands.evolution.engine import Engine
 from islands.evolution.search_state import SearchState
 from islands.facade.engine_choice import Ray
 from islands.facade.identify import SearchCallback, identify
-from islands.model.equations import named_equation
+from islands.models.equations import named_equation
 from islands.progress import ProgressCallback, Stop, ignore_progress, never_stop
 from islands.simulation.predictors import free_run
 

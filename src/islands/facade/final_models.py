@@ -21,7 +21,7 @@ from islands.evolution.individual import Individual, unique_structures
 from islands.evolution.problem import Problem
 from islands.evolution.search_result import rank_models
 from islands.evolution.settings import Settings
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run, multiple_shooting

@@ -42,7 +42,7 @@ from islands.facade.trials.library import make_trial_library
 from islands.facade.trials.rate_selection import select_rate
 from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
-from islands.model.candidate_library import full_set
+from islands.models.candidate_library import full_set
 from islands.program.primitive_functions import row_address
 from islands.progress import (
     ProgressCallback,

@@ -43,8 +43,8 @@ from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.rate_selection import select_rate
-from islands.model.candidate_library import full_set
-from islands.model.regressor import Regressor
+from islands.models.candidate_library import full_set
+from islands.models.regressor import Regressor
 from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import Assessment, assess

@@ -33,9 +33,9 @@ from islands.kernels.population import (
     evaluate_individuals,
     select_terms,
 )
-from islands.model.model import make_model
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import make_model
 from islands.simulation.coupled_free_run import coupled_free_run
-from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED

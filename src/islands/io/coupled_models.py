@@ -13,7 +13,8 @@ from islands.errors import ModelError
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.io.models import model_from_json, model_json, write_model_text
-from islands.model.equations import (
+from islands.models.coupled_narx import CoupledModel
+from islands.models.equations import (
     latex_equation,
     latex_statement,
     mathml_equation,
@@ -21,8 +22,7 @@ from islands.model.equations import (
     named_equation,
     signal_names,
 )
-from islands.model.signal_statement import join_statements, symbols
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.signal_statement import join_statements, symbols
 
 COUPLED_SCHEMA = "islands.coupled-model/1"
 

@@ -12,8 +12,8 @@ from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.printing import plain
 from islands.expressions.tree import Primitive
-from islands.model.model import Model
-from islands.model.regressor import Regressor, regressor
+from islands.models.narx import Model
+from islands.models.regressor import Regressor, regressor
 from islands.validation.ensemble import Ensemble, EnsembleStructure
 from islands.validation.prediction_bands import PredictionBands
 

@@ -16,9 +16,9 @@ from islands.expressions.printing import plain
 from islands.expressions.tree import Primitive
 from islands.io.document_problems import find_problem
 from islands.io.result_models import read_preprocessing
-from islands.model.equations import equation, latex_equation
-from islands.model.model import Model, canonical_order
-from islands.model.regressor import Regressor, regressor
+from islands.models.equations import equation, latex_equation
+from islands.models.narx import Model, canonical_order
+from islands.models.regressor import Regressor, regressor
 
 SCHEMA: Literal["islands.model/1"] = "islands.model/1"
 

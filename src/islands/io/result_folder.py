@@ -16,8 +16,8 @@ from islands.io.certificates import certificates_document
 from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
-from islands.model.equations import equation, latex_equation
-from islands.model.signal_statement import describe_signals
+from islands.models.equations import equation, latex_equation
+from islands.models.signal_statement import describe_signals
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.ensemble import Ensemble
 from islands.validation.physics import PhysicsChecks

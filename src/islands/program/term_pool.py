@@ -10,7 +10,7 @@ from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primit
 from islands.kernels import codegen, interpreter
 from islands.kernels.codegen import CONSTANT, LAGGED, NodeArrays
 from islands.kernels.interpreter import CALL, MAX_FACTORS, MULTIPLY, Program
-from islands.model.regressor import Regressor
+from islands.models.regressor import Regressor
 from islands.program.primitive_functions import row_address
 
 #: Primitives that are instructions of the interpreter; all others are called through an address.

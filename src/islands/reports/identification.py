@@ -9,7 +9,7 @@ from markupsafe import Markup
 from islands.evolution.search_result import SearchResult
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.model_table import LEGEND, columns, number, rows
-from islands.model.equations import mathml_equation, named_term
+from islands.models.equations import mathml_equation, named_term
 from islands.reports.rendering import TEMPLATES, inline_svg
 
 #: Captions of the figures, in the order of the report.

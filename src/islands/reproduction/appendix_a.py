@@ -24,8 +24,8 @@ from islands.evolution.individual import Individual
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import make_problem
 from islands.figures.monte_carlo import MonteCarloGroup, ScanLine, draw_groups, draw_scan
-from islands.model.equations import equation
-from islands.model.model import Model
+from islands.models.equations import equation
+from islands.models.narx import Model
 from islands.progress import never_stop
 from islands.reproduction.section import WHY, ComparisonTable, Section, SectionFigure
 from islands.reproduction.tasks import Document, ReproductionOptions, Task

@@ -16,7 +16,7 @@ from islands.figures.paper import (
     draw_training_data,
     draw_validation,
 )
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.reproduction.ablation import (
     LITERAL,
     SWITCHES,

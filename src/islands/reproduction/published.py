@@ -9,7 +9,7 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.expressions.parsing import parse
-from islands.model.model import Model, make_model
+from islands.models.narx import Model, make_model
 from islands.reproduction.searches import measure_errors, model_document
 from islands.reproduction.tasks import Document
 from islands.systems.published_models import Published

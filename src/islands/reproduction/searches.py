@@ -9,8 +9,8 @@ from islands.evolution.individual import Individual
 from islands.evolution.island import Island, first_generation, step
 from islands.evolution.presets import resolve_settings, with_tuples
 from islands.expressions.parsing import parse
-from islands.model.equations import plain_text
-from islands.model.model import Model, make_model
+from islands.models.equations import plain_text
+from islands.models.narx import Model, make_model
 from islands.reproduction.tasks import Document
 from islands.simulation.predictors import free_run
 from islands.validation.metrics import metrics

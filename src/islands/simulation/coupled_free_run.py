@@ -13,8 +13,8 @@ from islands.errors import RecordError, SettingsError
 from islands.kernels.interpreter import Program
 from islands.kernels.simulate_coupled import LANES, simulate_coupled
 from islands.kernels.summation import dot
+from islands.models.coupled_narx import CoupledModel
 from islands.program.term_pool import link
-from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.layout import check_warm_up, find_intervals
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.predictors import divergence_bound

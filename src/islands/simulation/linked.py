@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from islands.errors import RecordError
 from islands.kernels.interpreter import Program
 from islands.kernels.simulate_coupled import LANES, MANY_LANES, simulate_coupled
-from islands.model.regressor import Regressor
+from islands.models.regressor import Regressor
 from islands.program.term_pool import link
 from islands.simulation.predictors import BOUND, divergence_bound_of_range
 

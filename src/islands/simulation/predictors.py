@@ -10,7 +10,7 @@ from islands.data.signal_map import map_signals
 from islands.errors import SettingsError
 from islands.kernels.simulate import Layout, simulate
 from islands.kernels.summation import total
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.program.term_pool import link
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status

@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
-from islands.model.model import Model
-from islands.model.operating_point import find_equilibrium
+from islands.models.narx import Model
+from islands.models.operating_point import find_equilibrium
 from islands.simulation.predictors import BOUND, free_run
 
 #: Steps of the model before the step of the input, besides the largest lag.

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from islands.errors import lookup
 from islands.expressions.parsing import parse
-from islands.model.model import Model, make_model
+from islands.models.narx import Model, make_model
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.estimation.block_bootstrap import draw_parameters
-from islands.model.model import Model
-from islands.model.regressor import Regressor
+from islands.models.narx import Model
+from islands.models.regressor import Regressor
 from islands.simulation.predictors import free_run, free_runs
 
 #: Members of an ensemble, up to rounding.

@@ -15,8 +15,8 @@ from islands.data.dataset import Dataset, join
 from islands.estimation.parameter_constraints import PROPERTY_1
 from islands.expressions import printing
 from islands.kernels.characteristic_roots import converges
-from islands.model.clusters import OUTPUT_AT_REST, clusters
-from islands.model.model import Model
+from islands.models.clusters import OUTPUT_AT_REST, clusters
+from islands.models.narx import Model
 from islands.simulation.predictors import divergence_bound, free_run
 from islands.systems.signals import hold_signal, minor_loops, sine
 

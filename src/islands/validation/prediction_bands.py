@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import Ensemble, effective_samples
 

@@ -15,7 +15,7 @@ from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.model.candidate_library import LIBRARIES
+from islands.models.candidate_library import LIBRARIES
 from islands.progress import Steps
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, progress

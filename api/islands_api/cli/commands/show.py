@@ -10,7 +10,7 @@ from islands.facade.load import load
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.result import Result
 from islands.io.result_text.text_layout import term_table, wrap
-from islands.model.equations import named_signals
+from islands.models.equations import named_signals
 from islands_api.cli import options
 
 

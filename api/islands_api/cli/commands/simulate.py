@@ -28,7 +28,7 @@ from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands.io.records.table_reading import read_table
 from islands.io.records.writer import write_coupled_simulation
-from islands.model.equations import named_signals
+from islands.models.equations import named_signals
 from islands.simulation.coupled_free_run import match_coupled
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand

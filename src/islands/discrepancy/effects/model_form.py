@@ -20,8 +20,8 @@ from islands.discrepancy.interfaces.simulator import (
 from islands.expressions.primitives import MUL, PRIMITIVES, SUB
 from islands.expressions.printing import plain
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, Shift
-from islands.model.model import Model
-from islands.model.regressor import Regressor, regressor
+from islands.models.narx import Model
+from islands.models.regressor import Regressor, regressor
 
 #: Name of the effect.
 CORE_SHAPE = "core-shape"

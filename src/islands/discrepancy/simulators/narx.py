@@ -13,8 +13,8 @@ from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import sum_output_forces
 from islands.discrepancy.interfaces.simulator import BatchSimulation, SimulationRun
 from islands.errors import ModelError
-from islands.model.model import Model, make_model
-from islands.model.regressor import Regressor
+from islands.models.narx import Model, make_model
+from islands.models.regressor import Regressor
 from islands.simulation.linked import LinkedModel
 
 #: Typical change of a parameter, relative to its value.

@@ -12,8 +12,8 @@ from islands.estimation.constraints.parts import (
     Symmetry,
 )
 from islands.estimation.parameter_constraints import constraint
-from islands.model.clusters import clusters
-from islands.model.model import Model
+from islands.models.clusters import clusters
+from islands.models.narx import Model
 
 #: Tolerance of an equality, relative to its largest term and to its target.
 TOLERANCE = 1e-9

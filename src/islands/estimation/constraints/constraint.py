@@ -21,8 +21,8 @@ from islands.estimation.constraints.parts import (
 )
 from islands.expressions.primitives import ADD, MUL
 from islands.expressions.tree import Apply, Constant, Expression, Lagged
-from islands.model.clusters import clusters
-from islands.model.regressor import Regressor, canonical
+from islands.models.clusters import clusters
+from islands.models.regressor import Regressor, canonical
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 _PRESENT = Lagged(0, 0)

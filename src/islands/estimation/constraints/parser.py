@@ -13,7 +13,7 @@ from islands.estimation.constraints.parts import (
     StaticGain,
 )
 from islands.expressions.parsing import parse
-from islands.model.regressor import Regressor, regressor
+from islands.models.regressor import Regressor, regressor
 
 #: Largest number of statements; the cost of an estimation grows with it.
 MOST_STATEMENTS = 50

@@ -11,8 +11,8 @@ from islands.expressions.derivatives import differentiate
 from islands.expressions.evaluation import value
 from islands.expressions.parity import parity
 from islands.expressions.tree import Expression
-from islands.model.clusters import steady_state
-from islands.model.regressor import Regressor
+from islands.models.clusters import steady_state
+from islands.models.regressor import Regressor
 
 
 @dataclass(frozen=True, slots=True)

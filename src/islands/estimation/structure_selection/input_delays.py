@@ -4,8 +4,8 @@ from collections.abc import Iterable, Sequence
 
 from islands.errors import SettingsError
 from islands.expressions.tree import Apply, Expression, Lagged
-from islands.model.model import canonical_order
-from islands.model.regressor import Regressor, regressor
+from islands.models.narx import canonical_order
+from islands.models.regressor import Regressor, regressor
 
 #: Largest dead time in samples. Every lag of an input costs a sample at the start of each recording.
 LARGEST_DELAY = 1000

@@ -15,9 +15,9 @@ from islands.errors import SettingsError
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.structure_selection.input_delays import delay_inputs, expand_delays
 from islands.expressions.tree import Apply, Expression, Lagged
-from islands.model.candidate_library import candidates, count_inputs, largest_degree
-from islands.model.model import canonical_order
-from islands.model.regressor import Regressor, regressor
+from islands.models.candidate_library import candidates, count_inputs, largest_degree
+from islands.models.narx import canonical_order
+from islands.models.regressor import Regressor, regressor
 from islands.simulation.outcome import EvaluationOutcome
 
 #: Terms of the forward selection that ranks the inputs.

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from islands.expressions.tree import Expression
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.systems.ode.system import OdeSystem
 
 

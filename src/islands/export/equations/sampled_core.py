@@ -12,8 +12,8 @@ from islands.expressions.primitives import ADD, MUL, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Symbol
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.specification import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
-from islands.model.equations import equation
-from islands.model.model import measured_model
+from islands.models.equations import equation
+from islands.models.narx import measured_model
 from islands.systems.ode.output_system import INPUT, SIMULATED, make_output_system
 from islands.systems.ode.system import OdeSystem
 

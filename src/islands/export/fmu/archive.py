@@ -21,8 +21,8 @@ from islands.export.fmu.description import (
     model_identifier,
 )
 from islands.export.languages.c import c_block
-from islands.model.model import Model
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import Model
 
 #: The first flag makes results equal those of the search bit for bit.
 _FLAGS = ("-ffp-contract=off", "-O2", "-std=c99", "-fvisibility=hidden")

@@ -5,8 +5,8 @@ import textwrap
 from islands.export.block import make_block
 from islands.export.languages.bodies import body
 from islands.expressions.tree import Primitive
-from islands.model.model import Model
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import Model
 
 _FILE = """\
 function y = narx_model({inputs}, y0)

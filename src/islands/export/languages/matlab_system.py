@@ -4,8 +4,8 @@ import textwrap
 
 from islands.export.block import Block, make_sampled_block
 from islands.export.languages.matlab import matlab_definition
-from islands.model.model import Model
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import Model
 
 _FILE = """\
 classdef narx_system < matlab.System

@@ -8,8 +8,8 @@ from islands.errors import ModelError
 from islands.export.block import Block, make_sampled_block
 from islands.expressions.primitives import LARGEST_EXPONENT
 from islands.expressions.tree import Primitive
-from islands.model.model import Model
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import Model
 
 _FILE = """\
 block NarxModel "NARX model of {title}"

@@ -10,8 +10,8 @@ from numbers import Integral, Real
 from islands.errors import ModelError
 from islands.export.block import make_block
 from islands.expressions.tree import Primitive
-from islands.model.model import Model
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import Model
 
 _MODULE = '''"""NARX model: {equation}
 

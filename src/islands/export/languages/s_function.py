@@ -2,8 +2,8 @@
 
 from islands.export.block import make_sampled_block
 from islands.export.languages.c import c_block
-from islands.model.model import Model
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import Model
 
 _FILE = """\
 /*

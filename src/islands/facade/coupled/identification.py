@@ -24,6 +24,7 @@ from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.rate_selection import select_rate
 from islands.io.data_frames import as_record
+from islands.models.coupled_narx import CoupledModel
 from islands.progress import (
     ProgressCallback,
     Steps,
@@ -32,7 +33,6 @@ from islands.progress import (
     ignore_progress,
     never_stop,
 )
-from islands.simulation.coupled_model import CoupledModel
 
 if TYPE_CHECKING:
     from islands.io.data_frames import FrameLike

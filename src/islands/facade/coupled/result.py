@@ -14,9 +14,9 @@ from islands.facade.results.result import Result
 from islands.io.coupled_models import coupled_equation, coupled_json, coupled_signals
 from islands.io.result_folder import record_document
 from islands.io.result_text.text_layout import term_table, wrap
+from islands.models.coupled_narx import CoupledModel
 from islands.progress import Steps
 from islands.simulation.coupled_free_run import CoupledSimulation, coupled_free_run
-from islands.simulation.coupled_model import CoupledModel
 from islands.simulation.predictors import one_step_ahead
 from islands.validation.metrics import Metrics, metrics
 

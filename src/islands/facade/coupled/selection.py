@@ -7,9 +7,9 @@ from math import inf, sqrt
 import numpy as np
 
 from islands.data.coupled_record import CoupledRecord
-from islands.model.model import Model
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import Model
 from islands.simulation.coupled_free_run import CoupledSimulator
-from islands.simulation.coupled_model import CoupledModel
 
 #: Excess of the error over the least, as a fraction, that never justifies another term.
 NEGLIGIBLE_EXCESS = 0.03

@@ -18,11 +18,11 @@ from islands.export import export_or_write
 from islands.facade.results.model_analysis import linearise
 from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
 from islands.facade.results.notebook_html import render_html
-from islands.model.equations import equation, latex_equation
-from islands.model.model import Model
-from islands.model.operating_point import static_characteristic
-from islands.model.signal_statement import describe_signals
-from islands.model.sympy_expression import to_sympy
+from islands.models.equations import equation, latex_equation
+from islands.models.narx import Model
+from islands.models.operating_point import static_characteristic
+from islands.models.signal_statement import describe_signals
+from islands.models.sympy_expression import to_sympy
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation
 from islands.simulation.step_response import StepResponse, step_response

@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from islands.distribution import describe_missing_extra
 from islands.errors import ModelError
-from islands.model.model import Model
-from islands.model.operating_point import differentiate_model
+from islands.models.narx import Model
+from islands.models.operating_point import differentiate_model
 
 if TYPE_CHECKING:
     import control

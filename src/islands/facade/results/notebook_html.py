@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from html import escape
 from typing import TYPE_CHECKING
 
-from islands.model.equations import mathml_equation
-from islands.model.model import Model
+from islands.models.equations import mathml_equation
+from islands.models.narx import Model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

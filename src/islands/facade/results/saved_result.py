@@ -15,7 +15,7 @@ from islands.facade.results.result import Result
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import read_model, terms_document
 from islands.io.result_models import check_single_output, read_shooting_interval
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.validation.metrics import Metrics
 from islands.validation.recommendation import Recommendation
 

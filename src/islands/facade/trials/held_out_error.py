@@ -23,7 +23,7 @@ from islands.estimation.structure_selection.deviations import (
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.swap_search import swap_search
 from islands.facade.trials.library import TrialLibrary
-from islands.model.regressor import Regressor
+from islands.models.regressor import Regressor
 from islands.progress import Steps, StoppedError
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run

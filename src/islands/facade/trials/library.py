@@ -8,8 +8,8 @@ from islands.data.dataset import Dataset
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.settings import Settings
-from islands.model.candidate_library import get_library
-from islands.model.regressor import Regressor
+from islands.models.candidate_library import get_library
+from islands.models.regressor import Regressor
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ from islands.estimation.structure_selection.deviations import (
 )
 from islands.facade.trials.library import TrialLibrary
 from islands.inspection.oversampling import COUNTS, is_noisy, keeps_bandwidth
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, free_run

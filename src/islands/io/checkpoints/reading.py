@@ -18,7 +18,7 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.io.checkpoints.json_reader import JsonReader
 from islands.io.checkpoints.writing import SCHEMA
-from islands.model.regressor import Regressor
+from islands.models.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 #: Expressions that are kept while a checkpoint is read.

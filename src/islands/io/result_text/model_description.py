@@ -7,14 +7,14 @@ import numpy as np
 
 from islands.estimation.constraints.checks import ConstraintCheck
 from islands.evolution.search_result import SearchResult
-from islands.model.equations import (
+from islands.models.equations import (
     named_equation,
     named_signals,
     named_statement,
     named_term,
     signal_names,
 )
-from islands.model.signal_statement import describe_values
+from islands.models.signal_statement import describe_values
 from islands.validation.assessment import Assessment
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE, ResidualStructure
 from islands.validation.prediction_bands import LEVEL

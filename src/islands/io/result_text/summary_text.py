@@ -5,7 +5,7 @@ from islands.io.certificates import summarise_certificates
 from islands.io.result_text.model_description import describe_choice, describe_findings, describe_units
 from islands.io.result_text.model_table import LEGEND, table
 from islands.io.result_text.text_layout import term_table, wrap
-from islands.model.equations import named_equation, named_signals
+from islands.models.equations import named_equation, named_signals
 
 
 def summary(found: SearchResult) -> str:

@@ -2,8 +2,8 @@
 
 from textwrap import fill
 
-from islands.model.equations import named_term, signal_names
-from islands.model.model import Model
+from islands.models.equations import named_term, signal_names
+from islands.models.narx import Model
 
 #: Largest number of characters of a line.
 WIDTH = 80

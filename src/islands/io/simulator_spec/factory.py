@@ -48,8 +48,8 @@ from islands.io.simulator_spec.specification import (
     SimulationSpec,
     parse_spec,
 )
-from islands.model.model import Model, measured_model
-from islands.model.signal_statement import describe_values
+from islands.models.narx import Model, measured_model
+from islands.models.signal_statement import describe_values
 from islands.systems.ode.output_system import SIMULATED
 
 #: Smallest number of samples from which parameters and the initial state are estimated.

@@ -18,7 +18,7 @@ from islands.data.dataset import Dataset
 from islands.export.fmu.compiler import compile_library
 from islands.export.languages.c import definition
 from islands.expressions.primitives import SIGN
-from islands.model.regressor import Regressor
+from islands.models.regressor import Regressor
 from islands.performance.benchmark.expression_source import infix
 
 

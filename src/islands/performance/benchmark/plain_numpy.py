@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.model.regressor import Regressor
+from islands.models.regressor import Regressor
 from islands.performance.benchmark.expression_source import infix
 
 Vector = NDArray[np.float64]

@@ -19,8 +19,8 @@ from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
 from islands.expressions.primitives import MUL, SIGN, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged
-from islands.model.model import canonical_order
-from islands.model.regressor import Regressor, regressor
+from islands.models.narx import canonical_order
+from islands.models.regressor import Regressor, regressor
 from islands.systems.catalogue import make_record
 
 #: Settings of the paper's case 1, with the choices of its preset when the goals were set: another selection

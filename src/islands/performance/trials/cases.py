@@ -14,8 +14,8 @@ from islands.estimation.refinement import refine
 from islands.expressions.primitives import MUL, PRIMITIVES
 from islands.expressions.tree import Apply, Expression, Lagged
 from islands.io.simulator_spec.factory import make_simulator
-from islands.model.model import Model
-from islands.model.regressor import Regressor, regressor
+from islands.models.narx import Model
+from islands.models.regressor import Regressor, regressor
 from islands.performance.trials.injection.measurement import VISIBLE_FRACTION, FaultyRecord
 from islands.performance.trials.injection.oscillator import OSCILLATOR
 from islands.performance.trials.injection.piezo import PIEZO

@@ -11,7 +11,7 @@ from islands.data.signal_map import match_rate
 from islands.data.split import Split, average_split
 from islands.errors import RecordError, SettingsError
 from islands.expressions.parsing import parse
-from islands.model.model import make_model
+from islands.models.narx import make_model
 
 
 def ramp(samples=11, **changes):

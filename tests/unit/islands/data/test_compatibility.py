@@ -7,7 +7,7 @@ from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.expressions.parsing import parse
-from islands.model.model import make_model
+from islands.models.narx import make_model
 
 
 def record(*names: str, output: str = "y_um", dt: float = 0.1, **changes: object) -> Dataset:

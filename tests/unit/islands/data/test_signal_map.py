@@ -15,9 +15,9 @@ from islands.export import export
 from islands.expressions.parsing import parse
 from islands.facade.results.model_simulation import predict, simulate
 from islands.io.models import model_from_json, model_json
-from islands.model.model import make_model, measured_model
-from islands.model.operating_point import static_characteristic
-from islands.model.signal_statement import describe_values
+from islands.models.narx import make_model, measured_model
+from islands.models.operating_point import static_characteristic
+from islands.models.signal_statement import describe_values
 from islands.simulation.predictors import free_run
 from islands.simulation.step_response import step_response
 from support.block_cases import model_case

@@ -8,7 +8,7 @@ from islands.estimation.block_bootstrap import draw_parameters
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import refine
 from islands.expressions.parsing import parse
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 
 
 def terms(*texts):

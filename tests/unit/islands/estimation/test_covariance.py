@@ -9,7 +9,7 @@ from islands.estimation.estimate import estimate
 from islands.estimation.least_squares import least_squares
 from islands.estimation.refinement import refine
 from islands.expressions.parsing import parse
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from support.noisy_records import TERMS, TRUE, coverage, make_noisy_record
 
 

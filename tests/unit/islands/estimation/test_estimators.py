@@ -10,8 +10,8 @@ from islands.estimation.estimators import estimate_with, least_squares_bias
 from islands.estimation.refinement import refine
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
-from islands.model.model import make_model
-from islands.model.regressor import regressor
+from islands.models.narx import make_model
+from islands.models.regressor import regressor
 from islands.simulation.outcome import EvaluationOutcome, Status
 from support.noisy_records import TERMS, coverage, make_noisy_record
 

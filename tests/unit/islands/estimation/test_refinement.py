@@ -12,7 +12,7 @@ from islands.estimation.estimate import estimate
 from islands.estimation.refinement import RefinedModel, refine
 from islands.estimation.shooting_residual import ShootingResidual
 from islands.expressions.parsing import parse
-from islands.model.model import make_model
+from islands.models.narx import make_model
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.physics import cluster_sums

@@ -16,8 +16,8 @@ from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.expressions.tree import Apply, height, walk
-from islands.model.candidate_library import candidates
-from islands.model.model import canonical_order
+from islands.models.candidate_library import candidates
+from islands.models.narx import canonical_order
 from support.searches import distinct_genes
 
 SETTINGS = Settings(library="phi-polynomial", library_degree=3, library_lags=3)

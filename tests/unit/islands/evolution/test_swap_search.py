@@ -15,7 +15,7 @@ from islands.evolution.individual import Individual
 from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
-from islands.model.candidate_library import candidates
+from islands.models.candidate_library import candidates
 from support.searches import record
 
 HYSTERESIS = Settings(

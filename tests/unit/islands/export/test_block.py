@@ -12,8 +12,8 @@ from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.export import EXPORTS, export
+from islands.models.coupled_narx import CoupledModel
 from islands.simulation.coupled_free_run import coupled_free_run
-from islands.simulation.coupled_model import CoupledModel
 from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record
 
 _TERMS = {"y(k-1)": 0.5, "max(u1(k-1), u3(k-2))": 0.1, "u2(k-1)*u4(k-1)*y(k-2)": -0.2, "1": 0.1 + 0.2}

@@ -13,7 +13,7 @@ from islands.expressions.primitives import LARGEST_EXPONENT, PRIMITIVES
 from islands.expressions.printing import latex, plain
 from islands.expressions.tree import Lagged, Primitive
 from islands.expressions.user_primitive import primitive
-from islands.model.regressor import canonical
+from islands.models.regressor import canonical
 
 
 @pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))

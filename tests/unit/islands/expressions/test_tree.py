@@ -20,7 +20,7 @@ from islands.expressions.tree import (
     substitute,
     walk,
 )
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 
 # Model (13) of the paper, section 7, as genes: q1 .. q5, products of two, phi1 and phi2.
 MODEL_13 = (

@@ -9,7 +9,7 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.inference.verdict import Verdict
 from islands.expressions.parsing import parse
 from islands.facade import explain_residual as module
-from islands.model.model import make_model
+from islands.models.narx import make_model
 
 RNG = np.random.default_rng(3)
 INPUT = RNG.standard_normal(200)

@@ -11,7 +11,7 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.io.result_folder import record_document, result_json
 from islands.io.result_text.summary_text import summary
-from islands.model.equations import equation, latex_equation
+from islands.models.equations import equation, latex_equation
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 from support.undrawn import undrawn_figures
 

@@ -14,8 +14,8 @@ from islands.estimation.estimators import estimate_with
 from islands.estimation.refinement import refine
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
-from islands.model.model import canonical_order
-from islands.model.regressor import regressor
+from islands.models.narx import canonical_order
+from islands.models.regressor import regressor
 from islands.simulation.predictors import free_run
 from support.identifications import BUDGET, identify, record
 

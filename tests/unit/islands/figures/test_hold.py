@@ -9,7 +9,7 @@ from islands.data.dataset import Dataset
 from islands.expressions.parsing import parse
 from islands.figures.hold import draw_holds
 from islands.figures.style import save
-from islands.model.model import Model, make_model
+from islands.models.narx import Model, make_model
 from islands.validation.physics import LEVELS, check_physics
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import pytest
 from islands.data.split import Split
 from islands.expressions.parsing import parse
 from islands.figures.registry import FIGURES
-from islands.model.model import make_model
+from islands.models.narx import make_model
 from islands.validation.assessment import assess
 from support.searches import record
 

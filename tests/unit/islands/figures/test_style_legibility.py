@@ -18,7 +18,7 @@ from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop
 from islands.figures.residuals import draw_residual_correlations
 from islands.figures.style import save
-from islands.model.model import Model, make_model
+from islands.models.narx import Model, make_model
 from islands.validation.residual_tests import residual_tests
 
 pytestmark = pytest.mark.ci

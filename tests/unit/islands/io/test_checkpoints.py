@@ -30,7 +30,7 @@ from islands.io.checkpoints import (
     write_checkpoint,
     write_hall,
 )
-from islands.model.model import canonical_order
+from islands.models.narx import canonical_order
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 
 #: Floats that only an exact round trip preserves.

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import islands
 from islands.errors import ModelError
 from islands.io.models import SCHEMA, model_from_json, model_json, read_model, terms_document, write_model
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.systems.published_models import PUBLISHED
 from support.strategies import models
 

@@ -25,7 +25,7 @@ from islands.kernels.constrained_lstsq import (
     from_gram,
 )
 from islands.kernels.parameter_reduction import expand
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.program.regressor_matrix import arrange_rows, gram_matrix, regressor_matrix, select_rows
 from islands.program.term_pool import link
 from islands.simulation.outcome import OK

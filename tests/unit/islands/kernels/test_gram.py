@@ -12,7 +12,7 @@ from islands.expressions.tree import Lagged
 from islands.kernels.gram import gram, inner_products
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK, dot
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.program.regressor_matrix import arrange_rows
 from islands.program.term_pool import link
 from support.oracles import side_by_side

@@ -30,9 +30,9 @@ from islands.kernels.population import (
     empty_terms,
     evaluate,
 )
-from islands.model.clusters import OUTPUT_AT_REST, clusters, steady_state
-from islands.model.model import Model
-from islands.model.regressor import regressor
+from islands.models.clusters import OUTPUT_AT_REST, clusters, steady_state
+from islands.models.narx import Model
+from islands.models.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from islands.program.term_pool import TermPool
 from islands.simulation.layout import layout

@@ -12,7 +12,7 @@ from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.kernels.simulate import ABANDONED, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
 from islands.kernels.summation import total
-from islands.model.model import make_model
+from islands.models.narx import make_model
 from islands.program.term_pool import link
 from islands.simulation.layout import layout
 

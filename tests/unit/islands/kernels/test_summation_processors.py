@@ -30,9 +30,9 @@ from islands.kernels.population import (
 )
 from islands.kernels.err_selection import OUTPUT
 from islands.expressions.tree import (Lagged)
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.expressions.parsing import parse
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from islands.kernels.pair_table import pair_table
 from islands.program.term_pool import TermPool

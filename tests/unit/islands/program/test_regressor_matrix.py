@@ -14,7 +14,7 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Constant, Lagged
 from islands.expressions.user_primitive import primitive
 from islands.kernels.summation import CHUNK, dot
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from support.oracles import side_by_side
 from support.strategies import INPUTS, nearly, records, regressors, settled_value

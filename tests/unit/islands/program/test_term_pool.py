@@ -19,7 +19,7 @@ from islands.kernels.interpreter import (
     MAX_FACTORS,
     SIGN,
 )
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.program.primitive_functions import row_address
 from islands.program.term_pool import TermPool, link
 from support.oracles import NUMBERS

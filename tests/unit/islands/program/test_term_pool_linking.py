@@ -22,7 +22,7 @@ from islands.kernels.interpreter import (
     SUBTRACT,
     TEMPORARY,
 )
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.program.primitive_functions import row_address
 from islands.program.term_pool import link
 from support.oracles import NUMBERS

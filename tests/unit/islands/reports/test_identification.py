@@ -2,7 +2,7 @@
 
 import islands
 from islands.data.dataset import Dataset
-from islands.model.equations import named_term
+from islands.models.equations import named_term
 from islands.reports.identification import identification_report
 from support.identifications import record
 

@@ -15,8 +15,8 @@ from islands.data.signal_map import match_rate
 from islands.errors import RecordError, SettingsError
 from islands.export import export
 from islands.io.coupled_models import read_coupled_model, write_coupled_model
+from islands.models.coupled_narx import CoupledModel, measured_coupled_model
 from islands.simulation.coupled_free_run import CoupledSimulator, coupled_free_run, match_coupled
-from islands.simulation.coupled_model import CoupledModel, measured_coupled_model
 from islands.simulation.outcome import Status
 from islands.simulation.predictors import free_run
 from support.block_cases import coupled_case

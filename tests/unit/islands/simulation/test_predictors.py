@@ -11,7 +11,7 @@ from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
-from islands.model.model import make_model
+from islands.models.narx import make_model
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, Status
 from islands.simulation.predictors import BOUND, divergence_bound, free_run, multiple_shooting, one_step_ahead

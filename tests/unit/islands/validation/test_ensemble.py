@@ -10,7 +10,7 @@ from islands.data.dataset import Dataset
 from islands.data.split import split
 from islands.estimation.estimate import estimate
 from islands.expressions.parsing import parse
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import Ensemble, ValidatedModel, effective_samples, make_ensemble
 from islands.validation.prediction_bands import calibrate_bands

@@ -17,7 +17,7 @@ from islands.expressions.parsing import parse
 from islands.io.models import read_model, write_model
 from islands.io.records import write_record
 from islands.io.records.row_range import parse_rows
-from islands.model.model import make_model
+from islands.models.narx import make_model
 from islands_api.cli import options
 from islands_api.cli.output_folder import check_folder
 from support.command_line import succeed

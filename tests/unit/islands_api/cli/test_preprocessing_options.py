@@ -9,7 +9,7 @@ from islands.discrepancy.calibration.preparation import make_context
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.expressions.parsing import parse
 from islands.io.simulator_spec.factory import make_simulator
-from islands.model.model import make_model
+from islands.models.narx import make_model
 from support.command_line import fail, stored, succeed
 from support.exported_programs import run_c
 from support.undrawn import undrawn_figures

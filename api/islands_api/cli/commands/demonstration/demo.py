@@ -13,7 +13,7 @@ import islands
 from islands.data.dataset import Dataset
 from islands.evolution.presets import PRESETS
 from islands.io.records import write_record
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.progress import Steps, StoppedError
 from islands.reproduction.published import estimate_again
 from islands.reproduction.searches import read_document, search_island

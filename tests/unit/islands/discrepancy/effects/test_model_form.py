@@ -15,7 +15,7 @@ from islands.expressions.parsing import parse
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import simulate_spec
-from islands.model.model import Model, make_model
+from islands.models.narx import Model, make_model
 from islands.performance.trials.cases import CASES
 from islands.performance.trials.injection.measurement import FaultyRecord, inject
 

@@ -25,7 +25,7 @@ from islands.io.models import model_from_json
 from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
-from islands.model.model import Model
+from islands.models.narx import Model
 from support.oscillator_fmus import write_oscillator
 from support.simulated_records import DT, EQUATIONS, FMUS, MODEL, recorded, simulate_oscillator, wave
 

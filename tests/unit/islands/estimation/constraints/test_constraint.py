@@ -7,8 +7,8 @@ from islands.errors import SettingsError
 from islands.estimation.parameter_constraints import constraint, count_free_parameters
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
-from islands.model.model import canonical_order
-from islands.model.regressor import regressor
+from islands.models.narx import canonical_order
+from islands.models.regressor import regressor
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 

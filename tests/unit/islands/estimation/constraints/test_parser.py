@@ -14,7 +14,7 @@ from islands.estimation.constraints.parts import (
 )
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.expressions.parsing import parse
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 
 
 def term(text):

@@ -19,7 +19,7 @@ from islands.estimation.structure_selection.certificate import certify, combine_
 from islands.expressions.tree import Lagged
 from islands.io.result_folder import result_document
 from islands.io.result_text.summary_text import method_text
-from islands.model.candidate_library import candidates
+from islands.models.candidate_library import candidates
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.predictors import multiple_shooting
 

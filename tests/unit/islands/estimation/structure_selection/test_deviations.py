@@ -15,7 +15,7 @@ from islands.estimation.structure_selection.deviations import (
 )
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 
 STEPS = np.random.default_rng(3)
 U = np.repeat(STEPS.uniform(-1, 1, 100), 8) + 0.1 * STEPS.normal(size=800)

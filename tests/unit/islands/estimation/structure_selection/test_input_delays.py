@@ -4,7 +4,7 @@ import pytest
 
 from islands.errors import SettingsError
 from islands.estimation.structure_selection.input_delays import check_delays, delay_inputs, expand_delays
-from islands.model.candidate_library import LIBRARIES, candidates
+from islands.models.candidate_library import LIBRARIES, candidates
 
 
 @pytest.mark.parametrize("name", LIBRARIES)

@@ -16,8 +16,8 @@ from islands.export import export
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
 from islands.io.models import model_json
-from islands.model.equations import mathml_equation
-from islands.model.regressor import Regressor
+from islands.models.equations import mathml_equation
+from islands.models.regressor import Regressor
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
 from support.programs import CASES, HOSTILE_NAMES, SAMPLES, bits, model, record, record_of

@@ -14,7 +14,7 @@ from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.facade.results.model_simulation import SIMULATION_MODES
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
-from islands.model.candidate_library import full_set
+from islands.models.candidate_library import full_set
 from islands.validation.assessment import MODES
 from islands.validation.metrics import metrics
 from islands.validation.physics import check_physics

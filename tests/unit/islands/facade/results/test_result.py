@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import islands
-from islands.model.equations import mathml_equation
+from islands.models.equations import mathml_equation
 from support.searches import record
 from support.undrawn import undrawn_figures
 

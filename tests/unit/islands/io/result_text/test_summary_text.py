@@ -11,8 +11,8 @@ from islands.expressions.parsing import parse
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.model_table import table
 from islands.io.result_text.summary_text import method_text, summary
-from islands.model.equations import named_equation, named_term
-from islands.model.model import make_model
+from islands.models.equations import named_equation, named_term
+from islands.models.narx import make_model
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics

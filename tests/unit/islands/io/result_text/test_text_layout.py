@@ -6,8 +6,8 @@ import pytest
 
 from islands.expressions.parsing import parse
 from islands.io.result_text.text_layout import term_table
-from islands.model.equations import named_equation
-from islands.model.model import make_model
+from islands.models.equations import named_equation
+from islands.models.narx import make_model
 
 LONG = "y(k-1)*sign(u(k-10) - u(k-11))*(u(k-1) - u(k-2))*abs(u(k-7) - u(k-8))"
 

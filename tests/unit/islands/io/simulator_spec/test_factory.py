@@ -17,7 +17,7 @@ from islands.io.models import model_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import ModelSpec
-from islands.model.model import make_model
+from islands.models.narx import make_model
 from islands.simulation.predictors import free_run
 
 DT = 0.01

@@ -6,7 +6,7 @@ import pytest
 
 from islands.errors import ModelError
 from islands.export.fmu.compiler import find_compiler
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.performance.benchmark import comparison, kernel_evaluator
 from islands.performance.benchmark.workload import (
     CASE1,

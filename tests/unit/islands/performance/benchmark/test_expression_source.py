@@ -10,7 +10,7 @@ from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
 from islands.expressions.tree import Apply, Constant, Lagged
-from islands.model.regressor import regressor
+from islands.models.regressor import regressor
 from islands.performance.benchmark.expression_source import infix
 from support.strategies import signals
 

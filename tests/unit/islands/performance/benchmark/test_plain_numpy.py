@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from islands.estimation.structure_selection.froe import froe
 from islands.expressions.tree import Lagged
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.performance.benchmark import plain_numpy
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix
 from islands.simulation.predictors import multiple_shooting

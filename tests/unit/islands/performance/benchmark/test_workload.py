@@ -10,7 +10,7 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Apply, Lagged, height
-from islands.model.model import Model
+from islands.models.narx import Model
 from islands.performance.benchmark import workload as module
 from islands.performance.benchmark.workload import (
     INTERVAL,

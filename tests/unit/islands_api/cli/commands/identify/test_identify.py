@@ -12,7 +12,7 @@ from islands.data.dataset import Dataset
 from islands.expressions.parsing import parse
 from islands.io.checkpoints import read_checkpoint, write_hall
 from islands.io.records import write_record
-from islands.model.model import make_model
+from islands.models.narx import make_model
 from islands.simulation.predictors import free_run
 from islands_api.cli.runs import identify as command
 from support.identify_runs import COLUMNS, DEEPEST, SMALL, STEPWISE, TWO, models, record, refused

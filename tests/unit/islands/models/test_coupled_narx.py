@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from islands.errors import ModelError
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.coupled_narx import CoupledModel
 from support.coupled_systems import TWO_MASSES, equation
 
 ONE, TWO = TWO_MASSES.models

@@ -8,9 +8,9 @@ import pytest
 from islands.errors import SettingsError
 from islands.expressions.printing import plain
 from islands.expressions.tree import Apply
-from islands.model.candidate_library import LIBRARIES, MAX_CANDIDATES, candidates, full_set, get_library
-from islands.model.clusters import steady_state
-from islands.model.model import canonical_order
+from islands.models.candidate_library import LIBRARIES, MAX_CANDIDATES, candidates, full_set, get_library
+from islands.models.clusters import steady_state
+from islands.models.narx import canonical_order
 
 
 def texts(name, degree, lags, inputs=1):

@@ -7,8 +7,8 @@ from islands.errors import ModelError
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.expressions.tree import Constant
-from islands.model.model import Model, canonical_order, make_model
-from islands.model.regressor import regressor
+from islands.models.narx import Model, canonical_order, make_model
+from islands.models.regressor import regressor
 from support.strategies import models
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from islands.expressions.parsing import parse
 from islands.expressions.printing import mathml
 from islands.expressions.tree import Apply, Lagged, Primitive
-from islands.model.equations import (
+from islands.models.equations import (
     equation,
     latex_equation,
     mathml_equation,
@@ -18,7 +18,7 @@ from islands.model.equations import (
     named_term,
     signal_names,
 )
-from islands.model.model import make_model
+from islands.models.narx import make_model
 from support.strategies import models, regressors
 
 U = Lagged(1, 1)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from islands.expressions.tree import Apply, Expression, Lagged, Shift, content
-from islands.model.regressor import Regressor, canonical
+from islands.models.regressor import Regressor, canonical
 
 #: Steady state of y(k-1). Property 1 requires that the parameters of its cluster sum to 1.
 OUTPUT_AT_REST = Lagged(0, 0)

@@ -8,7 +8,7 @@ from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.expressions.primitives import SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, replace_leaves
-from islands.model.regressor import Regressor, regressor
+from islands.models.regressor import Regressor, regressor
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -19,8 +19,8 @@ from islands.expressions.printing import (
     plain_factor,
 )
 from islands.expressions.tree import Constant, Expression, Lagged, replace_leaves
-from islands.model.model import Model
-from islands.model.signal_statement import describe_signals
+from islands.models.narx import Model
+from islands.models.signal_statement import describe_signals
 
 #: Maximum number of visible characters of a row of MathML.
 _ROW_CHARACTERS = 80

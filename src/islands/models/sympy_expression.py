@@ -8,8 +8,8 @@ from islands.distribution import describe_missing_extra
 from islands.errors import ModelError
 from islands.expressions.primitives import LARGEST_EXPONENT
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift
-from islands.model.equations import expressions_of_record, signal_names
-from islands.model.model import Model
+from islands.models.equations import expressions_of_record, signal_names
+from islands.models.narx import Model
 
 if TYPE_CHECKING:
     import sympy

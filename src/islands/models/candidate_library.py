@@ -11,8 +11,8 @@ from types import MappingProxyType
 from islands.errors import SettingsError, lookup
 from islands.expressions.primitives import MUL, PRIMITIVES, SIGN, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged
-from islands.model.model import canonical_order
-from islands.model.regressor import Regressor, regressor
+from islands.models.narx import canonical_order
+from islands.models.regressor import Regressor, regressor
 
 #: Maximum number of candidates of a library; their Gram matrix takes 128 MB. Use evolution for more.
 MAX_CANDIDATES = 4000

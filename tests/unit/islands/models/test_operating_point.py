@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.model.operating_point import differentiate_model, find_equilibrium, static_characteristic
+from islands.models.operating_point import differentiate_model, find_equilibrium, static_characteristic
 from islands.simulation.predictors import free_run
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.expressions.tree import Apply, Expression, Lagged
-from islands.model.model import Model, measured_model
+from islands.models.narx import Model, measured_model
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
 """Regressors and NARX models, and their equations as text, LaTeX and MathML.
 
-Read `regressor` first, then `model`.
+Read `regressor` first, then `narx`.
 """

@@ -8,8 +8,8 @@ from islands.expressions.primitives import MUL, PRIMITIVES
 from islands.expressions.printing import plain
 from islands.expressions.tree import Apply, Constant, Lagged
 from islands.expressions.user_primitive import primitive
-from islands.model.clusters import steady_state
-from islands.model.regressor import canonical, regressor
+from islands.models.clusters import steady_state
+from islands.models.regressor import canonical, regressor
 
 
 def canonical_text(text):

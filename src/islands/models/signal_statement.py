@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.signal_map import SampledReference
-from islands.model.model import Model
+from islands.models.narx import Model
 
 
 def describe_signals(model: Model, names: Sequence[str] = ()) -> str:

@@ -12,10 +12,10 @@ from islands.data.preprocessing import preprocess
 from islands.errors import ModelError
 from islands.export import export
 from islands.expressions.parsing import parse
-from islands.model.equations import mathml_equation, named_signals
-from islands.model.model import make_model
-from islands.model.signal_statement import describe_signals
-from islands.simulation.coupled_model import CoupledModel
+from islands.models.coupled_narx import CoupledModel
+from islands.models.equations import mathml_equation, named_signals
+from islands.models.narx import make_model
+from islands.models.signal_statement import describe_signals
 
 RATE = "k counts steps of 0.08 s: each value is the mean of 2 values, each one of 4 samples of 0.01 s behind"
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import islands
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import PRIMITIVES
-from islands.model.sympy_expression import to_sympy
+from islands.models.sympy_expression import to_sympy
 
 pytestmark = pytest.mark.ci
 
