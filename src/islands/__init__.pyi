@@ -48,9 +48,8 @@ from islands.facade.results.saved_simulation import SavedSimulation as SavedSimu
 from islands.io.checkpoints.monitor_state import SavedMonitor as SavedMonitor
 from islands.io.checkpoints.monitor_state import read_monitor as read_monitor
 from islands.io.checkpoints.monitor_state import write_monitor as write_monitor
-from islands.io.coupled_models import read_coupled_model as read_coupled_model
-from islands.io.coupled_models import write_coupled_model as write_coupled_model
 from islands.io.data_frames import as_record as as_record
+from islands.io.models import read_coupled_model as read_coupled_model
 from islands.io.models import read_model as read_model
 from islands.io.models import write_model as write_model
 from islands.io.records import read_record as read_record

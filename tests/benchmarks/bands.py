@@ -211,8 +211,8 @@ def main() -> None:
                 true = {regressor(islands.parse(text))[1] for text in law.terms}
                 found = {item for each in ensemble.structures for item in each.model.regressors}
                 if true:
-                    terms[noise][0].extend(ensemble.inclusion(item) for item in true)
-                    terms[noise][1].append(sum(ensemble.inclusion(item) for item in found - true))
+                    terms[noise][0].extend(ensemble.inclusion(item.text) for item in true)
+                    terms[noise][1].append(sum(ensemble.inclusion(item.text) for item in found - true))
             cells.append(np.mean(tests))
             within += [0.85 <= each <= 0.95 for each in tests]
             numbers = " ".join(

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.export.block import Block, make_sampled_block
+from islands.export import measured_block
+from islands.models.block import Block
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model
 from islands.simulation.coupled_free_run import coupled_free_run
@@ -77,7 +78,7 @@ def coupled_case(exported, data):
 
 def make_case(exported, u, y, simulated):
     """Return the case of a simulation, of shape (samples, outputs), that starts from measured samples."""
-    block, first = make_sampled_block(exported), max(exported.maximum_lag, 1)
+    block, first = measured_block(exported), max(exported.maximum_lag, 1)
     signals = [*y.T, *u.T]
     past = [float(signals[channel][first - lag]) for channel, lag in block.samples]
     return BlockCase(exported, block, past, np.ascontiguousarray(u[first:]), simulated[first:])

@@ -22,7 +22,6 @@ from islands.io.checkpoints import history_document
 from islands.io.models import model_json
 from islands.io.result_folder import result_document
 from islands.io.result_text.model_description import describe
-from islands.models.equations import equation
 from islands.progress import StoppedError
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
@@ -149,7 +148,7 @@ def make_outcome(found: SearchResult, note: str = "") -> JobOutcome:
         "rank": recommended["rank"],
         "reasons": recommended["reasons"],
         "words": "\n".join([*describe(found), *([f"Note: {note}."] if note else [])]),
-        "equation": equation(found.recommended.model),
+        "equation": found.recommended.model.equation().line,
         "size": best["size"],
         "metrics": best["metrics"]["validation"]["free_run"],
         "property_1": best["physics"]["property_1"],

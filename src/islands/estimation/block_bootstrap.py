@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.estimation.damped_least_squares import compute_jacobian, find_directions, inner_products
-from islands.estimation.parameter_constraints import constraint
-from islands.estimation.shooting_residual import ShootingResidual
-from islands.models.narx import Model
+from islands.estimation.parameter_constraints import constrain_model
+from islands.estimation.shooting_residual import make_residual
+from islands.models.dynamic_model import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome
 
 
 def draw_parameters(
-    model: Model,
+    model: DynamicModel,
     record: Dataset,
     interval: int | None,
     constraints: str,
@@ -37,7 +37,7 @@ def draw_parameters(
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Model whose parameters minimise the multiple-shooting error.
     record : Dataset
         Estimation data.
@@ -60,13 +60,13 @@ def draw_parameters(
     """
     theta = np.array(model.parameters)
     repeated = np.tile(theta, (draws, 1))
-    constrained = constraint(constraints).constrain(model.regressors)
-    if isinstance(constrained, EvaluationOutcome) or constrained.regressors != model.regressors:
+    constrained = constrain_model(model, constraints)
+    if isinstance(constrained, EvaluationOutcome):
         return repeated
     directions = find_directions(theta, constrained)
     if isinstance(directions, EvaluationOutcome) or not directions.shape[1]:
         return repeated
-    residual = ShootingResidual(model, record, interval, warm_up)
+    residual = make_residual(model, record, interval, warm_up)
     error = residual(theta)
     if error is None or not np.isfinite(error).all():
         return repeated

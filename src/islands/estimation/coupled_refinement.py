@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from islands.data.coupled_record import CoupledRecord
 from islands.estimation.damped_least_squares import find_directions, minimise
-from islands.estimation.parameter_constraints import constraint
+from islands.estimation.parameter_constraints import constrain_model
 from islands.models.coupled_narx import CoupledModel
 from islands.simulation.coupled_free_run import CoupledSimulator
 from islands.simulation.outcome import EvaluationOutcome
@@ -86,14 +86,17 @@ class _CoupledResidual:
         known = ~np.isnan(simulated.y[:, 0])
         return np.ascontiguousarray(((simulated.y - self._y)[known] / self._scale).T).reshape(-1)
 
+    def evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
+        return [self(theta) for theta in thetas]
+
 
 def _find_directions(model: CoupledModel, constraints: str) -> NDArray[np.float64] | None:
     """Return the free directions of all parameters, shape (terms, free); None if a term is forced to zero."""
     directions: NDArray[np.float64] = np.zeros((model.size, 0))
     begin = 0
     for single in model.models:
-        constrained = constraint(constraints).constrain(single.regressors)
-        if isinstance(constrained, EvaluationOutcome) or constrained.regressors != single.regressors:
+        constrained = constrain_model(single, constraints)
+        if isinstance(constrained, EvaluationOutcome):
             return None
         free = find_directions(np.array(single.parameters), constrained)
         if isinstance(free, EvaluationOutcome):

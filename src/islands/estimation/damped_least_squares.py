@@ -4,7 +4,7 @@ The steps are restricted to directions along which the constraints on the parame
 products are summed in a written order, so that a result has the same bits on every number of threads.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -29,6 +29,9 @@ class Residual(Protocol):
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return simulation minus measurement, shape (samples,); None after a divergence."""
+
+    def evaluate(self, thetas: NDArray[np.float64]) -> Sequence[NDArray[np.float64] | None]:
+        """Return the residual of each of several parameter vectors, shape (vectors, terms)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,8 +112,9 @@ def compute_jacobian(
         A row is zero if the simulation diverges next to theta.
     """
     jacobian: NDArray[np.float64] = np.zeros((directions.shape[1], samples))
-    for row, direction in zip(jacobian, directions.T, strict=True):
-        forward, backward = (residual(theta + sign * _DIFFERENCE_STEP * direction) for sign in (1.0, -1.0))
+    moved = [theta + sign * _DIFFERENCE_STEP * step for step in directions.T for sign in (1.0, -1.0)]
+    found = residual.evaluate(np.array(moved)) if moved else ()
+    for row, forward, backward in zip(jacobian, found[::2], found[1::2], strict=True):
         if forward is not None and backward is not None:
             row[:] = (forward - backward) / (2.0 * _DIFFERENCE_STEP)
     return jacobian

@@ -14,7 +14,8 @@ from islands.estimation.extended_least_squares import extended_least_squares
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import refine
 from islands.expressions.tree import Lagged
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
+from islands.models.narx import Model, require_narx
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import EvaluationOutcome, Status
 
@@ -66,7 +67,7 @@ def estimate_with(
 
 
 def least_squares_bias(
-    model: Model, record: Dataset, constraints: str = "none", warm_up: int | None = None
+    model: DynamicModel, record: Dataset, constraints: str = "none", warm_up: int | None = None
 ) -> float | EvaluationOutcome:
     """Measure how far coloured noise shifts the least-squares parameters of a structure.
 
@@ -78,7 +79,7 @@ def least_squares_bias(
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Only its structure is used.
     record : Dataset
     constraints, warm_up
@@ -89,7 +90,8 @@ def least_squares_bias(
     float or EvaluationOutcome
         An outcome if an estimate fails.
     """
-    start = estimate(model.regressors, record, constraints, warm_up)
+    narx = require_narx(model)
+    start = estimate(narx.regressors, record, constraints, warm_up)
     if isinstance(start, EvaluationOutcome):
         return start
     found = estimate_with("extended-least-squares", start, record, constraints, warm_up)

@@ -4,18 +4,21 @@ A constraint has the form ``S theta = c``, restricts the regressors of a model, 
 parameter. Statements are combined with semicolons: ``odd; gain = 2.5``.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType
 
+import numpy as np
+
 from islands.errors import SettingsError
-from islands.estimation.constraints.constraint import Constraint
+from islands.estimation.constraints.constraint import Constrained, Constraint
 from islands.estimation.constraints.parser import parse_statements
 from islands.estimation.constraints.parts import ClusterSums, StaticGain, Symmetry
 from islands.expressions.tree import Expression
 from islands.models.clusters import OUTPUT_AT_REST, steady_state
-from islands.models.regressor import Regressor
-from islands.simulation.outcome import EvaluationOutcome
+from islands.models.dynamic_model import DynamicModel
+from islands.models.narx import Model
+from islands.simulation.outcome import EvaluationOutcome, Status
 
 #: Property 1 (the paper, section 3): with these sums every output is an equilibrium at constant input.
 PROPERTY_1: Mapping[Expression, float] = MappingProxyType({OUTPUT_AT_REST: 1.0})
@@ -52,12 +55,39 @@ def constraint(text: str) -> Constraint:
     return Constraint(parts)
 
 
-def count_free_parameters(regressors: Sequence[Regressor], name: str) -> int:
+def constrain_model(model: DynamicModel, text: str) -> Constrained | EvaluationOutcome:
+    """Return the constraint on the parameters of a model.
+
+    Returns
+    -------
+    Constrained or EvaluationOutcome
+        INFEASIBLE if the structure cannot meet the constraint, or if a parameter is forced to zero.
+
+    Raises
+    ------
+    SettingsError
+        A statement cannot be read, or the model is not a NARX model, whose terms the statements are about.
+    """
+    if not isinstance(model, Model):
+        if text != "none":
+            raise SettingsError(f"the constraints {text!r} are about the terms of a NARX model: take 'none'")
+        return Constrained((), np.empty((0, model.size)), np.empty(0), np.zeros(model.size))
+    constrained = constraint(text).constrain(model.regressors)
+    if not isinstance(constrained, EvaluationOutcome) and constrained.regressors != model.regressors:
+        return EvaluationOutcome(
+            Status.INFEASIBLE, "the constraint forces a parameter to zero: remove its term"
+        )
+    return constrained
+
+
+def count_free_parameters(model: DynamicModel, text: str) -> int:
     """Return the number of parameters that remain free: the dimension of the null space.
 
     A structure that cannot meet the constraint was not estimated under it; all of its parameters count.
     """
-    constrained = constraint(name).constrain(regressors)
+    if not isinstance(model, Model):
+        return model.size
+    constrained = constraint(text).constrain(model.regressors)
     if isinstance(constrained, EvaluationOutcome):
-        return len(regressors)
+        return model.size
     return len(constrained.regressors) - len(constrained.c)

@@ -6,6 +6,7 @@ constraints remain satisfied because the steps are restricted to their null spac
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -19,28 +20,30 @@ from islands.estimation.damped_least_squares import (
     mean_square,
     minimise,
 )
-from islands.estimation.parameter_constraints import constraint
-from islands.estimation.shooting_residual import ShootingResidual
-from islands.models.narx import Model
-from islands.simulation.outcome import EvaluationOutcome, Status
+from islands.estimation.parameter_constraints import constrain_model
+from islands.estimation.shooting_residual import make_residual
+from islands.models.dynamic_model import DynamicModel
+from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import multiple_shooting
+
+M = TypeVar("M", bound=DynamicModel)
 
 #: Refinement ends when a step reduces the squared error by a smaller relative amount.
 _MIN_GAIN = 1e-8
 
 
 @dataclass(frozen=True, slots=True)
-class RefinedModel:
+class RefinedModel(Generic[M]):
     """A refined model, its mean squared error before and after, and the number of accepted steps."""
 
-    model: Model
+    model: M
     before: float
     after: float
     steps: int
 
 
 def refine(
-    model: Model,
+    model: M,
     record: Dataset,
     interval: int | None,
     constraints: str = "none",
@@ -48,12 +51,12 @@ def refine(
     max_steps: int = 30,
     standard_errors: bool = True,
     stop: Callable[[], bool] = lambda: False,
-) -> RefinedModel | EvaluationOutcome:
+) -> RefinedModel[M] | EvaluationOutcome:
     """Refine the parameters of a model on the multiple-shooting error.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Model with parameters that meet the constraints.
     record : Dataset
     interval : int or None
@@ -86,13 +89,9 @@ def refine(
         The warm-up is shorter than the model's largest lag, the interval is less than 1, or the constraint
         is unknown.
     """
-    constrained = constraint(constraints).constrain(model.regressors)
+    constrained = constrain_model(model, constraints)
     if isinstance(constrained, EvaluationOutcome):
         return constrained
-    if constrained.regressors != model.regressors:
-        return EvaluationOutcome(
-            Status.INFEASIBLE, "the constraint forces a parameter to zero: remove its term"
-        )
     record = match_record(model, record)
     # This call also checks the inputs, the lags and the length of the record, which the kernel does not.
     started = multiple_shooting(model, record, interval, warm_up)
@@ -104,7 +103,7 @@ def refine(
     directions = find_directions(theta, constrained)
     if isinstance(directions, EvaluationOutcome):
         return directions
-    residual = ShootingResidual(model, record, interval, warm_up)
+    residual = make_residual(model, record, interval, warm_up)
     error = residual(theta)
     assert error is not None, "the initial simulation did not diverge"
     found = minimise(

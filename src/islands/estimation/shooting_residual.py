@@ -5,8 +5,10 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.kernels.simulate import DIVERGED, Layout, simulate
+from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
 from islands.program.term_pool import link
+from islands.simulation.block_simulation import make_simulator
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound
 
@@ -49,3 +51,43 @@ class ShootingResidual:
             return None
         # The memory of other samples is not initialised: differences of it may overflow.
         return predicted[self._predicted] - self._y[self._predicted]
+
+    def evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
+        """Return the residual of each of several parameter vectors, shape (vectors, terms)."""
+        return [self(theta) for theta in thetas]
+
+
+class BlockResidual:
+    """The simulation error of the block of a model as a function of its parameters.
+
+    Parameters
+    ----------
+    model, record, interval, warm_up
+        As for `ShootingResidual`; see `make_simulator` for the intervals.
+    """
+
+    def __init__(
+        self, model: DynamicModel, record: Dataset, interval: int | None, warm_up: int | None
+    ) -> None:
+        first = model.maximum_lag if warm_up is None else warm_up
+        self._simulate = make_simulator(model.block(), record, interval, first)
+        self._predicted = self._simulate.predicted
+        self._y, self._bound = record.y[self._predicted], divergence_bound(record)
+        self.intervals = self._simulate.intervals
+
+    def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return prediction minus measurement over all predicted samples, or None after a divergence."""
+        return self.evaluate(theta[None])[0]
+
+    def evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
+        """Return the residual of each of several parameter vectors, which are simulated together."""
+        runs = self._simulate(thetas)[:, 0, self._predicted]
+        return [run - self._y if (np.abs(run) <= self._bound).all() else None for run in runs]
+
+
+def make_residual(
+    model: DynamicModel, record: Dataset, interval: int | None, warm_up: int | None
+) -> ShootingResidual | BlockResidual:
+    """Return the multiple-shooting residual of a model of any class; see `ShootingResidual`."""
+    kind = ShootingResidual if isinstance(model, Model) else BlockResidual
+    return kind(model, record, interval, warm_up)  # type: ignore[arg-type]

@@ -17,6 +17,7 @@ from islands.estimation.structure_selection.certificate import Certificate
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.history import HistoryPoint
 from islands.models.equations import equation
+from islands.models.narx import Model
 from islands.progress import Steps
 from islands.validation.assessment import MODES, Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
@@ -207,4 +208,5 @@ def _ranking_key(entry: Assessment) -> tuple[bool, float, int, str]:
     errors = entry.metrics["validation"]
     diverged = bool(np.isnan(errors["free_run"].rmse))
     rmse = errors["one_step_ahead" if diverged else "free_run"].rmse
-    return diverged, inf if np.isnan(rmse) else rmse, entry.model.size, equation(entry.model, digits=17)
+    text = equation(entry.model, digits=17) if isinstance(entry.model, Model) else entry.model.equation().line
+    return diverged, inf if np.isnan(rmse) else rmse, entry.model.size, text

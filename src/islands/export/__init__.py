@@ -1,15 +1,16 @@
 """Export of models to text formats, programming languages and blocks of simulators.
 
-Each text format is an entry of `EXPORTS`, each binary one of `FILE_EXPORTS`. Read `block` first: all programs
-are written from it.
+Each text format is an entry of `EXPORTS`, each binary one of `FILE_EXPORTS`. All
+programs are written from the `Block` of a model.
 """
 
 from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypeAlias, TypeVar
 
-from islands.errors import SettingsError, lookup
+from islands.errors import ModelError, SettingsError, lookup
 from islands.export.fmu.archive import fmu2, fmu3
 from islands.export.languages.c import c_source
 from islands.export.languages.matlab import matlab_source
@@ -17,52 +18,85 @@ from islands.export.languages.matlab_system import matlab_system_source
 from islands.export.languages.modelica import modelica_source
 from islands.export.languages.python import python_source
 from islands.export.languages.s_function import s_function_source
-from islands.io.coupled_models import coupled_json, coupled_latex, coupled_mathml, coupled_text
 from islands.io.models import model_json
+from islands.models.block import Block, subtract_offsets
 from islands.models.coupled_narx import CoupledModel, measured_coupled_model
-from islands.models.equations import latex_equation, mathml_equation, plain_text
+from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, measured_model
 
+#: Models that can be exported.
+Exported: TypeAlias = DynamicModel | CoupledModel
 
-def _choose(
-    of_one: Callable[[Model], str], of_several: Callable[[CoupledModel], str]
-) -> Callable[[Model | CoupledModel], str]:
-    """Return a format of models of one or several outputs, with the description of that of one."""
-
-    @wraps(of_one)
-    def write(model: Model | CoupledModel) -> str:
-        return of_several(model) if isinstance(model, CoupledModel) else of_one(model)
-
-    return write
+Text = TypeVar("Text", str, bytes)
 
 
-#: Text formats by name.
-EXPORTS: Mapping[str, Callable[[Model | CoupledModel], str]] = MappingProxyType(
+def plain_text(model: Exported) -> str:
+    """Return the equation of a model; a last line states its signals, unless they are those of the record."""
+    return model.equation().plain
+
+
+def latex(model: Exported) -> str:
+    """Return the equation of a model in LaTeX, without dollar signs."""
+    return model.equation().latex
+
+
+def mathml(model: Exported) -> str:
+    """Return the equation of a model as ``math`` elements, which browsers render without a library."""
+    return model.equation().mathml
+
+
+def measured_block(model: Exported) -> Block:
+    """Return the block of a model of the measured signals, with the offsets in its equations.
+
+    Raises
+    ------
+    ModelError
+        The model has no parameters.
+    """
+    if not model.parameters:
+        raise ModelError("the model has no parameters, so that there is nothing to export")
+    match model:
+        case Model():
+            return measured_model(model).block()
+        case CoupledModel():
+            return measured_coupled_model(model).block()
+    return subtract_offsets(model.block(), model.preprocessing)
+
+
+def _of_block(write: Callable[[Block], Text]) -> Callable[[Exported], Text]:
+    """Return a format of models, with the description of that of blocks."""
+
+    @wraps(write)
+    def write_model(model: Exported) -> Text:
+        return write(measured_block(model))
+
+    return write_model
+
+
+#: Text formats by name. Equations may be in deviations; programs have the offsets in their equations.
+EXPORTS: Mapping[str, Callable[[Exported], str]] = MappingProxyType(
     {
-        "plain": _choose(plain_text, coupled_text),
-        "latex": _choose(latex_equation, coupled_latex),
-        "mathml": _choose(mathml_equation, coupled_mathml),
-        "python": python_source,
-        "c": c_source,
-        "matlab": matlab_source,
-        "matlab-system": matlab_system_source,
-        "s-function": s_function_source,
-        "modelica": modelica_source,
-        "json": _choose(model_json, coupled_json),
+        "plain": plain_text,
+        "latex": latex,
+        "mathml": mathml,
+        "python": _of_block(python_source),
+        "c": _of_block(c_source),
+        "matlab": _of_block(matlab_source),
+        "matlab-system": _of_block(matlab_system_source),
+        "s-function": _of_block(s_function_source),
+        "modelica": _of_block(modelica_source),
+        "json": model_json,
     }
 )
 
-#: Formats that write the equation of a model in deviations. Programs have the offsets in the equation.
-_OF_DEVIATIONS = ("plain", "latex", "mathml", "json")
-
 #: Formats that are not text.
-FILE_EXPORTS: Mapping[str, Callable[[Model | CoupledModel], bytes]] = MappingProxyType(
-    {"fmu": fmu3, "fmu2": fmu2}
+FILE_EXPORTS: Mapping[str, Callable[[Exported], bytes]] = MappingProxyType(
+    {"fmu": _of_block(fmu3), "fmu2": _of_block(fmu2)}
 )
 
 
-def export(model: Model | CoupledModel, kind: str) -> str:
-    """Return a model of one or several outputs as text in a format of ``EXPORTS``.
+def export(model: Exported, kind: str) -> str:
+    """Return a model as text in a format of ``EXPORTS``.
 
     Raises
     ------
@@ -72,10 +106,10 @@ def export(model: Model | CoupledModel, kind: str) -> str:
     if kind in FILE_EXPORTS:
         raise SettingsError(f"the format {kind} is not text: write a file with --out or write_export")
     lookup({**EXPORTS, **FILE_EXPORTS}, kind, "format")
-    return EXPORTS[kind](model if kind in _OF_DEVIATIONS else _measure(model))
+    return EXPORTS[kind](model)
 
 
-def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> None:
+def write_export(model: Exported, kind: str, path: str | Path) -> None:
     """Write a model to a file in one of its text formats or a format of ``FILE_EXPORTS``.
 
     Raises
@@ -84,19 +118,14 @@ def write_export(model: Model | CoupledModel, kind: str, path: str | Path) -> No
         The format is unknown.
     """
     if kind in FILE_EXPORTS:
-        Path(path).write_bytes(FILE_EXPORTS[kind](_measure(model)))
+        Path(path).write_bytes(FILE_EXPORTS[kind](model))
         return
     Path(path).write_text(f"{export(model, kind).rstrip()}\n", encoding="utf-8")
 
 
-def export_or_write(model: Model | CoupledModel, kind: str, path: str | Path | None) -> str | None:
+def export_or_write(model: Exported, kind: str, path: str | Path | None) -> str | None:
     """Return a model as text, or write it to a file if there is a path; see `export` and `write_export`."""
     if path is None:
         return export(model, kind)
     write_export(model, kind, path)
     return None
-
-
-def _measure(model: Model | CoupledModel) -> Model | CoupledModel:
-    """Return the model of the measured signals, with the offsets in its equation."""
-    return measured_coupled_model(model) if isinstance(model, CoupledModel) else measured_model(model)

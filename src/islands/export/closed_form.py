@@ -14,7 +14,7 @@ from islands.data.channel_names import AT_ONCE
 from islands.errors import ModelError
 from islands.expressions.primitives import MUL, PRIMITIVES, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, replace_leaves
-from islands.io.models import model_from_json
+from islands.io.models import narx_from_json
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.spec_base import EffectSpec, ScalesSpec
 from islands.io.simulator_spec.specification import (
@@ -73,7 +73,7 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
     """
     match spec:
         case ModelSpec():
-            return measured_model(model_from_json(json.dumps(spec.model), spec.name))
+            return measured_model(narx_from_json(json.dumps(spec.model), spec.name))
         case ExtendedSpec(core=LinearSpec(numerator=tuple()) as core):
             found = _make_linear_model(core, spec.inputs[0])
         case ExtendedSpec():

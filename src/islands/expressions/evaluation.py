@@ -1,6 +1,7 @@
 """Values of expressions, computed with Python or NumPy."""
 
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,17 @@ from islands.expressions.tree import (
     Expression,
     Lagged,
     Shift,
+    Symbol,
     remove_shifts,
 )
 
+#: No parameters.
+_NONE: Mapping[str, float] = MappingProxyType({})
 
-def value(expression: Expression, signal: Callable[[int, int], float]) -> float:
+
+def value(
+    expression: Expression, signal: Callable[[int, int], float], parameters: Mapping[str, float] = _NONE
+) -> float:
     """Evaluate an expression of lagged signals. This is the reference implementation for the kernels.
 
     Parameters
@@ -27,16 +34,21 @@ def value(expression: Expression, signal: Callable[[int, int], float]) -> float:
     expression : Expression
     signal : callable
         ``signal(channel, lag)`` returns the value of the channel ``lag`` samples back.
+    parameters : mapping
+        Values of the parameters by name. They and the signals are arrays only in sums, differences and
+        products.
 
     Raises
     ------
     ModelError
-        The expression contains a name or an unknown kind of node.
+        The expression contains an unknown name or an unknown kind of node.
     """
 
     def read(leaf: Expression) -> float:
         if isinstance(leaf, Lagged):
             return signal(leaf.channel, leaf.lag)
+        if isinstance(leaf, Symbol) and leaf.name in parameters:
+            return parameters[leaf.name]
         raise ModelError(f"{leaf!r} is not an expression: use Lagged, Constant, Shift or Apply")
 
     found: float = _evaluate(expression, read)

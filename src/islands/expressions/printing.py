@@ -357,7 +357,10 @@ def render(expression: Expression) -> str:
 
 
 def program_text(
-    expression: Expression, signal: Callable[[int, int], str], function: Callable[[Primitive], str]
+    expression: Expression,
+    signal: Callable[[int, int], str],
+    function: Callable[[Primitive], str],
+    symbol: Callable[[str], str] = str,
 ) -> str:
     """Write an expression of a model in a programming language, in brackets if it is an operation.
 
@@ -369,6 +372,8 @@ def program_text(
         ``signal(channel, lag)`` returns the text of a sample.
     function : callable
         ``function(primitive)`` returns the name of a primitive's function.
+    symbol : callable
+        ``symbol(name)`` returns the text of a parameter.
 
     Raises
     ------
@@ -379,7 +384,7 @@ def program_text(
     def call(primitive: Primitive, arguments: Sequence[str]) -> str:
         return f"{function(primitive)}({', '.join(arguments)})"
 
-    return ProgramPrinter(BRACKETED_OPERATORS, call, signal).write_operand(expression, ATOM)
+    return ProgramPrinter(BRACKETED_OPERATORS, call, signal, symbol).write_operand(expression, ATOM)
 
 
 def plain(expression: Expression, inputs: int = 1) -> str:

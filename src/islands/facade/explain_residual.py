@@ -14,7 +14,6 @@ from islands.evolution.engine import Engine
 from islands.evolution.search_state import SearchState
 from islands.facade.engine_choice import Ray
 from islands.facade.identify import SearchCallback, identify
-from islands.models.equations import named_equation
 from islands.progress import ProgressCallback, Stop, ignore_progress, never_stop
 from islands.simulation.predictors import free_run
 
@@ -117,4 +116,4 @@ def explain_residual(
             best, explained = each.model, fraction
     if best is None:
         return None
-    return ResidualFormula(named_equation(best), explained)
+    return ResidualFormula(best.equation().named, explained)

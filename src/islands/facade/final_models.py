@@ -21,7 +21,8 @@ from islands.evolution.individual import Individual, unique_structures
 from islands.evolution.problem import Problem
 from islands.evolution.search_result import rank_models
 from islands.evolution.settings import Settings
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
+from islands.models.narx import Model, require_narx
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run, multiple_shooting
@@ -97,12 +98,12 @@ def _order_candidates(
     return sorted(candidates, key=order)
 
 
-def _with_standard_errors(candidate: ValidatedModel, settings: Settings, record: Dataset) -> Model:
+def _with_standard_errors(candidate: ValidatedModel, settings: Settings, record: Dataset) -> DynamicModel:
     """Return the model with standard errors; most candidates do not need them, so they have none."""
     model = candidate.model
     limits = settings.constraints, settings.maximum_lag
     if candidate.interval == 1:
-        estimated = estimate(model.regressors, record, *limits)
+        estimated = estimate(require_narx(model).regressors, record, *limits)
         if not isinstance(estimated, EvaluationOutcome) and estimated.model.parameters == model.parameters:
             return estimated.model
     refined = refine(model, record, candidate.interval, *limits, max_steps=0)
@@ -187,7 +188,7 @@ def screen(
         for each in by_fitness
     }
     validated = _without_diverged(_validate(models, 1, validation, warm_up))
-    by_error = [models[each.model] for each in validated]
+    by_error = [models[require_narx(each.model)] for each in validated]
     return list(unique_structures((*by_error[:most_valid], *by_fitness[:fittest])))
 
 
@@ -256,11 +257,11 @@ def _estimate_with_choice(
 
 
 def _refine(
-    models: list[Model], interval: int | None, settings: Settings, split: Split, steps: Steps
+    models: Sequence[DynamicModel], interval: int | None, settings: Settings, split: Split, steps: Steps
 ) -> list[ValidatedModel]:
     """Refine models over shooting intervals and validate them; the kernels run in parallel threads."""
 
-    def refine_one(model: Model) -> Model | None:
+    def refine_one(model: DynamicModel) -> DynamicModel | None:
         if steps.skip(_REFINEMENT):
             return None
         refined = refine(
@@ -280,7 +281,7 @@ def _refine(
 
 
 def _validate(
-    models: Iterable[Model], interval: int | None, validation: Dataset, warm_up: int
+    models: Iterable[DynamicModel], interval: int | None, validation: Dataset, warm_up: int
 ) -> list[ValidatedModel]:
     """Simulate models on the validation data and return them, least error first."""
     validated = (

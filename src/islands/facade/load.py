@@ -14,8 +14,7 @@ from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.result import Result
 from islands.facade.results.saved_result import read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
-from islands.io.coupled_models import read_coupled_model
-from islands.io.models import read_model
+from islands.io.models import read_coupled_model, read_model
 from islands.io.simulator_spec.code_spec import FmuSpec
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import EXTENDED_FILE, LocalExtendedSpec, parse_spec
@@ -121,12 +120,10 @@ def _load_model(file: Path, _document: _Document, primitives: Mapping[str, Primi
 
 def _load_coupled(file: Path, document: _Document, primitives: Mapping[str, Primitive]) -> FittedCoupledModel:
     """Read a model of several outputs, with the warm-up of the errors of its folder."""
-    if file.name == "result.json":
-        warm_up = document.get("warm_up")
-        model = read_coupled_model(file.parent, primitives)
-        return FittedCoupledModel(model, model.maximum_lag if warm_up is None else int(warm_up))
-    model = read_coupled_model(file, primitives)
-    return FittedCoupledModel(model, model.maximum_lag)
+    is_result = file.name == "result.json"
+    model = read_coupled_model(file.parent if is_result else file, primitives)
+    warm_up = document.get("warm_up") if is_result else None
+    return FittedCoupledModel(model, model.maximum_lag if warm_up is None else int(warm_up))
 
 
 def _load_extended(file: Path, _document: _Document, _primitives: Mapping[str, Primitive]) -> SavedSimulation:

@@ -12,7 +12,7 @@ from islands.data.dataset import Dataset
 from islands.figures.diverging_lines import annotate_divergence, limits, within_reach
 from islands.figures.downsampling import downsample
 from islands.figures.style import FRAME, blank, finish, house_style, label
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
 from islands.validation.physics import LEVELS, hold_response, percent_of_range
 
 #: Colours of the levels from lowest to highest, distinguishable for colour-blind readers and in grey print.
@@ -35,7 +35,7 @@ class _Hold:
 
 
 @house_style()
-def draw_holds(model: Model, record: Dataset, title: str = "") -> Figure:
+def draw_holds(model: DynamicModel, record: Dataset, title: str = "") -> Figure:
     """Draw the output while the input is held at five levels, reached while loading and while unloading.
 
     Time 0 is the first sample of the hold; negative times show the approach. The title of each side gives
@@ -45,7 +45,7 @@ def draw_holds(model: Model, record: Dataset, title: str = "") -> Figure:
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Model with parameters.
     record : Dataset
         Record without missing values; defines ranges, sampling rate, divergence bound and initial output.
@@ -81,7 +81,7 @@ def draw_holds(model: Model, record: Dataset, title: str = "") -> Figure:
     return finish(figure)
 
 
-def _simulate_hold(model: Model, record: Dataset, level: float, loading: bool) -> _Hold:
+def _simulate_hold(model: DynamicModel, record: Dataset, level: float, loading: bool) -> _Hold:
     u, y = hold_response(model, record, level, loading)
     begin = int(np.flatnonzero(u != u[-1])[-1]) + 1
     # As in the physics check, start when every lag of the input has reached the level.

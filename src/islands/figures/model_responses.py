@@ -13,7 +13,7 @@ from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.figures.style import MEASURED, SIMULATED, blank, finish, house_style, label
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
 from islands.models.operating_point import static_characteristic
 from islands.simulation.step_response import StepResponse, step_response
 
@@ -56,7 +56,7 @@ def _draw_output(axes: Axes, response: StepResponse) -> None:
 
 @house_style()
 def draw_static_characteristic(
-    model: Model,
+    model: DynamicModel,
     inputs: Sequence[float] | NDArray[np.float64],
     outputs: NDArray[np.float64],
     ax: Axes | None = None,
@@ -66,7 +66,7 @@ def draw_static_characteristic(
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
     inputs : sequence of float
     outputs : ndarray, shape (points,)
     ax : Axes, optional
@@ -83,7 +83,7 @@ def draw_static_characteristic(
     return finish(figure) if ax is None else figure
 
 
-def draw_responses(model: Model, record: Dataset) -> dict[str, Figure]:
+def draw_responses(model: DynamicModel, record: Dataset) -> dict[str, Figure]:
     """Draw the static characteristic and the step response of a model within the range of a record.
 
     The first input that varies steps from the lower to the upper quartile; other inputs have their mean.

@@ -18,7 +18,7 @@ from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop, draw_loop_panel
 from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import Assessment, assess_residual
 from islands.validation.predictable_residual import ResidualStructure
@@ -29,23 +29,25 @@ ModelFigure = Callable[[Assessment, Split], Figure]
 
 
 #: Draws a model on a record, with a number of samples before the first prediction and prediction bands.
-RecordFigure = Callable[[Model, Dataset, int, PredictionBands | None], Figure]
+RecordFigure = Callable[[DynamicModel, Dataset, int, PredictionBands | None], Figure]
 
 
-def _free_run_on(model: Model, record: Dataset, warm_up: int, bands: PredictionBands | None) -> Figure:
+def _free_run_on(model: DynamicModel, record: Dataset, warm_up: int, bands: PredictionBands | None) -> Figure:
     band = None if bands is None else bands.predict(model, record, warm_up=warm_up)
     return draw_free_run(record, free_run(model, record, warm_up).y, band=band)
 
 
-def _loop_on(model: Model, record: Dataset, warm_up: int, _bands: PredictionBands | None) -> Figure:
+def _loop_on(model: DynamicModel, record: Dataset, warm_up: int, _bands: PredictionBands | None) -> Figure:
     return draw_loop(record, free_run(model, record, warm_up).y)
 
 
-def _hold_on(model: Model, record: Dataset, _warm_up: int, _bands: PredictionBands | None) -> Figure:
+def _hold_on(model: DynamicModel, record: Dataset, _warm_up: int, _bands: PredictionBands | None) -> Figure:
     return draw_holds(model, record)
 
 
-def _residuals_on(model: Model, record: Dataset, warm_up: int, _bands: PredictionBands | None) -> Figure:
+def _residuals_on(
+    model: DynamicModel, record: Dataset, warm_up: int, _bands: PredictionBands | None
+) -> Figure:
     return _draw_residuals(*assess_residual(model, record, warm_up))
 
 
@@ -60,7 +62,7 @@ PANELS = MappingProxyType({"free-run": draw_free_run_panel, "loop": draw_loop_pa
 
 def draw_record_figure(
     kind: str,
-    model: Model,
+    model: DynamicModel,
     record: Dataset,
     warm_up: int,
     bands: PredictionBands | None = None,
@@ -72,7 +74,7 @@ def draw_record_figure(
     ----------
     kind : str
         A key of `RECORD_FIGURES`.
-    model : Model
+    model : DynamicModel
     record : Dataset
         Record with the inputs and the sampling time of the model.
     warm_up : int

@@ -1,5 +1,6 @@
 """Ensemble and prediction bands of a result as JSON values."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Any
@@ -12,6 +13,8 @@ from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.printing import plain
 from islands.expressions.tree import Primitive
+from islands.io.models import model_from_json, model_json
+from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
 from islands.models.regressor import Regressor, regressor
 from islands.validation.ensemble import Ensemble, EnsembleStructure
@@ -19,12 +22,13 @@ from islands.validation.prediction_bands import PredictionBands
 
 
 class StructureDocument(BaseModel):
-    """A structure of an ensemble: its weight, its terms, and the parameters of its members."""
+    """A structure of an ensemble: its weight, its terms or its model, and the parameters of its members."""
 
     model_config = ConfigDict(frozen=True)
 
     weight: Annotated[FiniteFloat, Field(gt=0, le=1)]
-    regressors: Annotated[tuple[str, ...], Field(min_length=1)]
+    regressors: tuple[str, ...] = ()
+    model: dict[str, Any] | None = None
     parameters: Annotated[tuple[tuple[FiniteFloat, ...], ...], Field(min_length=1)]
 
 
@@ -46,15 +50,21 @@ def ensemble_document(ensemble: Ensemble | None) -> list[dict[str, Any]] | None:
     return [
         {
             "weight": each.weight,
-            "regressors": [plain(item.expression, each.model.inputs) for item in each.model.regressors],
+            **_structure_document(each.model),
             "parameters": each.parameters.tolist(),
         }
         for each in ensemble.structures
     ]
 
 
+def _structure_document(model: DynamicModel) -> dict[str, Any]:
+    if isinstance(model, Model):
+        return {"regressors": [plain(item.expression, model.inputs) for item in model.regressors]}
+    return {"model": json.loads(model_json(model))}
+
+
 def ensemble_from_document(
-    document: Any, model: Model, primitives: Mapping[str, Primitive] = PRIMITIVES
+    document: Any, model: DynamicModel, primitives: Mapping[str, Primitive] = PRIMITIVES
 ) -> Ensemble | None:
     """Return the ensemble of a document.
 
@@ -62,7 +72,7 @@ def ensemble_from_document(
     ----------
     document : list or None
         Value made by `ensemble_document`.
-    model : Model
+    model : DynamicModel
         A model of the result. It gives the names of the columns and the sampling time.
     primitives : mapping
         Primitives that expressions may contain.
@@ -82,13 +92,17 @@ def ensemble_from_document(
 
 
 def _structure(
-    document: StructureDocument, model: Model, primitives: Mapping[str, Primitive]
+    document: StructureDocument, model: DynamicModel, primitives: Mapping[str, Primitive]
 ) -> EnsembleStructure:
-    terms = tuple(_regressor(text, primitives) for text in document.regressors)
     parameters = np.array(document.parameters, dtype=np.float64)
-    if parameters.shape[1] != len(terms):
-        raise ValueError(f"{parameters.shape[1]} parameters for {len(terms)} terms")
-    found = replace(model, regressors=terms, theta=None, standard_errors=None)
+    found: DynamicModel
+    if isinstance(model, Model):
+        terms = tuple(_regressor(text, primitives) for text in document.regressors)
+        found = replace(model, regressors=terms, theta=None, standard_errors=None)
+    else:
+        found = model_from_json(json.dumps(document.model), "the ensemble")
+    if parameters.shape[1] != found.size:
+        raise ValueError(f"{parameters.shape[1]} parameters for {found.size} terms")
     return EnsembleStructure(found, document.weight, parameters)
 
 

@@ -1,92 +1,89 @@
-"""Model files: JSON with a schema version and exact floats."""
+"""Files of models: JSON with a tag of the class, and the table of classes. Equal models give equal files."""
 
-from collections.abc import Mapping
-from dataclasses import replace
-from math import isfinite
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from types import MappingProxyType
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
-
-from islands.data.preprocessing_steps import Preprocessing
-from islands.errors import ModelError
-from islands.expressions.parsing import parse
+from islands.data.dataset import Dataset
+from islands.errors import ModelError, lookup
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.printing import plain
 from islands.expressions.tree import Primitive
-from islands.io.document_problems import find_problem
+from islands.io.narx_documents import (
+    COUPLED_SCHEMA,
+    SCHEMA,
+    coupled_json,
+    narx_json,
+    read_coupled,
+    read_narx,
+)
 from islands.io.result_models import read_preprocessing
-from islands.models.equations import equation, latex_equation
-from islands.models.narx import Model, canonical_order
-from islands.models.regressor import Regressor, regressor
-
-SCHEMA: Literal["islands.model/1"] = "islands.model/1"
+from islands.models.coupled_narx import CoupledModel
+from islands.models.dynamic_model import DynamicModel
+from islands.models.narx import Model, require_narx
 
 
-class TermDocument(BaseModel):
-    """One term of a model in a file."""
+@dataclass(frozen=True, slots=True)
+class ModelClass:
+    """Class of models that `fit` estimates by the error of the free run.
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    Attributes
+    ----------
+    kind : str
+        Tag of its documents.
+    summary : str
+        Description in one sentence.
+    read : callable
+        ``read(document, name)`` returns the model of JSON values; it raises `ModelError` for others, with the
+        name of the file.
+    start : callable
+        ``start(record)`` returns models with parameters from which the estimation starts, of increasing size.
+    """
 
-    regressor: str
-    parameter: FiniteFloat | None
-    standard_error: Annotated[FiniteFloat, Field(ge=0)] | None = None
-
-
-class ModelDocument(BaseModel):
-    """A model in a file. ``equation`` and ``latex`` are for human readers and are never read back."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-    schema_version: Annotated[Literal["islands.model/1"], Field(alias="schema")] = SCHEMA
-    inputs: Annotated[tuple[str, ...], Field(min_length=1)]
-    output: str
-    dt: Annotated[FiniteFloat, Field(gt=0)] | None = None
-    average: Annotated[int, Field(ge=1)] = 1
-    preprocessing: Preprocessing | None = None
-    equation: str = ""
-    latex: str = ""
-    terms: Annotated[tuple[TermDocument, ...], Field(min_length=1)]
+    kind: str
+    summary: str
+    read: Callable[[Mapping[str, Any], str], DynamicModel]
+    start: Callable[[Dataset], Iterable[DynamicModel]]
 
 
-def terms_document(model: Model) -> list[dict[str, Any]]:
-    """Return the terms of a model in the form used by model files and ``result.json``."""
-    parameters = model.theta or (None,) * model.size
-    errors = model.standard_errors or (None,) * model.size
-    return [
-        {"regressor": plain(item.expression, model.inputs), "parameter": parameter, "standard_error": error}
-        for item, parameter, error in zip(model.regressors, parameters, errors, strict=True)
-    ]
+#: Classes of models by tag, in addition to NARX models, which are selected from a library or evolved.
+MODEL_CLASSES: Mapping[str, ModelClass] = MappingProxyType({})
 
 
-def model_json(model: Model) -> str:
-    """Return a model as JSON text. Equal models give equal texts.
+def model_json(model: DynamicModel | CoupledModel) -> str:
+    """Return a model as JSON text.
 
     Raises
     ------
     ModelError
         A number of the model is not finite; JSON cannot represent it.
     """
-    fields = {
-        "inputs": model.input_names,
-        "output": model.output_name,
-        "dt": model.dt,
-        "average": model.average,
-        "preprocessing": model.preprocessing,
-        "equation": equation(model),
-        "latex": latex_equation(model),
-        "terms": terms_document(model),
-    }
+    match model:
+        case Model():
+            return narx_json(model)
+        case CoupledModel():
+            return coupled_json(model)
+    document = {"schema": SCHEMA, "kind": model.kind, **model.document()}
     try:
-        document = ModelDocument.model_validate(fields)
-    except ValidationError as error:
-        raise ModelError(f"the model cannot be written: {_explain(error)}") from error
-    # Models of measured signals have the files of earlier versions.
-    left_out = {"preprocessing"} if model.preprocessing is None else None
-    return document.model_dump_json(by_alias=True, indent=2, exclude=left_out) + "\n"
+        return json.dumps(document, indent=2, allow_nan=False) + "\n"
+    except ValueError as error:
+        raise ModelError(f"the model cannot be written: {error}") from error
 
 
-def write_model(model: Model, path: str | Path) -> None:
+def terms_document(model: DynamicModel) -> list[dict[str, Any]]:
+    """Return the parameters of a model in the form of ``result.json``; a regressor is a term or a name."""
+    if isinstance(model, Model):
+        return list(model.document()["terms"])
+    errors = model.standard_errors or (None,) * model.size
+    return [
+        {"regressor": name, "parameter": parameter, "standard_error": error}
+        for name, parameter, error in zip(model.parameter_names, model.parameters, errors, strict=True)
+    ]
+
+
+def write_model(model: DynamicModel | CoupledModel, path: str | Path) -> None:
     """Write a model file.
 
     Raises
@@ -94,25 +91,15 @@ def write_model(model: Model, path: str | Path) -> None:
     ModelError
         A number of the model is not finite, or the file cannot be written.
     """
-    write_model_text(model_json(model), path)
-
-
-def write_model_text(text: str, path: str | Path) -> None:
-    """Write the text of a model file.
-
-    Raises
-    ------
-    ModelError
-        The file cannot be written.
-    """
+    text = model_json(model)
     try:
         Path(path).write_text(text, encoding="utf-8")
     except OSError as error:
         raise ModelError(f"cannot write the model file {path}: {error.strerror}") from error
 
 
-def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Model:
-    """Read a model file.
+def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> DynamicModel:
+    """Read a file of a model of one output.
 
     Parameters
     ----------
@@ -124,19 +111,17 @@ def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVE
     ModelError
         The file does not exist or is not a model file. The message names the invalid field.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ModelError(f"cannot read the model file {path}: {error}") from error
-    model = model_from_json(text, str(path), primitives)
-    # Earlier versions wrote the preprocessing to result.json alone.
-    return model if model.preprocessing else replace(model, preprocessing=read_preprocessing(path))
+    model = model_from_json(_read_text(path), str(path), primitives)
+    if isinstance(model, Model) and not model.preprocessing:
+        # Earlier versions wrote the preprocessing to result.json alone.
+        return replace(model, preprocessing=read_preprocessing(path))
+    return model
 
 
 def model_from_json(
     text: str, name: str = "model", primitives: Mapping[str, Primitive] = PRIMITIVES
-) -> Model:
-    """Parse the text of a model file. ``name`` is the name of the file in error messages.
+) -> DynamicModel:
+    """Parse the text of a file of a model of one output. ``name`` is the name of the file in error messages.
 
     Raises
     ------
@@ -144,60 +129,45 @@ def model_from_json(
         As in `read_model`.
     """
     try:
-        document = ModelDocument.model_validate_json(text)
-    except ValidationError as error:
-        raise ModelError(f"{name} is not a model file of schema {SCHEMA}: {_explain(error)}") from error
-    terms: dict[Regressor, tuple[float | None, float | None]] = {}
-    for position, term in enumerate(document.terms):
-        where = f"{name}: terms.{position}"
-        factor, item = _parse_regressor(term.regressor, primitives, f"{where}.regressor")
-        if item in terms:
-            raise ModelError(f"{where}.regressor: {term.regressor!r} is given twice")
-        # A file may contain terms that are not in canonical form: the constant factor that canonicalisation
-        # extracts is multiplied into the parameter.
-        terms[item] = (
-            _scale(factor, term.parameter, f"{where}.parameter"),
-            _scale(abs(factor), term.standard_error, f"{where}.standard_error"),
-        )
-    ordered = canonical_order(terms)
-    theta = _all_or_none([terms[item][0] for item in ordered], f"{name}: parameter")
-    errors = _all_or_none([terms[item][1] for item in ordered], f"{name}: standard_error")
+        document = json.loads(text)
+    except ValueError:
+        document = None  # reported as a damaged document of a NARX model
+    if isinstance(document, dict) and "kind" in document:
+        return lookup(MODEL_CLASSES, str(document["kind"]), f"class of models of {name}").read(document, name)
+    return read_narx(text, name, primitives)
+
+
+def narx_from_json(text: str, name: str, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Model:
+    """Parse the text of a NARX model of one output; other models raise `ModelError`."""
+    return require_narx(model_from_json(text, name, primitives))
+
+
+def read_coupled_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> CoupledModel:
+    """Read the file of a model of several outputs, or ``model.json`` of a result folder.
+
+    Parameters
+    ----------
+    primitives : mapping
+        As in `read_model`.
+
+    Raises
+    ------
+    ModelError
+        The file does not exist or is not a model of several outputs. The message names the invalid field.
+    """
+    file = Path(path)
+    file = file / "model.json" if file.is_dir() else file
     try:
-        return Model(
-            *(tuple(ordered), theta, document.inputs, document.output, document.dt, errors),
-            document.average,
-            document.preprocessing,
-        )
-    except ModelError as error:
-        raise ModelError(f"{name}: inputs: {error}") from error
+        document = json.loads(_read_text(file))
+    except ValueError as error:
+        raise ModelError(f"cannot read the model file {file}: {error}") from error
+    if not isinstance(document, dict) or document.get("schema") != COUPLED_SCHEMA:
+        raise ModelError(f"{file} is not a coupled model of schema {COUPLED_SCHEMA}")
+    return read_coupled(document, str(file), primitives)
 
 
-def _explain(error: ValidationError) -> str:
-    where, message = find_problem(error, ModelDocument)
-    return f"{where or 'the file'}: {message}"
-
-
-def _parse_regressor(text: str, primitives: Mapping[str, Primitive], where: str) -> tuple[float, Regressor]:
+def _read_text(path: str | Path) -> str:
     try:
-        factor, item = regressor(parse(text, primitives))
-    except ModelError as error:
-        raise ModelError(f"{where}: {error}") from error
-    if item is None:
-        raise ModelError(f"{where}: {text!r} is identically zero")
-    return factor, item
-
-
-def _scale(factor: float, number: float | None, where: str) -> float | None:
-    if number is None:
-        return None
-    if not isfinite(factor * number):
-        raise ModelError(f"{where}: {number!r} overflows with the regressor's factor {factor!r}")
-    return factor * number
-
-
-def _all_or_none(values: list[float | None], field: str) -> tuple[float, ...] | None:
-    """Return the numbers if all are given, None if none is given."""
-    given = tuple(value for value in values if value is not None)
-    if given and len(given) < len(values):
-        raise ModelError(f"{field} is given for some terms only: give it for all or for none")
-    return given or None
+        return Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f"cannot read the model file {path}: {error}") from error

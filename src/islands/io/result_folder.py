@@ -16,7 +16,6 @@ from islands.io.certificates import certificates_document
 from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
-from islands.models.equations import equation, latex_equation
 from islands.models.signal_statement import describe_signals
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.ensemble import Ensemble
@@ -101,17 +100,17 @@ def content_sha256(record: Dataset) -> str:
 def _model_document(
     rank: int, assessment: Assessment, recommended: bool, ensemble: Ensemble | None
 ) -> dict[str, Any]:
-    model = assessment.model
+    model, written = assessment.model, assessment.model.equation()
     terms = [
-        {**term, "inclusion": None if ensemble is None else ensemble.inclusion(item)}
-        for term, item in zip(terms_document(model), model.regressors, strict=True)
+        {**term, "inclusion": None if ensemble is None else ensemble.inclusion(name)}
+        for term, name in zip(terms_document(model), model.parameter_names, strict=True)
     ]
     return {
         "rank": rank,
         "recommended": recommended,
         "size": model.size,
-        "equation": equation(model),
-        "latex": latex_equation(model),
+        "equation": written.line,
+        "latex": written.latex,
         "signals": describe_signals(model),
         "terms": terms,
         "bands": bands_document(assessment.bands),

@@ -27,7 +27,7 @@ class NodeArrays(NamedTuple):
     operation : ndarray of int64, shape (nodes,)
         Instruction of the interpreter, `LAGGED` or `CONSTANT`.
     first, second : ndarray of int64, shape (nodes,)
-        Nodes of the operands; channel and lag of a signal.
+        Nodes of the operands; channel and lag of a signal; of a constant, the number of its parameter or 0.
     address : ndarray of int64, shape (nodes,)
         Machine address of the row function of a CALL.
     value : ndarray of float64, shape (nodes,)
@@ -83,6 +83,7 @@ def generate_program(
     addresses = np.empty(instructions, np.int64)
     operands = np.empty((count, 2), np.int64)
     values = np.empty(constants, np.float64)
+    parameters = np.empty(constants, np.int64)
     free = np.empty(count, np.int64)
     rows, spare, position, constant = constants, 0, 0, 0
     for index in range(count):
@@ -95,6 +96,7 @@ def generate_program(
         if operation == CONSTANT:
             operands[index, 1] = constant
             values[constant] = nodes.value[node]
+            parameters[constant] = first
             constant += 1
             continue
         if spare > 0:
@@ -115,7 +117,7 @@ def generate_program(
                 spare += 1
     for index in range(count):
         operand_index[needed[index]] = -1
-    return Program(code, addresses, operands, values, rows, factors, degree)
+    return Program(code, addresses, operands, values, parameters, rows, factors, degree)
 
 
 @kernel

@@ -56,8 +56,10 @@ class Program(NamedTuple):
         Machine address of the row function of a CALL, otherwise 0.
     operands : ndarray of int64, shape (operands, 2)
         Channel and lag, or `TEMPORARY` and its index. Channel 0 is the output.
-    constants : ndarray of float64
+    constants : ndarray of float64, shape (constants,)
         Values of the first temporaries.
+    parameters : ndarray of int64, shape (constants,)
+        Number of the parameter whose value the constant has, from 1; 0 for a number.
     temporaries : int
         Number of temporary rows, including those of the constants.
     factors : ndarray of int64, shape (terms, 4)
@@ -70,6 +72,7 @@ class Program(NamedTuple):
     addresses: NDArray[np.int64]
     operands: NDArray[np.int64]
     constants: NDArray[np.float64]
+    parameters: NDArray[np.int64]
     temporaries: int
     factors: NDArray[np.int64]
     degree: NDArray[np.int64]

@@ -1,12 +1,28 @@
 """Coupled model: one equation per output, each of which may read the past of all outputs."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import nan
+from typing import Any, ClassVar
 
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.expressions.tree import Apply, Expression, Lagged
+from islands.models.block import Block, BlockTerm
+from islands.models.coupled_equations import (
+    coupled_equation,
+    coupled_latex,
+    coupled_mathml,
+    coupled_text,
+    equation_signals,
+    input_signals,
+    output_signals,
+)
+from islands.models.dynamic_model import EquationText
+from islands.models.equations import equation
 from islands.models.narx import Model, measured_model
+from islands.models.signal_statement import describe_values
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +40,8 @@ class CoupledModel:
         There are fewer than two equations, or their outputs, inputs, sampling times, averages or
         preprocessing do not agree.
     """
+
+    kind: ClassVar[str] = "coupled-narx"
 
     models: tuple[Model, ...]
 
@@ -127,6 +145,65 @@ class CoupledModel:
             models.append(model.with_parameters(theta[begin : begin + model.size]))
             begin += model.size
         return replace(self, models=tuple(models))
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters: the output of the equation, and the text of the term."""
+        return tuple(
+            f"{model.output_name}: {name}" for model in self.models for name in model.parameter_names
+        )
+
+    def block(self) -> Block:
+        """Return the difference equations; the weights of their terms are the parameters."""
+        equations, texts = [], []
+        parameters: dict[str, float] = {}
+        for place, model in enumerate(self.models):
+            names = [f"{place}: {item.text}" for item in model.regressors]
+            equations.append(tuple(map(BlockTerm, self.expressions(place), names)))
+            parameters.update(zip(names, model.theta or (nan,) * model.size, strict=True))
+            texts.append(self._equation(place))
+        return Block(
+            equations=tuple(equations),
+            columns=(*self.output_names, *self.models[0].column_names[: len(self.input_names)]),
+            signals=(*output_signals(self), *input_signals(self)),
+            starts=(),
+            leads=self.leads,
+            parameters=parameters,
+            maximum_lag=self.maximum_lag,
+            dt=None if self.dt is None else float(self.dt),
+            values=describe_values(self),
+            texts=tuple(texts),
+        )
+
+    def _equation(self, place: int) -> str:
+        """Return the text of one equation with the signals of the block."""
+        names = equation_signals(self, place)
+        return re.sub(
+            r"\b(y|u\d*)\(k(?=[-)])", lambda leaf: f"{names[leaf[1]]}(k", equation(self.models[place])
+        )
+
+    def equation(self) -> EquationText:
+        """Return the equations as text, one line for each output."""
+        return EquationText(
+            line="\n".join(map(self._equation, range(len(self.models)))),
+            plain=coupled_text(self),
+            named=coupled_equation(self),
+            terms=self.parameter_names,
+            latex=coupled_latex(self),
+            mathml=coupled_mathml(self),
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return the model as JSON values."""
+        return {
+            "inputs": list(self.input_names),
+            "outputs": list(self.output_names),
+            "dt": self.dt,
+            "average": self.average,
+            "equation": coupled_equation(self),
+            "latex": coupled_latex(self),
+            "models": [model.document() for model in self.models],
+        }
 
     def channels(self, place: int) -> tuple[int, ...]:
         """Return the channel of the coupled model of every channel of one equation.

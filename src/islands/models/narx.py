@@ -2,13 +2,27 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import nan
+from typing import Any, ClassVar
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.expressions.primitives import SUB
+from islands.expressions.printing import plain
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, replace_leaves
+from islands.models.block import Block, BlockTerm
+from islands.models.dynamic_model import DynamicModel, ModelEquation
+from islands.models.equations import (
+    equation,
+    latex_equation,
+    mathml_equation,
+    named_equation,
+    named_term,
+    plain_text,
+)
 from islands.models.regressor import Regressor, regressor
+from islands.models.signal_statement import describe_values, symbols
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -40,6 +54,8 @@ class Model:
         There is no regressor, the regressors are not in canonical order, the number of parameters or standard
         errors differs from the number of regressors, or a regressor reads an input without a name.
     """
+
+    kind: ClassVar[str] = "narx"
 
     regressors: tuple[Regressor, ...]
     theta: tuple[float, ...] | None = None
@@ -115,10 +131,108 @@ class Model:
         errors = None if standard_errors is None else tuple(map(float, standard_errors))
         return replace(self, theta=tuple(map(float, theta)), standard_errors=errors)
 
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Texts of the regressors with numbered inputs, which identify the structure."""
+        return tuple(item.text for item in self.regressors)
+
+    def block(self) -> Block:
+        """Return the difference equation; the weights of its terms are the parameters."""
+        names = [item.text for item in self.regressors]
+        terms = tuple(BlockTerm(item.expression, item.text) for item in self.regressors)
+        return Block(
+            equations=(terms,),
+            columns=(self.output_name, *self.column_names),
+            signals=symbols(self.inputs),
+            starts=(),
+            leads=self.leads,
+            parameters=dict(zip(names, self.theta or (nan,) * self.size, strict=True)),
+            maximum_lag=self.maximum_lag,
+            dt=None if self.dt is None else float(self.dt),
+            values=describe_values(self),
+            texts=(equation(self),),
+        )
+
+    def equation(self) -> ModelEquation:
+        """Return the equation as text."""
+        return NarxEquation(self)
+
+    def document(self) -> dict[str, Any]:
+        """Return the model as JSON values; ``equation`` and ``latex`` are for readers."""
+        parameters = self.theta or (None,) * self.size
+        errors = self.standard_errors or (None,) * self.size
+        return {
+            "inputs": self.input_names,
+            "output": self.output_name,
+            "dt": self.dt,
+            "average": self.average,
+            "preprocessing": self.preprocessing,
+            "equation": equation(self),
+            "latex": latex_equation(self),
+            "terms": [
+                {
+                    "regressor": plain(item.expression, self.inputs),
+                    "parameter": parameter,
+                    "standard_error": error,
+                }
+                for item, parameter, error in zip(self.regressors, parameters, errors, strict=True)
+            ],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class NarxEquation:
+    """Equation of a NARX model; see `ModelEquation`."""
+
+    model: Model
+
+    @property
+    def line(self) -> str:
+        """One line with the symbols y and u."""
+        return equation(self.model)
+
+    @property
+    def plain(self) -> str:
+        """The line, and one that states the signals."""
+        return plain_text(self.model)
+
+    @property
+    def named(self) -> str:
+        """One line with the column names of the record."""
+        return named_equation(self.model)
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Texts of the regressors with the column names of the record."""
+        return tuple(named_term(self.model, position) for position in range(self.model.size))
+
+    @property
+    def latex(self) -> str:
+        """The equation in LaTeX."""
+        return latex_equation(self.model)
+
+    @property
+    def mathml(self) -> str:
+        """The equation in MathML."""
+        return mathml_equation(self.model)
+
 
 def canonical_order(regressors: Iterable[Regressor]) -> list[Regressor]:
     """Return the regressors in canonical order, without repetition."""
     return sorted(dict.fromkeys(regressors), key=lambda item: item.content)
+
+
+def require_narx(model: DynamicModel) -> Model:
+    """Return a model as a NARX model.
+
+    Raises
+    ------
+    ModelError
+        It is of another class.
+    """
+    if not isinstance(model, Model):
+        raise ModelError(f"a NARX model is needed, this one is of the class {model.kind}")
+    return model
 
 
 def make_model(

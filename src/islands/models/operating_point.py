@@ -17,8 +17,9 @@ from islands.errors import ModelError
 from islands.expressions.derivatives import differentiate
 from islands.expressions.evaluation import value
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, remove_shifts, walk
+from islands.models.dynamic_model import DynamicModel
 from islands.models.equations import expressions_of_record, named_term, signal_names
-from islands.models.narx import Model, measured_model
+from islands.models.narx import Model, measured_model, require_narx
 
 #: Sums of parameters below this fraction of their absolute sum are zero except for rounding.
 _ROUNDING = 1e-9
@@ -60,12 +61,12 @@ class Linearisation:
         return bool((np.abs(self.poles) < 1.0).all())
 
 
-def differentiate_model(model: Model, u: ArrayLike, y: float | None = None) -> Linearisation:
+def differentiate_model(model: DynamicModel, u: ArrayLike, y: float | None = None) -> Linearisation:
     """Return the coefficients of the linear model about an operating point.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Model with parameters.
     u : float or sequence of float
         Constant value of every input.
@@ -78,15 +79,15 @@ def differentiate_model(model: Model, u: ArrayLike, y: float | None = None) -> L
         The model has no unique stable equilibrium at these inputs and no output is given, or it has a kink or
         a step at the operating point, such as that of ``sign(u(k-1) - u(k-2))`` at rest.
     """
-    model = measured_model(model)
-    levels = _read_levels(model, u)
+    narx = measured_model(require_narx(model))
+    levels = _read_levels(narx, u)
     if y is None:
-        y = _find_rest(model, levels)
-    found = _differentiate(model, levels, y)
+        y = _find_rest(narx, levels)
+    found = _differentiate(narx, levels, y)
     if np.isnan(found.outputs).any() or np.isnan(found.inputs).any():
-        expressions = expressions_of_record(model)
+        expressions = expressions_of_record(narx)
         kinked = next(
-            named_term(model, place)
+            named_term(narx, place)
             for place, expression in enumerate(expressions)
             if any(isnan(slope) for slope in _slopes(expression, y, levels).values())
         )
@@ -97,12 +98,12 @@ def differentiate_model(model: Model, u: ArrayLike, y: float | None = None) -> L
     return found
 
 
-def static_characteristic(model: Model, inputs: ArrayLike) -> NDArray[np.float64]:
+def static_characteristic(model: DynamicModel, inputs: ArrayLike) -> NDArray[np.float64]:
     """Return the output at rest for constant inputs.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Model with parameters.
     inputs : array_like, shape (points,) or (points, inputs)
         Constant inputs.
@@ -117,10 +118,10 @@ def static_characteristic(model: Model, inputs: ArrayLike) -> NDArray[np.float64
     ModelError
         A point has no stable equilibrium, several of them, or a continuum.
     """
-    model = measured_model(model)
+    narx = measured_model(require_narx(model))
     points = np.atleast_1d(np.asarray(inputs, dtype=np.float64))
     rows = points[:, None] if points.ndim == 1 else points
-    return np.array([_find_rest(model, _read_levels(model, row)) for row in rows])
+    return np.array([_find_rest(narx, _read_levels(narx, row)) for row in rows])
 
 
 def find_equilibrium(model: Model, u: Sequence[float]) -> float:

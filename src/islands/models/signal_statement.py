@@ -3,16 +3,15 @@
 from collections.abc import Sequence
 
 from islands.data.channel_names import parse_channel_name
-from islands.data.signal_map import SampledReference
-from islands.models.narx import Model
+from islands.data.signal_map import SampledReference, SignalReference
 
 
-def describe_signals(model: Model, names: Sequence[str] = ()) -> str:
+def describe_signals(model: SignalReference, names: Sequence[str] = ()) -> str:
     """State which signals the equation of a model reads.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
     names : sequence of str
         Names of the output and of every input in the text of the equation; by default y and u, or y, u1, u2.
 
@@ -24,8 +23,8 @@ def describe_signals(model: Model, names: Sequence[str] = ()) -> str:
     """
     done = model.preprocessing
     offsets = () if done is None else (done.output_offset, *done.input_offsets)
-    columns = (model.output_name, *model.column_names)
-    return join_statements(model, names or symbols(model.inputs), columns, offsets)
+    columns = (model.output_name, *(parse_channel_name(name).base for name in model.input_names))
+    return join_statements(model, names or symbols(len(model.input_names)), columns, offsets)
 
 
 def symbols(inputs: int) -> tuple[str, ...]:

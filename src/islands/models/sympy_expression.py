@@ -8,8 +8,9 @@ from islands.distribution import describe_missing_extra
 from islands.errors import ModelError
 from islands.expressions.primitives import LARGEST_EXPONENT
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift
+from islands.models.dynamic_model import DynamicModel
 from islands.models.equations import expressions_of_record, signal_names
-from islands.models.narx import Model
+from islands.models.narx import require_narx
 
 if TYPE_CHECKING:
     import sympy
@@ -35,12 +36,12 @@ _FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
 )
 
 
-def to_sympy(model: Model) -> "sympy.Eq":
+def to_sympy(model: DynamicModel) -> "sympy.Eq":
     """Return a model as a SymPy equation.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Model with parameters.
 
     Returns
@@ -55,12 +56,13 @@ def to_sympy(model: Model) -> "sympy.Eq":
     ModelError
         SymPy is not installed, or the model has no parameters.
     """
+    narx = require_narx(model)
     try:
         import sympy as sp  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise ModelError(describe_missing_extra("the equation of SymPy", "sympy")) from error
     k = sp.Symbol("k", integer=True)
-    names = (name.strip("[]") for name in signal_names(model))
+    names = (name.strip("[]") for name in signal_names(narx))
     signals = [sp.Function(name, real=True) for name in names]
 
     def call(primitive: Primitive, *arguments: Any) -> Any:
@@ -86,6 +88,6 @@ def to_sympy(model: Model) -> "sympy.Eq":
 
     terms = (
         sp.Float(parameter) * convert(expression)
-        for parameter, expression in zip(model.parameters, expressions_of_record(model), strict=True)
+        for parameter, expression in zip(narx.parameters, expressions_of_record(narx), strict=True)
     )
     return sp.Eq(signals[0](k), sp.Add(*terms), evaluate=False)

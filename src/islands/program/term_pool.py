@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.expressions.primitives import ADD, MUL, SIGN, SUB
-from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Symbol
 from islands.kernels import codegen, interpreter
 from islands.kernels.codegen import CONSTANT, LAGGED, NodeArrays
 from islands.kernels.interpreter import CALL, MAX_FACTORS, MULTIPLY, Program
@@ -27,9 +27,15 @@ class TermPool:
     """Hash-consed canonical expressions: a node for every subexpression, a term for every regressor.
 
     The indices follow the order of insertion; no result may depend on them.
+
+    Parameters
+    ----------
+    parameters : sequence of str
+        Names of parameters in the expressions.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, parameters: Sequence[str] = ()) -> None:
+        self._parameters = {name: number for number, name in enumerate(parameters, start=1)}
         self._indices: dict[tuple[int, int, int, int, float], int] = {}
         self._known: dict[Expression, int] = {}
         self._terms: dict[Expression, int] = {}
@@ -77,6 +83,8 @@ class TermPool:
                 return self._add(LAGGED, channel, lag)
             case Constant(value):
                 return self._add(CONSTANT, value=value)
+            case Symbol(name):
+                return self._add(CONSTANT, self._parameters[name])
             case Apply(primitive, (Apply(inner, (*firsts, last)),)) if primitive == SIGN and inner in _SIGNS:
                 first = firsts[0] if len(firsts) == 1 else Apply(inner, tuple(firsts))
                 return self._add(_SIGNS[inner], self._node(first), self._node(last))
@@ -129,13 +137,13 @@ def _grow(old: NodeArrays, nodes: int = 0, terms: int = 0) -> NodeArrays:
     return new
 
 
-def link(terms: Sequence[Term]) -> Program:
+def link(terms: Sequence[Term], parameters: Sequence[str] = ()) -> Program:
     """Generate the program of some regressors, one term each and in the given order.
 
     A term may also be a canonical expression with lag 0, for example the target y(k). The kernel of columns
-    allows this, a simulation does not.
+    allows this, a simulation does not. ``parameters`` are the names of parameters in the expressions.
     """
-    pool = TermPool()
+    pool = TermPool(parameters)
     indices = pool.terms(terms)
     nodes = pool.nodes
     program: Program = codegen.generate_program(nodes, indices, np.full(nodes.operation.size, -1, np.int64))

@@ -16,7 +16,7 @@ from islands.figures.paper import (
     draw_training_data,
     draw_validation,
 )
-from islands.models.narx import Model
+from islands.models.narx import Model, require_narx
 from islands.reproduction.ablation import (
     LITERAL,
     SWITCHES,
@@ -144,9 +144,10 @@ def search_with_preset(quick: bool) -> Document:
     for most in _SIZES:
         # The models are ordered by their validation error.
         best = next(each for each in found.models if each.model.size <= most)
+        model = require_narx(best.model)
         document[str(most)] = {
-            **model_document(best.model),
-            "errors": measure_errors(best.model, records),
+            **model_document(model),
+            "errors": measure_errors(model, records),
             "property_1": best.physics.property_1,
         }
     published = assess_published(PUBLISHED["13"], records, 0, printed=False)

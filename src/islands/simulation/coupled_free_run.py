@@ -1,6 +1,5 @@
 """Free run of a coupled model: every equation reads the simulated past of all outputs."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +9,9 @@ from islands.data.compatibility import ColumnReference, match_record
 from islands.data.coupled_record import CoupledRecord
 from islands.data.signal_map import map_signals, match_rate
 from islands.errors import RecordError, SettingsError
-from islands.kernels.interpreter import Program
-from islands.kernels.simulate_coupled import LANES, simulate_coupled
 from islands.kernels.summation import dot
 from islands.models.coupled_narx import CoupledModel
-from islands.program.term_pool import link
+from islands.simulation.block_simulation import BlockSimulator
 from islands.simulation.layout import check_warm_up, find_intervals
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.predictors import divergence_bound
@@ -78,50 +75,31 @@ class CoupledSimulator:
             )
         if interval is not None and interval < 1:
             raise SettingsError(f"a shooting interval has at least 1 sample, got {interval}")
-        places = range(len(model.models))
-        self._program: Program = link([term for place in places for term in model.expressions(place)])
-        self._ends = np.cumsum([each.size for each in model.models], dtype=np.int64)
-        self._y, self._u = record.y, record.records[0].u
+        self._y = record.y
         self._start, self._length = find_intervals(record.records[0], self._warm_up, interval)
         for each in record.records:
             check_warm_up(each.y, self._start, self._warm_up)
         self._bounds = [divergence_bound(each) for each in record.records]
-        self._blocks = list(self._make_blocks())
-
-    def _make_blocks(self) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64]]]:
-        """Yield the intervals of every block, and its signals of shape (channels, rows * lanes)."""
-        signals = np.vstack([self._y.T, self._u.T])
-        order = np.argsort(-self._length, kind="stable")
-        for begin in range(0, len(order), LANES):
-            lanes = order[begin : begin + LANES]
-            rows = self._warm_up + int(self._length[lanes[0]])
-            first = np.resize(self._start[lanes], LANES) - self._warm_up
-            samples = np.minimum(first + np.arange(rows)[:, None], signals.shape[1] - 1)
-            yield lanes, signals[:, samples.reshape(-1)]
+        self._simulate = BlockSimulator(
+            model.block(), self._y.T, record.records[0].u.T, self._start, self._length, self._warm_up
+        )
 
     def __call__(self, theta: NDArray[np.float64]) -> CoupledSimulation:
         """Simulate with the parameters of all equations, one after the other."""
-        outputs, warm_up = len(self._ends), self._warm_up
-        predicted = np.full((len(self._y), outputs), np.nan)
+        predicted = np.ascontiguousarray(self._simulate(theta[None])[0].T)
         failures = []
-        theta = np.repeat(theta[:, None], LANES, axis=1)
-        for lanes, block in self._blocks:
-            signals = block.copy()
-            simulate_coupled(self._program, theta, self._ends, warm_up, signals)
-            rows = signals[:outputs].reshape(outputs, -1, LANES)
-            for lane, interval in enumerate(lanes):
-                start, length = self._start[interval], self._length[interval]
-                run = rows[:, warm_up : warm_up + length, lane].T
-                outside = ~(np.abs(run) <= self._bounds)
-                if outside.any():
-                    length = int(np.argmax(outside.any(axis=1)))
-                    failures.append((int(start) + length, int(np.argmax(outside[length]))))
-                predicted[start : start + length] = run[:length]
+        for start, length in zip(self._start, self._length, strict=True):
+            run = predicted[start : start + length]
+            outside = ~(np.abs(run) <= self._bounds)
+            if outside.any():
+                first = int(np.argmax(outside.any(axis=1)))
+                failures.append((int(start) + first, int(np.argmax(outside[first]))))
+                run[first:] = np.nan
         if failures:
             sample, output = min(failures)
             reason = f"|y{output + 1}| left {self._bounds[output]:.3g} at sample {sample}"
             outcome = EvaluationOutcome(Status.DIVERGED, reason)
-            return CoupledSimulation(predicted + self._offsets, (np.inf,) * outputs, outcome)
+            return CoupledSimulation(predicted + self._offsets, (np.inf,) * self._y.shape[1], outcome)
         return CoupledSimulation(predicted + self._offsets, self._mean_squares(predicted), OK)
 
     def _mean_squares(self, predicted: NDArray[np.float64]) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.kernels.interpreter import Program
-from islands.kernels.simulate_coupled import LANES, MANY_LANES, simulate_coupled
+from islands.kernels.simulate_block import LANES, MANY_LANES, simulate_block
 from islands.models.regressor import Regressor
 from islands.program.term_pool import link
 from islands.simulation.predictors import BOUND, divergence_bound_of_range
@@ -93,6 +93,8 @@ class LinkedModel:
                 signals[1:, :, lane] = u[run]
         ends = np.array([theta.shape[1]], dtype=np.int64)
         rows = signals.reshape(1 + inputs, -1)
-        simulate_coupled(self._program, np.ascontiguousarray(theta[lanes].T), ends, self.warm_up, rows)
+        constants = np.repeat(self._program.constants[:, None], len(lanes), axis=1)
+        weights = np.ascontiguousarray(theta[lanes].T)
+        simulate_block(self._program, weights, constants, ends, self.warm_up, rows)
         predicted: NDArray[np.float64] = signals[0, :, :runs].T
         return predicted

@@ -9,9 +9,11 @@ from islands.data.dataset import Dataset
 from islands.data.signal_map import map_signals
 from islands.errors import SettingsError
 from islands.kernels.simulate import Layout, simulate
-from islands.kernels.summation import total
+from islands.kernels.summation import dot, total
+from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
 from islands.program.term_pool import link
+from islands.simulation.block_simulation import make_simulator
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 
@@ -40,20 +42,20 @@ class Simulation:
     outcome: EvaluationOutcome
 
 
-def one_step_ahead(model: Model, record: Dataset, warm_up: int | None = None) -> Simulation:
+def one_step_ahead(model: DynamicModel, record: Dataset, warm_up: int | None = None) -> Simulation:
     """Predict every sample from measured past samples."""
     return multiple_shooting(model, record, 1, warm_up)
 
 
 def free_run(
-    model: Model, record: Dataset, warm_up: int | None = None, bound: float | None = None
+    model: DynamicModel, record: Dataset, warm_up: int | None = None, bound: float | None = None
 ) -> Simulation:
     """Simulate every segment from its first samples; the output is only read during the warm-up."""
     return multiple_shooting(model, record, None, warm_up, bound)
 
 
 def multiple_shooting(
-    model: Model,
+    model: DynamicModel,
     record: Dataset,
     interval: int | None,
     warm_up: int | None = None,
@@ -89,6 +91,8 @@ def multiple_shooting(
         raise SettingsError(f"the model reads {model.maximum_lag} samples back, the warm-up has {warm_up}")
     theta = np.array(model.parameters)
     bound = divergence_bound(record) if bound is None else bound
+    if not isinstance(model, Model):
+        return _simulate_block(model, record, interval, warm_up, bound, offset)
     cut = layout(record, warm_up, interval)
     squared_error = np.empty(len(cut.start))
     diverged = np.empty(len(cut.start), np.int64)
@@ -104,8 +108,27 @@ def multiple_shooting(
     return Simulation(predicted, float(total(squared_error) / cut.length.sum()), OK)
 
 
+def _simulate_block(
+    model: DynamicModel,
+    record: Dataset,
+    interval: int | None,
+    warm_up: int,
+    bound: float,
+    offset: float,
+) -> Simulation:
+    """Simulate the block of a model; ``offset`` is added to its output."""
+    simulate_record = make_simulator(model.block(), record, interval, warm_up)
+    predicted = simulate_record(np.array([model.parameters]))[0, 0]
+    sample = simulate_record.remove_diverged(predicted, bound)
+    if sample is not None:
+        reason = f"|y| left {bound:.3g} at sample {sample}"
+        return Simulation(predicted + offset, np.inf, EvaluationOutcome(Status.DIVERGED, reason))
+    error = (predicted - record.y)[simulate_record.predicted]
+    return Simulation(predicted + offset, float(dot(error, 0, error, 0, error.size)) / error.size, OK)
+
+
 def free_runs(
-    model: Model, thetas: NDArray[np.float64], record: Dataset, warm_up: int
+    model: DynamicModel, thetas: NDArray[np.float64], record: Dataset, warm_up: int
 ) -> NDArray[np.float64]:
     """Simulate every segment of a record once for each of several parameter vectors of a structure.
 
@@ -130,6 +153,13 @@ def free_runs(
         The record does not match the model, is too short, or its output is missing in a warm-up.
     """
     record, offset = map_signals(model, record)
+    if not isinstance(model, Model):
+        simulate_record = make_simulator(model.block(), record, None, warm_up)
+        bound = divergence_bound(record)
+        predicted = simulate_record(thetas)[:, 0]
+        for run in predicted:
+            simulate_record.remove_diverged(run, bound)
+        return predicted + offset
     program, cut, bound = link(model.regressors), layout(record, warm_up), divergence_bound(record)
     squared_error, diverged = np.empty(len(cut.start)), np.empty(len(cut.start), np.int64)
     predicted = np.full((len(thetas), record.samples), np.nan)

@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
+from islands.models.narx import Model, require_narx
 from islands.models.operating_point import find_equilibrium
 from islands.simulation.predictors import BOUND, free_run
 
@@ -47,7 +48,7 @@ class StepResponse:
 
 
 def step_response(
-    model: Model,
+    model: DynamicModel,
     start: ArrayLike,
     end: ArrayLike,
     y: float | None = None,
@@ -57,7 +58,7 @@ def step_response(
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Model with parameters.
     start, end : float or sequence of float
         Constant value of every input before and after the step.
@@ -75,11 +76,12 @@ def step_response(
     SettingsError
         There is not one value for each input, no input changes, or there is less than one sample.
     """
+    narx = require_narx(model)
     levels = [np.atleast_1d(np.asarray(each, dtype=np.float64)) for each in (start, end)]
     for level in levels:
-        if level.shape != (model.inputs,):
+        if level.shape != (narx.inputs,):
             raise SettingsError(
-                f"the model has the inputs {', '.join(model.column_names)}: give one value for each before "
+                f"the model has the inputs {', '.join(narx.column_names)}: give one value for each before "
                 f"and after the step, got {level.tolist()}"
             )
     changed = np.flatnonzero(levels[0] != levels[1])
@@ -87,10 +89,10 @@ def step_response(
         raise SettingsError("no input changes: give different values before and after the step")
     if samples is not None and samples < 1:
         raise SettingsError(f"a response has at least 1 sample, got {samples}")
-    rest = find_equilibrium(model, levels[0].tolist()) if y is None else y
+    rest = find_equilibrium(narx, levels[0].tolist()) if y is None else y
     count = _FEWEST if samples is None else samples
     while True:
-        found = _simulate(model, levels[0], levels[1], rest, count, int(changed[0]))
+        found = _simulate(narx, levels[0], levels[1], rest, count, int(changed[0]))
         after = found.y[-count:]
         change = np.abs(after - after[-1])
         settled = np.isnan(change).any() or change[count // 2 :].max() <= _SETTLED * change.max()

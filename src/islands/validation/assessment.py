@@ -12,7 +12,7 @@ from islands.data.split import Split
 from islands.errors import RecordError
 from islands.estimation.constraints.checks import ConstraintCheck, check_constraints
 from islands.estimation.parameter_constraints import count_free_parameters
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
@@ -40,7 +40,7 @@ class Assessment:
 
     Attributes
     ----------
-    model : Model
+    model : DynamicModel
     metrics : mapping
         ``metrics[part][mode]``, NaN if the simulation diverged.
     outcomes : mapping
@@ -68,7 +68,7 @@ class Assessment:
         Prediction bands of the free run. None without an ensemble, or if its free runs diverge.
     """
 
-    model: Model
+    model: DynamicModel
     metrics: Mapping[str, Mapping[str, Metrics]]
     outcomes: Mapping[str, Mapping[str, EvaluationOutcome]]
     information: InformationCriteria
@@ -83,13 +83,13 @@ class Assessment:
 
 
 def assess(
-    model: Model, split: Split, shooting: int, warm_up: int | None = None, constraints: str = "none"
+    model: DynamicModel, split: Split, shooting: int, warm_up: int | None = None, constraints: str = "none"
 ) -> Assessment:
     """Assess a model on the estimation data and the validation data.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
     split : Split
     shooting : int
         Length of a multiple-shooting interval in samples.
@@ -152,24 +152,24 @@ def _compute_squared_errors(record: Dataset, run: Simulation) -> NDArray[np.floa
 
 
 def _compute_information(
-    model: Model, record: Dataset, warm_up: int | None, constraints: str
+    model: DynamicModel, record: Dataset, warm_up: int | None, constraints: str
 ) -> InformationCriteria:
     run = multiple_shooting(model, record, 1, warm_up)
     if not run.outcome:
         return InformationCriteria(nan, nan, nan)
     residual = (record.y - run.y)[~np.isnan(run.y)]
-    free = count_free_parameters(model.regressors, constraints)
+    free = count_free_parameters(model, constraints)
     return information_criteria(float(np.add.reduce(residual**2)), len(residual), free)
 
 
 def assess_residual(
-    model: Model, record: Dataset, warm_up: int | None
+    model: DynamicModel, record: Dataset, warm_up: int | None
 ) -> tuple[ResidualTests, ResidualStructure]:
     """Test the residuals of a model on the longest recording of a record.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
     record : Dataset
     warm_up : int or None
         Number of samples before the first prediction. None is the model's largest lag.

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.estimation.block_bootstrap import draw_parameters
+from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
-from islands.models.regressor import Regressor
 from islands.simulation.predictors import free_run, free_runs
 
 #: Members of an ensemble, up to rounding.
@@ -48,7 +48,7 @@ class ValidatedModel:
 
     Attributes
     ----------
-    model : Model
+    model : DynamicModel
     interval : int or None
         Shooting interval of the error that its parameters minimise, in samples: 1 for least squares, None for
         the free run.
@@ -56,7 +56,7 @@ class ValidatedModel:
         Mean squared error of the free run on the validation data; not finite if it diverged.
     """
 
-    model: Model
+    model: DynamicModel
     interval: int | None
     error: float
 
@@ -68,8 +68,7 @@ class ValidatedModel:
     @property
     def order(self) -> tuple[float, tuple[str, ...], tuple[float, ...]]:
         """Sort key: the error; ties are broken by the text of the terms and by the parameters."""
-        texts = tuple(item.text for item in self.model.regressors)
-        return self.error, texts, self.model.parameters
+        return self.error, self.model.parameter_names, self.model.parameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +77,7 @@ class EnsembleStructure:
 
     Attributes
     ----------
-    model : Model
+    model : DynamicModel
         Model with estimated parameters.
     weight : float
         Weight of the structure. Its members have equal weights.
@@ -86,7 +85,7 @@ class EnsembleStructure:
         Parameters of the members.
     """
 
-    model: Model
+    model: DynamicModel
     weight: float
     parameters: NDArray[np.float64]
 
@@ -97,9 +96,15 @@ class Ensemble:
 
     structures: tuple[EnsembleStructure, ...]
 
-    def inclusion(self, regressor: Regressor) -> float:
-        """Return the inclusion probability of a term: the weight of the structures that contain it."""
-        return min(1.0, sum(each.weight for each in self.structures if regressor in each.model.regressors))
+    def inclusion(self, term: str) -> float:
+        """Return the inclusion probability of a term: the weight of the structures that contain it.
+
+        Parameters
+        ----------
+        term : str
+            One of the ``parameter_names`` of a model.
+        """
+        return min(1.0, sum(each.weight for each in self.structures if term in each.model.parameter_names))
 
     @property
     def weights(self) -> NDArray[np.float64]:
@@ -203,17 +208,19 @@ def make_ensemble(
         predicted = ~np.isnan(free_run(model, split.validation, warm_up).y)
         plausible = np.mean(error[:, predicted] ** 2, axis=1) <= _IMPLAUSIBLE * candidate.error + floor
         members = drawn[plausible] if plausible.any() else np.array([model.parameters])
-        structure = replace(model, theta=None, standard_errors=None)
+        structure = model
+        if isinstance(model, Model):
+            structure = replace(model, theta=None, standard_errors=None)
         structures.append(EnsembleStructure(structure, weight, members))
     return Ensemble(tuple(structures)) if structures else None
 
 
 def _best_of_each_structure(candidates: Sequence[ValidatedModel]) -> list[ValidatedModel]:
     """Return the candidate with the least error of each structure, in the order of their errors."""
-    found: dict[tuple[Regressor, ...], ValidatedModel] = {}
+    found: dict[tuple[str, ...], ValidatedModel] = {}
     for candidate in sorted(candidates, key=lambda each: each.order):
         if np.isfinite(candidate.error):
-            found.setdefault(candidate.model.regressors, candidate)
+            found.setdefault(candidate.model.parameter_names, candidate)
     return list(found.values())
 
 

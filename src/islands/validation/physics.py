@@ -16,6 +16,7 @@ from islands.estimation.parameter_constraints import PROPERTY_1
 from islands.expressions import printing
 from islands.kernels.characteristic_roots import converges
 from islands.models.clusters import OUTPUT_AT_REST, clusters
+from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
 from islands.simulation.predictors import divergence_bound, free_run
 from islands.systems.signals import hold_signal, minor_loops, sine
@@ -143,7 +144,7 @@ class PhysicsChecks:
         return max(entry.drift_percent for entry in self.holds)
 
 
-def check_physics(model: Model, record: Dataset) -> PhysicsChecks:
+def check_physics(model: DynamicModel, record: Dataset) -> PhysicsChecks:
     """Check a model under excitations derived from the ranges and the rate of the record.
 
     The base loop is a sine over the range of each input. Its rms slope equals that of the record, within
@@ -151,7 +152,7 @@ def check_physics(model: Model, record: Dataset) -> PhysicsChecks:
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Model with parameters.
     record : Dataset
         Complete record that defines the ranges, the rate, the bound and the initial output.
@@ -167,16 +168,18 @@ def check_physics(model: Model, record: Dataset) -> PhysicsChecks:
             holds.append(_evaluate_hold(kind, at_rest, record.output_range))
         else:
             excursions.append(_evaluate_excursion(kind, signal, y, record.output_range))
-    return PhysicsChecks(cluster_sums(model), is_convergent(model), tuple(holds), tuple(excursions))
+    convergent = not isinstance(model, Model) or is_convergent(model)
+    return PhysicsChecks(cluster_sums(model), convergent, tuple(holds), tuple(excursions))
 
 
-def cluster_sums(model: Model) -> tuple[ClusterSum, ...]:
+def cluster_sums(model: DynamicModel) -> tuple[ClusterSum, ...]:
     """Return the sums of the parameters over the clusters, with their targets.
 
     The cluster of y comes first. Its sum is 0 if no regressor has the steady state y: without feedback of the
-    output there is one equilibrium, not a continuum.
+    output there is one equilibrium, not a continuum. So it is of a model that is not a NARX model.
     """
-    sums = {group.steady_state: group.total(model.parameters) for group in clusters(model.regressors)}
+    groups = clusters(model.regressors) if isinstance(model, Model) else ()
+    sums = {group.steady_state: group.total(model.parameters) for group in groups}
     return tuple(
         ClusterSum(printing.at_rest(state, model.inputs), total, PROPERTY_1.get(state, 0.0))
         for state, total in ({OUTPUT_AT_REST: 0.0} | sums).items()
@@ -197,7 +200,7 @@ def is_convergent(model: Model) -> bool:
 
 
 def hold_response(
-    model: Model, record: Dataset, level: float = 0.4, loading: bool = True
+    model: DynamicModel, record: Dataset, level: float = 0.4, loading: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the input (in fractions of its amplitude) and the output of one hold, for a figure."""
     signal = _make_hold(_choose_period(record, model.maximum_lag), level, loading)
@@ -245,7 +248,7 @@ def _make_excursions(period: int) -> list[tuple[_Kind, NDArray[np.float64]]]:
 
 
 def _simulate(
-    model: Model, record: Dataset, signals: Sequence[NDArray[np.float64]]
+    model: DynamicModel, record: Dataset, signals: Sequence[NDArray[np.float64]]
 ) -> Iterator[NDArray[np.float64]]:
     """Yield the model's output for every signal, NaN after a divergence.
 

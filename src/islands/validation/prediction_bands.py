@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import Ensemble, effective_samples
 
@@ -78,13 +78,13 @@ class PredictionBands:
     factors: Mapping[float, float]
 
     def predict(
-        self, model: Model, record: Dataset, level: float = LEVEL, warm_up: int | None = None
+        self, model: DynamicModel, record: Dataset, level: float = LEVEL, warm_up: int | None = None
     ) -> PredictionBand:
         """Simulate a record with a band.
 
         Parameters
         ----------
-        model : Model
+        model : DynamicModel
             Model for which the bands were calibrated.
         record : Dataset
             Inputs, and the output of the warm-up.
@@ -119,13 +119,13 @@ class PredictionBands:
 
 
 def calibrate_bands(
-    models: Sequence[Model], ensemble: Ensemble, split: Split, warm_up: int
+    models: Sequence[DynamicModel], ensemble: Ensemble, split: Split, warm_up: int
 ) -> tuple[PredictionBands | None, ...]:
     """Calibrate the bands of models.
 
     Parameters
     ----------
-    models : sequence of Model
+    models : sequence of DynamicModel
         Models whose free runs are the centres of the bands.
     ensemble : Ensemble
     split : Split
@@ -149,7 +149,7 @@ def _runs(record: Dataset, ensemble: Ensemble, warm_up: int) -> tuple[NDArray[np
 
 
 def _calibrate(
-    model: Model,
+    model: DynamicModel,
     ensemble: Ensemble,
     parts: Sequence[tuple[Dataset, NDArray[np.int64], NDArray[np.float64]]],
     warm_up: int,

@@ -21,13 +21,13 @@ from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.results.result import Result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
-from islands.io.coupled_models import coupled_signals
 from islands.io.records import read_dataset, write_simulation
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands.io.records.table_reading import read_table
 from islands.io.records.writer import write_coupled_simulation
+from islands.models.coupled_equations import coupled_signals
 from islands.models.equations import named_signals
 from islands.simulation.coupled_free_run import match_coupled
 from islands.validation.metrics import metrics

@@ -11,8 +11,9 @@ from islands.estimation.constraints.parts import (
     StaticGain,
     Symmetry,
 )
-from islands.estimation.parameter_constraints import constraint
+from islands.estimation.parameter_constraints import constrain_model, constraint
 from islands.models.clusters import clusters
+from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
 
 #: Tolerance of an equality, relative to its largest term and to its target.
@@ -41,7 +42,7 @@ class ConstraintCheck:
     met: bool
 
 
-def check_constraints(model: Model, constraints: str) -> tuple[ConstraintCheck, ...]:
+def check_constraints(model: DynamicModel, constraints: str) -> tuple[ConstraintCheck, ...]:
     """Check every part of a constraint on a model.
 
     Parameters
@@ -55,8 +56,12 @@ def check_constraints(model: Model, constraints: str) -> tuple[ConstraintCheck, 
     ModelError
         The model has no parameters.
     SettingsError
-        A statement cannot be read.
+        A statement cannot be read, or there is one for a model that is not a NARX model.
     """
+    constrain_model(model, constraints)
+    if not isinstance(model, Model):
+        constrain_model(model, constraints)
+        return ()
     return tuple(_check(part, model) for part in constraint(constraints).parts)
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from islands.export.block import quote_name
 from islands.export.equations.common_parts import take_common_parts
 from islands.export.equations.extended_equations import ExtendedEquations
 from islands.export.equations.identifiers import make_identifiers
@@ -22,6 +21,7 @@ from islands.expressions.tree import (
     replace,
     substitute,
 )
+from islands.models.block import quote_name
 from islands.systems.ode.equation_parser import TIME
 from islands.systems.ode.output_system import SIMULATED
 from islands.systems.ode.system import sort_variables

@@ -12,7 +12,6 @@ from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 
-from islands.export.block import Block, make_sampled_block
 from islands.export.fmu.compiler import compile_library, find_compiler
 from islands.export.fmu.description import (
     describe_build,
@@ -21,8 +20,7 @@ from islands.export.fmu.description import (
     model_identifier,
 )
 from islands.export.languages.c import c_block
-from islands.models.coupled_narx import CoupledModel
-from islands.models.narx import Model
+from islands.models.block import Block
 
 #: The first flag makes results equal those of the search bit for bit.
 _FLAGS = ("-ffp-contract=off", "-O2", "-std=c99", "-fvisibility=hidden")
@@ -86,17 +84,17 @@ FMI_VERSIONS: Mapping[str, FmiVersion] = MappingProxyType(
 )
 
 
-def fmu3(model: Model | CoupledModel) -> bytes:
+def fmu3(block: Block) -> bytes:
     """Return a model as an FMU of FMI 3.0; see `make_fmu`."""
-    return make_fmu(model, FMI_VERSIONS["fmu"])
+    return make_fmu(block, FMI_VERSIONS["fmu"])
 
 
-def fmu2(model: Model | CoupledModel) -> bytes:
+def fmu2(block: Block) -> bytes:
     """Return a model as an FMU of FMI 2.0; see `make_fmu`."""
-    return make_fmu(model, FMI_VERSIONS["fmu2"])
+    return make_fmu(block, FMI_VERSIONS["fmu2"])
 
 
-def make_fmu(model: Model | CoupledModel, version: FmiVersion) -> bytes:
+def make_fmu(block: Block, version: FmiVersion) -> bytes:
     """Return a model of one or several outputs as an FMU for co-simulation, with its sources.
 
     A library for this machine is included if there is a C compiler. The communication step is a multiple of
@@ -108,7 +106,7 @@ def make_fmu(model: Model | CoupledModel, version: FmiVersion) -> bytes:
         The model has no finite parameters or no sampling time, a user-defined primitive has no C body, a
         column cannot name a variable, or the compiler fails.
     """
-    block = make_sampled_block(model)
+    block.check_names()
     program = c_block(block)
     token = hashlib.sha256(f"{version.source}{block.columns}{program}".encode()).hexdigest()
     sources = {name: _read(name) for name in ("instance.h", version.source)}

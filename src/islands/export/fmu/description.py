@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from islands.data.channel_names import parse_unit
-from islands.export.block import Block
+from islands.models.block import Block
 
 #: Attributes of an FMU of either version.
 _CAPABILITIES = {
@@ -24,8 +24,8 @@ class FmuVariable:
     name, causality, variability, description, unit : str
     initial : str
         Empty for inputs and for the time.
-    start : bool
-        Whether the variable has a start value, which is zero.
+    start : float or None
+        Start value; None for a variable without one.
     """
 
     name: str
@@ -34,7 +34,12 @@ class FmuVariable:
     description: str
     unit: str = ""
     initial: str = ""
-    start: bool = False
+    start: float | None = None
+
+    @property
+    def start_text(self) -> str:
+        """Start value as text; empty without one."""
+        return "" if self.start is None else repr(self.start)
 
 
 def fmu_variables(block: Block) -> tuple[FmuVariable, ...]:
@@ -42,7 +47,7 @@ def fmu_variables(block: Block) -> tuple[FmuVariable, ...]:
     found = [FmuVariable("time", "independent", "continuous", "Time in seconds", "s")]
     late = ", one sampling time late" if any(block.feedthrough) else ""
     for channel, (column, signal) in enumerate(zip(block.columns, block.signals, strict=True)):
-        is_input = channel >= block.outputs
+        is_input = channel >= block.computed
         causality, variability = ("input", "continuous") if is_input else ("output", "discrete")
         found.append(
             FmuVariable(
@@ -52,15 +57,15 @@ def fmu_variables(block: Block) -> tuple[FmuVariable, ...]:
                 f"{signal}(k)" if is_input else f"{signal}(k){late}",
                 parse_unit(column),
                 "" if is_input else "calculated",
-                is_input,
+                0.0 if is_input else None,
             )
         )
-    for channel, lag in block.samples:
+    for (channel, lag), start in zip(block.samples, block.start_values(), strict=True):
         column = block.columns[channel]
         text = f"{block.signals[channel]}(k-{lag}) at the first sample"
         found.append(
             FmuVariable(
-                f"start.{column}[{lag}]", "parameter", "fixed", text, parse_unit(column), "exact", True
+                f"start.{column}[{lag}]", "parameter", "fixed", text, parse_unit(column), "exact", start
             )
         )
     return tuple(found)
@@ -98,12 +103,12 @@ def describe_fmi3(block: Block, token: str) -> str:
                 "causality": each.causality,
                 "variability": each.variability,
                 "description": each.description,
-                **_optional(unit=each.unit, initial=each.initial, start="0.0" if each.start else ""),
+                **_optional(unit=each.unit, initial=each.initial, start=each.start_text),
             },
         )
     structure = SubElement(root, "ModelStructure")
     # Value references of the outputs: those behind the time. No output depends on present inputs.
-    references = [str(place) for place in range(1, 1 + block.outputs)]
+    references = [str(place) for place in range(1, 1 + block.computed)]
     for output in references:
         SubElement(structure, "Output", valueReference=output, dependencies="")
     for output in references:
@@ -141,11 +146,11 @@ def describe_fmi2(block: Block, token: str) -> str:
                 **_optional(initial=each.initial),
             },
         )
-        SubElement(variable, "Real", _optional(unit=each.unit, start="0.0" if each.start else ""))
+        SubElement(variable, "Real", _optional(unit=each.unit, start=each.start_text))
     structure = SubElement(root, "ModelStructure")
     outputs, unknowns = SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")
     # FMI 2.0 counts variables from 1: the time is the first one.
-    for index in range(2, 2 + block.outputs):
+    for index in range(2, 2 + block.computed):
         SubElement(outputs, "Unknown", index=str(index), dependencies="")
         SubElement(unknowns, "Unknown", index=str(index))
     return _to_text(root)
@@ -167,7 +172,7 @@ def _make_root(block: Block, version: str, identity: dict[str, str]) -> Element:
             "fmiVersion": version,
             "modelName": f"NARX model of {block.title}",
             **identity,
-            "description": "; ".join(filter(None, [*block.equations, block.values])),
+            "description": "; ".join(filter(None, [*block.texts, block.values])),
             "generationTool": "islands",
             "variableNamingConvention": "flat",
         },

@@ -23,6 +23,7 @@ typedef struct {
 static void reset(Model *model)
 {
     memset(model, 0, sizeof *model);
+    memcpy(model->values + START, START_VALUES, sizeof START_VALUES);
     model->phase = PREPARING;
 }
 

@@ -2,11 +2,9 @@
 
 import textwrap
 
-from islands.export.block import Block, make_block
 from islands.export.languages.bodies import body
 from islands.expressions.tree import Primitive
-from islands.models.coupled_narx import CoupledModel
-from islands.models.narx import Model
+from islands.models.block import Block
 
 _HEAD = """\
 /*
@@ -55,23 +53,23 @@ double predict_{output}({pointers})
 
 """
 
-_SEVERAL_OUTPUTS = """\
+_SEVERAL_SIGNALS = """\
 {predictors}/*
  * Free run: the first MAXIMUM_LAG samples of the outputs are given, the others are computed and written.
  */
 void simulate({inputs}, {outputs}, size_t samples)
 {{
-    for (size_t k = MAXIMUM_LAG; k < samples; ++k) {{
+    {starts}for (size_t k = MAXIMUM_LAG; k < samples; ++k) {{
         {steps}
     }}
 }}
 """
 
 
-def c_source(model: Model | CoupledModel) -> str:
-    """Return a model of one or several outputs as C99 source in ASCII.
+def c_source(block: Block) -> str:
+    """Return a block as C99 source in ASCII.
 
-    The source defines the function ``predict`` (one sample; ``predict_y1`` .. for several outputs) and
+    The source defines the function ``predict`` (one sample; ``predict_y1`` .. for several signals) and
     ``simulate`` (free run). Sums and products are evaluated in the same order as in this package's kernels.
 
     Raises
@@ -79,13 +77,12 @@ def c_source(model: Model | CoupledModel) -> str:
     ModelError
         The model has no finite parameters, or a user-defined primitive has no C body.
     """
-    block = make_block(model)
-    outputs = block.signals[: block.outputs]
+    names = block.signals[: block.computed]
     head = _HEAD.format(heading=block.heading(" *"), lag=block.maximum_lag, functions=define_functions(block))
     pointers = [f"const double *{name}" for name in block.signals]
-    given, at_k = ", ".join(pointers[block.outputs :]), ", ".join(f"{name} + k" for name in block.signals)
-    bodies = ["\n    ".join(_list_terms(block, place)) for place in range(block.outputs)]
-    if block.outputs == 1:
+    given, at_k = ", ".join(pointers[block.computed :]), ", ".join(f"{name} + k" for name in block.signals)
+    bodies = ["\n    ".join(_list_terms(block, place)) for place in range(block.computed)]
+    if block.computed == 1:
         (terms,) = bodies
         return head + _ONE_OUTPUT.format(
             present=_describe_future(block),
@@ -95,15 +92,30 @@ def c_source(model: Model | CoupledModel) -> str:
             at_k=at_k,
         )
     predictors = (
-        _PREDICTOR.format(output=output, pointers=", ".join(pointers), terms=terms)
-        for output, terms in zip(outputs, bodies, strict=True)
+        _PREDICTOR.format(output=name, pointers=", ".join(pointers), terms=terms)
+        for name, terms in zip(names, bodies, strict=True)
     )
-    return head + _SEVERAL_OUTPUTS.format(
+    return head + _SEVERAL_SIGNALS.format(
         predictors="".join(predictors),
         inputs=given,
-        outputs=", ".join(f"double *{name}" for name in outputs),
-        steps="\n        ".join(f"{output}[k] = predict_{output}({at_k});" for output in outputs),
+        outputs=", ".join(f"double *{name}" for name in names),
+        starts=_write_starts(block),
+        steps="\n        ".join(
+            f"{names[place]}[k] = predict_{names[place]}({at_k});" for place in block.order
+        ),
     )
+
+
+def _write_starts(block: Block) -> str:
+    """Return the statements that write the first samples of the states; empty without states."""
+    if not block.starts:
+        return ""
+    lines = [
+        f"        {name}[k] = {block.start_text(place, lambda signal, _lag: f'{signal}[k]', c_name)};\n"
+        for place, name in enumerate(block.signals[block.outputs : block.computed])
+    ]
+    loop = "for (size_t k = 0; k < MAXIMUM_LAG && k < samples; ++k) {\n"
+    return f"{loop}{''.join(lines)}    }}\n    "
 
 
 def _list_terms(block: Block, place: int) -> list[str]:
@@ -114,8 +126,7 @@ def _list_terms(block: Block, place: int) -> list[str]:
 
 
 def _describe_future(block: Block) -> str:
-    (model,) = block.models
-    present = [name for name, lead in zip(block.signals, model.leads, strict=True) if lead]
+    present = [name for name, lead in zip(block.signals, block.leads, strict=True) if lead]
     return f"a later sample than {'[0], '.join(present)}[0]" if present else "sample k or later ones"
 
 
@@ -153,6 +164,9 @@ enum {{ OUTPUTS = {outputs}, INPUTS = {inputs}, STATES = {states}, FEEDTHROUGH =
 
 /* Number of past samples of each output and each input in the state, newest first. */
 static const int DEPTHS[OUTPUTS + INPUTS] = {{{depths}}};
+
+/* Samples before the first one unless others are given. */
+static const double START_VALUES[STATES] = {{{start}}};
 
 /* Sampling time in seconds. */
 static const double STEP = {dt!r};
@@ -195,18 +209,21 @@ def c_block(block: Block) -> str:
     def read(signal: str, lag: int) -> str:
         if lag:
             return f"state[{block.position(signal, lag)}]"
-        return f"input[{block.signals.index(signal) - block.outputs}]"
+        channel = block.signals.index(signal)
+        is_input = channel >= block.computed
+        return f"input[{channel - block.computed}]" if is_input else f"output[{channel}]"
 
     lines = ["(void)state;"]
-    for place in range(block.outputs):
+    for place in block.order:
         lines += ["total = 0.0;", *(f"total += {term};" for term in block.terms(place, read, c_name))]
         lines.append(f"output[{place}] = total;")
     return _C_BLOCK.format(
-        outputs=block.outputs,
-        inputs=len(block.signals) - block.outputs,
+        outputs=block.computed,
+        inputs=len(block.signals) - block.computed,
         states=block.size,
         feedthrough=int(any(block.feedthrough)),
         depths=", ".join(map(str, block.depths)),
+        start=", ".join(map(repr, block.start_values())),
         dt=block.dt,
         functions=define_functions(block),
         equations="\n    ".join(lines),

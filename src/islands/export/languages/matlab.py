@@ -2,11 +2,9 @@
 
 import textwrap
 
-from islands.export.block import make_block
 from islands.export.languages.bodies import body
 from islands.expressions.tree import Primitive
-from islands.models.coupled_narx import CoupledModel
-from islands.models.narx import Model
+from islands.models.block import Block
 
 _FILE = """\
 function y = narx_model({inputs}, y0)
@@ -31,14 +29,14 @@ function y = narx_model({inputs}, y0)
 end
 {functions}"""
 
-_COUPLED_FILE = """\
-function [{outputs}] = coupled_narx_model({inputs}, {starts})
-% COUPLED_NARX_MODEL  Free run of a coupled NARX model from its inputs and the first outputs.
+_SIGNALS_FILE = """\
+function [{outputs}] = {name}({inputs}, {starts})
+% {title}  Free run of a {kind} from its inputs and the first outputs.
 %
 {heading}
 %
 % Inputs are vectors of equal length, the outputs have the size of the first input, and {starts} hold the
-% first {lag} samples of the outputs. Save this file as coupled_narx_model.m; it runs in MATLAB and Octave.
+% first {lag} samples of the outputs. Save this file as {name}.m; it runs in MATLAB and Octave.
 
   maximum_lag = {lag};
   {conversions}
@@ -52,8 +50,8 @@ end
 {functions}"""
 
 
-def matlab_source(model: Model | CoupledModel) -> str:
-    """Return a model of one or several outputs as an ASCII MATLAB function: the free run from input vectors.
+def matlab_source(block: Block) -> str:
+    """Return a block as an ASCII MATLAB function: the free run from input vectors.
 
     Sums and products are evaluated in the same order as in this package's kernels.
 
@@ -62,9 +60,8 @@ def matlab_source(model: Model | CoupledModel) -> str:
     ModelError
         The model has no finite parameters, or a user-defined primitive has no MATLAB body.
     """
-    block = make_block(model)
-    outputs, inputs = block.signals[: block.outputs], block.signals[block.outputs :]
-    starts = ["y0"] if block.outputs == 1 else [f"first_{output}" for output in outputs]
+    outputs, inputs = block.signals[: block.outputs], block.signals[block.computed :]
+    starts = ["y0"] if block.computed == 1 else [f"first_{output}" for output in outputs]
     shared = {
         "heading": block.heading("%"),
         "inputs": ", ".join(inputs),
@@ -74,14 +71,25 @@ def matlab_source(model: Model | CoupledModel) -> str:
         "conversions": "\n  ".join(f"{name} = double({name});" for name in [*inputs, *starts]),
         "functions": "".join(f"\n{matlab_definition(primitive)}" for primitive in block.primitives),
     }
-    terms = [block.terms(place, _write_sample, matlab_name) for place in range(block.outputs)]
-    if block.outputs == 1:
-        return _FILE.format(terms="\n    ".join(f"total = total + {term};" for term in terms[0]), **shared)
+    if block.computed == 1:
+        terms = block.terms(0, _write_sample, matlab_name)
+        return _FILE.format(terms="\n    ".join(f"total = total + {term};" for term in terms), **shared)
     steps, allocations = [], []
-    for output, start, added in zip(outputs, starts, terms, strict=True):
-        steps += [f"{output}(k) = 0;", *(f"{output}(k) = {output}(k) + {term};" for term in added)]
+    for place in block.order:
+        name = block.signals[place]
+        terms = block.terms(place, _write_sample, matlab_name)
+        steps += [f"{name}(k) = 0;", *(f"{name}(k) = {name}(k) + {term};" for term in terms)]
+    for output, start in zip(outputs, starts, strict=True):
         allocations += [f"{output} = zeros(size({inputs[0]}));", f"{output}(1:given) = {start}(1:given);"]
-    return _COUPLED_FILE.format(
+    for place, name in enumerate(block.signals[block.outputs : block.computed]):
+        start = block.start_text(place, _write_sample, matlab_name)
+        first = f"for k = 1:given, {name}(k) = {start}; end"
+        allocations += [f"{name} = zeros(size({inputs[0]}));", first]
+    name = "state_model" if block.starts else "coupled_narx_model"
+    return _SIGNALS_FILE.format(
+        name=name,
+        title=name.upper(),
+        kind="model with states" if block.starts else "coupled NARX model",
         outputs=", ".join(outputs),
         starts=", ".join(starts),
         allocations="\n  ".join(allocations),

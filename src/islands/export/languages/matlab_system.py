@@ -2,10 +2,8 @@
 
 import textwrap
 
-from islands.export.block import Block, make_sampled_block
 from islands.export.languages.matlab import matlab_definition
-from islands.models.coupled_narx import CoupledModel
-from islands.models.narx import Model
+from islands.models.block import Block
 
 _FILE = """\
 classdef narx_system < matlab.System
@@ -19,7 +17,7 @@ classdef narx_system < matlab.System
   properties (Nontunable)
     % Start  Samples before the first one, newest first:
 {past}
-    Start = zeros(1, {states});
+    Start = {start};
   end
 
   properties (DiscreteState)
@@ -88,8 +86,8 @@ _FUNCTIONS = """
 """
 
 
-def matlab_system_source(model: Model | CoupledModel) -> str:
-    """Return a model of one or several outputs as the source of a MATLAB System object, in ASCII.
+def matlab_system_source(block: Block) -> str:
+    """Return a block as the source of a MATLAB System object, in ASCII.
 
     The first sample of the object is the one after the past samples in its property ``Start``. An input that
     acts at once has direct feedthrough.
@@ -100,20 +98,20 @@ def matlab_system_source(model: Model | CoupledModel) -> str:
         The model has no finite parameters or no sampling time, or a user-defined primitive has no MATLAB
         body.
     """
-    block = make_sampled_block(model)
-    outputs, inputs = block.signals[: block.outputs], block.signals[block.outputs :]
+    block.check_names()
+    outputs, inputs = block.signals[: block.computed], block.signals[block.computed :]
     used = [textwrap.indent(matlab_definition(each), "    ") for each in block.primitives]
     equations = []
-    for place in range(block.outputs):
+    for place in block.order:
         equations += [
             f"result({place + 1}) = result({place + 1}) + {term};"
             for term in block.terms(
                 place,
-                lambda signal, lag: f"x({block.position(signal, lag) + 1})" if lag else signal,
+                lambda signal, lag: _sample(block, signal, lag),
                 lambda primitive: f"narx_system.f_{primitive.name}",
             )
         ]
-    read = [signal for signal, direct in zip(block.signals, block.feedthrough, strict=True) if direct]
+    read = [signal for signal, direct in zip(inputs, block.feedthrough, strict=True) if direct]
     return _FILE.format(
         heading=block.heading("%"),
         inputs=", ".join(inputs),
@@ -122,17 +120,30 @@ def matlab_system_source(model: Model | CoupledModel) -> str:
             f"{name} = result({place});" for place, name in enumerate(outputs, start=1)
         ),
         past=block.describe_state("    %   "),
-        outputs=block.outputs,
+        outputs=block.computed,
+        start=_write_start(block),
         states=block.size,
         update=_update(block),
         # With integer inputs MATLAB would round every product.
         conversions="\n      ".join(f"{name} = double({name});" for name in read) or "% no present input",
         equations="\n      ".join(equations),
         ignored=", ".join("~" for _ in inputs),
-        direct=", ".join(str(each).lower() for each in block.feedthrough[block.outputs :]),
+        direct=", ".join(str(each).lower() for each in block.feedthrough),
         dt=block.dt,
         functions=_FUNCTIONS.format(definitions="\n".join(used)) if used else "",
     )
+
+
+def _sample(block: Block, signal: str, lag: int) -> str:
+    if lag:
+        return f"x({block.position(signal, lag) + 1})"
+    channel = block.signals.index(signal)
+    return signal if channel >= block.computed else f"result({channel + 1})"
+
+
+def _write_start(block: Block) -> str:
+    values = block.start_values()
+    return f"[{', '.join(map(repr, values))}]" if any(values) else f"zeros(1, {block.size})"
 
 
 def _update(block: Block) -> str:
@@ -140,7 +151,7 @@ def _update(block: Block) -> str:
     parts, place = [], 1
     for channel, (signal, depth) in enumerate(zip(block.signals, block.depths, strict=True)):
         if depth:
-            parts.append(f"double({signal})" if channel >= block.outputs else f"result({channel + 1})")
+            parts.append(f"double({signal})" if channel >= block.computed else f"result({channel + 1})")
         if depth > 1:
             parts.append(f"x({place}:{place + depth - 2})")
         place += depth

@@ -5,11 +5,9 @@ from types import MappingProxyType
 
 from islands.data.channel_names import parse_unit
 from islands.errors import ModelError
-from islands.export.block import Block, make_sampled_block
 from islands.expressions.primitives import LARGEST_EXPONENT
 from islands.expressions.tree import Primitive
-from islands.models.coupled_narx import CoupledModel
-from islands.models.narx import Model
+from islands.models.block import Block
 
 _FILE = """\
 block NarxModel "NARX model of {title}"
@@ -44,8 +42,8 @@ _BODIES: Mapping[str, str] = MappingProxyType(
 )
 
 
-def modelica_source(model: Model | CoupledModel) -> str:
-    """Return a model of one or several outputs as a Modelica block.
+def modelica_source(block: Block) -> str:
+    """Return a block as a Modelica block.
 
     It has connectors of the Modelica Standard Library and samples its inputs with the sampling time of the
     model. Sums and products are evaluated in the same order as in this package's kernels.
@@ -55,12 +53,12 @@ def modelica_source(model: Model | CoupledModel) -> str:
     ModelError
         The model has no finite parameters or no sampling time, or it has a user-defined primitive.
     """
-    block = make_sampled_block(model)
+    block.check_names()
     stored = [(name, depth) for name, depth in zip(block.signals, block.depths, strict=True) if depth]
     return _FILE.format(
         title=_escape(block.title),
         heading=block.heading("  //"),
-        parameters="\n".join(_parameter(name, depth) for name, depth in stored),
+        parameters="\n".join(_parameter(block, name, depth) for name, depth in stored),
         connectors="\n".join(_connector(block, channel) for channel in range(len(block.signals))),
         states="".join(
             f"  discrete Real past_{name}[{depth}](start = start_{name}, each fixed = true);\n"
@@ -70,7 +68,7 @@ def modelica_source(model: Model | CoupledModel) -> str:
         dt=block.dt,
         equations="\n    ".join(
             f"{name} = {_join_terms(block.terms(place, _sample, lambda primitive: f'f_{primitive.name}'))};"
-            for place, name in enumerate(block.signals[: block.outputs])
+            for place, name in ((place, block.signals[place]) for place in block.order)
         ),
         shifts="\n    ".join(
             f"past_{name}[{lag}] = {f'pre(past_{name}[{lag - 1}])' if lag > 1 else name};"
@@ -89,13 +87,14 @@ def _join_terms(terms: list[str]) -> str:
     return "\n      + ".join(terms).replace("+ -", "- ")
 
 
-def _parameter(name: str, depth: int) -> str:
+def _parameter(block: Block, name: str, depth: int) -> str:
     lags = ", ".join(f"{name}(k-{lag})" for lag in range(1, depth + 1))
-    return f'  parameter Real start_{name}[{depth}] = fill(0.0, {depth}) "{lags}";'
+    start = block.start_values()[block.position(name, 1)]
+    return f'  parameter Real start_{name}[{depth}] = fill({start!r}, {depth}) "{lags}";'
 
 
 def _connector(block: Block, channel: int) -> str:
-    column, kind = block.columns[channel], "RealOutput" if channel < block.outputs else "RealInput"
+    column, kind = block.columns[channel], "RealOutput" if channel < block.computed else "RealInput"
     unit = parse_unit(column)
     declared = f'(unit = "{_escape(unit)}")' if unit else ""
     return f'  Modelica.Blocks.Interfaces.{kind} {block.signals[channel]}{declared} "{_escape(column)}";'

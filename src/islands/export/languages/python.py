@@ -8,10 +8,8 @@ from collections.abc import Sequence
 from numbers import Integral, Real
 
 from islands.errors import ModelError
-from islands.export.block import make_block
 from islands.expressions.tree import Primitive
-from islands.models.coupled_narx import CoupledModel
-from islands.models.narx import Model
+from islands.models.block import Block
 
 _MODULE = '''"""NARX model: {equation}
 
@@ -38,7 +36,7 @@ def simulate({inputs}, y0):
     return y
 '''
 
-_COUPLED_MODULE = '''"""Coupled NARX model:
+_SIGNALS_MODULE = '''"""{title}
 
 {equations}
 
@@ -51,14 +49,14 @@ MAXIMUM_LAG = {lag}
 {constants}
 
 {functions}def predict(k, {signals}):
-    """Return {outputs} at sample k from the preceding samples."""
+    """Return {computed} at sample k from the preceding samples."""
 {equations_code}
     return {results}
 
 
 def simulate({inputs}, {starts}):
     """Return the free run from the inputs and the first MAXIMUM_LAG outputs."""
-    {outputs} = ([float(value) for value in first[:MAXIMUM_LAG]] for first in ({starts}))
+    {first_samples}
     for k in range(MAXIMUM_LAG, len({first_input})):
         {results} = predict(k, {signals})
         {appends}
@@ -66,8 +64,8 @@ def simulate({inputs}, {starts}):
 '''
 
 
-def python_source(model: Model | CoupledModel) -> str:
-    """Return a model of one or several outputs as the source of a Python module.
+def python_source(block: Block) -> str:
+    """Return a block as the source of a Python module.
 
     The module defines the functions ``predict`` (one sample) and ``simulate`` (free run). It needs only the
     standard library. Its results equal those of this package's kernels bit for bit, because sums and products
@@ -79,9 +77,7 @@ def python_source(model: Model | CoupledModel) -> str:
         The model has no finite parameters, or a user-defined primitive cannot be exported: its source is not
         available, or it uses globals other than ``math`` and numbers.
     """
-    block = make_block(model)
-    outputs, inputs, used = block.signals[: block.outputs], block.signals[block.outputs :], block.primitives
-    terms = [block.terms(place, _write_sample, python_name) for place in range(block.outputs)]
+    names, inputs, used = block.signals[: block.computed], block.signals[block.computed :], block.primitives
     sources = [function_source(primitive) for primitive in used]
     shared = {
         "description": block.describe_signals(escape_name),
@@ -91,22 +87,35 @@ def python_source(model: Model | CoupledModel) -> str:
         "inputs": ", ".join(inputs),
         "first_input": inputs[0],
     }
-    if block.outputs == 1:
-        (equation,), (added,) = block.equations, terms
+    if block.computed == 1:
+        terms = block.terms(0, _write_sample, python_name)
         return _MODULE.format(
-            equation=equation, terms="\n    ".join(f"total += {term}" for term in added), **shared
+            equation=block.texts[0], terms="\n    ".join(f"total += {term}" for term in terms), **shared
         )
-    code = []
-    for output, added in zip(outputs, terms, strict=True):
-        code += [f"    next_{output} = 0.0", *(f"    next_{output} += {term}" for term in added)]
-    return _COUPLED_MODULE.format(
-        equations="\n".join(block.equations),
+    outputs, states = names[: block.outputs], names[block.outputs :]
+    code, first = [], [f"{name} = [float(value) for value in first_{name}[:MAXIMUM_LAG]]" for name in outputs]
+    for place in block.order:
+        next_name = f"next_{names[place]}"
+        terms = block.terms(
+            place,
+            lambda name, lag: _write_sample(name, lag) if lag or name in inputs else f"next_{name}",
+            python_name,
+        )
+        code += [f"    {next_name} = 0.0", *(f"    {next_name} += {term}" for term in terms)]
+    for place, name in enumerate(states):
+        start = block.start_text(place, _write_sample, python_name)
+        first.append(f"{name} = [{start} for k in range(MAXIMUM_LAG)]")
+    return _SIGNALS_MODULE.format(
+        title=block.kind_title,
+        equations="\n".join(block.texts),
         signals=", ".join(block.signals),
         outputs=", ".join(outputs),
+        computed=", ".join(names),
         starts=", ".join(f"first_{output}" for output in outputs),
-        results=", ".join(f"next_{output}" for output in outputs),
+        first_samples="\n    ".join(first),
+        results=", ".join(f"next_{name}" for name in names),
         equations_code="\n".join(code),
-        appends="\n        ".join(f"{output}.append(next_{output})" for output in outputs),
+        appends="\n        ".join(f"{name}.append(next_{name})" for name in names),
         **shared,
     )
 

@@ -1,9 +1,7 @@
 """Export of a model as a Simulink block: a C MEX S-function in one file."""
 
-from islands.export.block import make_sampled_block
 from islands.export.languages.c import c_block
-from islands.models.coupled_narx import CoupledModel
-from islands.models.narx import Model
+from islands.models.block import Block
 
 _FILE = """\
 /*
@@ -11,7 +9,7 @@ _FILE = """\
  *
  * Level-2 S-function for Simulink. Save this file as narx_model.c, run "mex narx_model.c" in MATLAB, and
  * enter narx_model in a block S-Function. Input ports: {ports}. Output ports: {results}. Its parameter is the
- * vector of the samples before the first one, newest first, or [] for zeros:
+ * vector of the samples before the first one, newest first, or [] for {default}:
 {past}
  */
 
@@ -76,7 +74,7 @@ static void mdlInitializeConditions(SimStruct *S)
 {{
     real_T *state = ssGetRealDiscStates(S);
     for (size_t place = 0; place < STATES; ++place) {{
-        state[place] = count_start_values(S) ? mxGetPr(ssGetSFcnParam(S, 0))[place] : 0.0;
+        state[place] = count_start_values(S) ? mxGetPr(ssGetSFcnParam(S, 0))[place] : START_VALUES[place];
     }}
 }}
 
@@ -118,8 +116,8 @@ static void mdlTerminate(SimStruct *S) {{ (void)S; }}
 """
 
 
-def s_function_source(model: Model | CoupledModel) -> str:
-    """Return a model of one or several outputs as the C source of a level-2 S-function, in ASCII.
+def s_function_source(block: Block) -> str:
+    """Return a block as the C source of a level-2 S-function, in ASCII.
 
     The first sample of the block is the one after the past samples in its parameter. An input that acts at
     once has direct feedthrough.
@@ -129,13 +127,14 @@ def s_function_source(model: Model | CoupledModel) -> str:
     ModelError
         The model has no finite parameters or no sampling time, or a user-defined primitive has no C body.
     """
-    block = make_sampled_block(model)
+    block.check_names()
     return _FILE.format(
         heading=block.heading(" *"),
-        ports=", ".join(block.signals[block.outputs :]),
-        results=", ".join(block.signals[: block.outputs]),
+        ports=", ".join(block.signals[block.computed :]),
+        results=", ".join(block.signals[: block.computed]),
         past=block.describe_state(" *  "),
         block=c_block(block),
-        direct=", ".join(str(int(each)) for each in block.feedthrough[block.outputs :]),
+        direct=", ".join(str(int(each)) for each in block.feedthrough),
         states=block.size,
+        default="those of its states" if block.starts else "zeros",
     )

@@ -25,6 +25,7 @@ from islands.facade.trials.library import TrialLibrary, make_trial_library, take
 from islands.facade.trials.rate_selection import select_rate
 from islands.io.data_frames import as_record
 from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import require_narx
 from islands.progress import (
     ProgressCallback,
     Steps,
@@ -270,7 +271,7 @@ def _couple(
         part.map(partial(average_samples, count=options["average"])) for part in (estimation, validation)
     )
     warm_up = max(entry.warm_up for result in results for entry in result.models)
-    ranked = [[entry.model for entry in result.models] for result in results]
+    ranked = [[require_narx(entry.model) for entry in result.models] for result in results]
     best = [result.recommendation.rank for result in results]
     choice = choose_equations(ranked, best, validation, warm_up, partial(steps.skip, _CHOICE))
     model = CoupledModel(tuple(models[rank - 1] for models, rank in zip(ranked, choice.ranks, strict=True)))

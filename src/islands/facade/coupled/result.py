@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 from islands.data.coupled_record import CoupledRecord
 from islands.export import export_or_write
 from islands.facade.results.result import Result
-from islands.io.coupled_models import coupled_equation, coupled_json, coupled_signals
+from islands.io.models import model_json
 from islands.io.result_folder import record_document
 from islands.io.result_text.text_layout import term_table, wrap
+from islands.models.coupled_equations import coupled_equation, coupled_signals
 from islands.models.coupled_narx import CoupledModel
 from islands.progress import Steps
 from islands.simulation.coupled_free_run import CoupledSimulation, coupled_free_run
@@ -141,7 +142,7 @@ class CoupledResult(FittedCoupledModel):
             result.save(folder / "outputs" / directory, steps)
             if not steps.skip("figures"):
                 self._draw_figure(name, folder / "figures" / f"free-run-{directory}.svg")
-        (folder / "model.json").write_text(coupled_json(self.model), encoding="utf-8")
+        (folder / "model.json").write_text(model_json(self.model), encoding="utf-8")
         (folder / "summary.txt").write_text(f"{self}\n", encoding="utf-8")
         (folder / "result.json").write_text(f"{json.dumps(self._document(), indent=2)}\n", encoding="utf-8")
         return folder

@@ -18,8 +18,7 @@ from islands.export import export_or_write
 from islands.facade.results.model_analysis import linearise
 from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
 from islands.facade.results.notebook_html import render_html
-from islands.models.equations import equation, latex_equation
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
 from islands.models.operating_point import static_characteristic
 from islands.models.signal_statement import describe_signals
 from islands.models.sympy_expression import to_sympy
@@ -49,8 +48,8 @@ class FittedModel:
 
     Attributes
     ----------
-    model : Model
-        Regressors, parameters, standard errors.
+    model : DynamicModel
+        Structure, parameters, standard errors.
     rank : int or None
         Rank of the model; 1 has the least validation error. None for a model file outside of a result folder.
     metrics : mapping
@@ -71,7 +70,7 @@ class FittedModel:
         residual tests and constraints. Empty for a new result.
     """
 
-    model: Model
+    model: DynamicModel
     rank: int | None
     metrics: Mapping[str, Mapping[str, Metrics]]
     warm_up: int
@@ -91,7 +90,7 @@ class FittedModel:
         )
 
     @classmethod
-    def from_model(cls, model: Model) -> "FittedModel":
+    def from_model(cls, model: DynamicModel) -> "FittedModel":
         """Return a model outside of a result."""
         return cls(model, None, {}, model.maximum_lag, SHOOTING, None, "")
 
@@ -135,12 +134,12 @@ class FittedModel:
     @property
     def equation(self) -> str:
         """Equation as plain text."""
-        return equation(self.model)
+        return self.model.equation().line
 
     @property
     def latex(self) -> str:
         """Equation in LaTeX."""
-        return latex_equation(self.model)
+        return self.model.equation().latex
 
     @property
     def signals(self) -> str:
@@ -241,7 +240,7 @@ class FittedModel:
         ensemble = self.search_result.ensemble
         if ensemble is None:
             raise ModelError("the result has no ensemble: the free run of every model diverged")
-        return tuple(ensemble.inclusion(item) for item in self.model.regressors)
+        return tuple(map(ensemble.inclusion, self.model.parameter_names))
 
     @property
     def least_squares_bias(self) -> float | None:

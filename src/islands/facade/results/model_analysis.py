@@ -7,19 +7,22 @@ from numpy.typing import ArrayLike
 
 from islands.distribution import describe_missing_extra
 from islands.errors import ModelError
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
+from islands.models.narx import require_narx
 from islands.models.operating_point import differentiate_model
 
 if TYPE_CHECKING:
     import control
 
 
-def linearise(model: Model, operating_point: ArrayLike, y: float | None = None) -> "control.StateSpace":
+def linearise(
+    model: DynamicModel, operating_point: ArrayLike, y: float | None = None
+) -> "control.StateSpace":
     """Linearise a model about an operating point, as a system of the library python-control.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Model with parameters.
     operating_point : float or sequence of float
         Constant value of every input.
@@ -39,11 +42,12 @@ def linearise(model: Model, operating_point: ArrayLike, y: float | None = None) 
         python-control is not installed, the model has no unique stable equilibrium and no output is given, or
         it has a kink or a step at the operating point.
     """
+    narx = require_narx(model)
     try:
         import control as library  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise ModelError(describe_missing_extra("a linear system", "control")) from error
-    found = differentiate_model(model, operating_point, y)
+    found = differentiate_model(narx, operating_point, y)
     order = len(found.outputs)
     direct, past = found.inputs[:, 0], found.inputs[:, 1:].T
     matrix = np.eye(order, k=1)
@@ -53,7 +57,7 @@ def linearise(model: Model, operating_point: ArrayLike, y: float | None = None) 
         past + np.outer(found.outputs, direct),
         np.eye(1, order),
         direct[None, :],
-        True if model.dt is None else model.dt,
-        inputs=list(model.column_names),
-        outputs=[model.output_name],
+        True if narx.dt is None else narx.dt,
+        inputs=list(narx.column_names),
+        outputs=[narx.output_name],
     )

@@ -11,7 +11,7 @@ from islands.data.signal_map import match_rate
 from islands.errors import RecordError, SettingsError, lookup, suggest
 from islands.io.data_frames import as_record, column_names, states_time
 from islands.io.records.column_names import find_column
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, free_run, multiple_shooting
 
@@ -29,7 +29,7 @@ SIMULATION_MODES = ("one-step", "shooting", "free-run")
 
 
 def simulate(
-    model: "Model | str | Mapping[str, object] | SimulationSpec | LocalSpec",
+    model: "DynamicModel | str | Mapping[str, object] | SimulationSpec | LocalSpec",
     record: "RecordLike",
     mode: str = "free-run",
     shooting: int = SHOOTING,
@@ -40,7 +40,7 @@ def simulate(
 
     Parameters
     ----------
-    model : Model, str, mapping or spec
+    model : DynamicModel, str, mapping or spec
         A model; or a simulator, as its name on the command line (``second-order``), its specification, or
         the document of an extended simulation.
     record : Dataset or data frame
@@ -65,7 +65,7 @@ def simulate(
     """
     intervals = dict(zip(SIMULATION_MODES, (1, shooting, None), strict=True))
     interval = lookup(intervals, mode, "mode")
-    if isinstance(model, Model):
+    if isinstance(model, DynamicModel):
         record = record_of_model(model, record)
         return multiple_shooting(model, match_rate(model, record), interval, warm_up)
     if interval is not None:
@@ -79,7 +79,7 @@ def simulate(
 
 
 def record_of_model(
-    model: Model,
+    model: DynamicModel,
     data: "RecordLike",
     y: "ArrayLike | IntoSeries | None" = None,
     dt: float | None = None,
@@ -114,7 +114,7 @@ def record_of_model(
     return as_record(data, y, dt, inputs=inputs, output=output, missing_output=True)
 
 
-def predict(model: Model, record: Dataset, warm_up: int | None = None) -> NDArray[np.float64]:
+def predict(model: DynamicModel, record: Dataset, warm_up: int | None = None) -> NDArray[np.float64]:
     """Return the free run of a model with one value for every sample of a record.
 
     Each sample of a model of means has the prediction of its mean. Behind a decimation, a prediction is held
@@ -122,7 +122,7 @@ def predict(model: Model, record: Dataset, warm_up: int | None = None) -> NDArra
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
     record : Dataset
         Inputs, and the first samples of the output.
     warm_up : int, optional

@@ -4,16 +4,15 @@ from collections.abc import Iterable
 from html import escape
 from typing import TYPE_CHECKING
 
-from islands.models.equations import mathml_equation
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def render_html(model: Model, sentences: Iterable[str], figure: "Figure | None" = None) -> str:
+def render_html(model: DynamicModel, sentences: Iterable[str], figure: "Figure | None" = None) -> str:
     """Return the equation of a model in MathML, sentences as paragraphs, and a figure as an image."""
-    return render_sentences(sentences, figure, "free run and measurement", mathml_equation(model))
+    return render_sentences(sentences, figure, "free run and measurement", model.equation().mathml)
 
 
 def render_sentences(

@@ -15,7 +15,7 @@ from islands.facade.results.result import Result
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import read_model, terms_document
 from islands.io.result_models import check_single_output, read_shooting_interval
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
 from islands.validation.metrics import Metrics
 from islands.validation.recommendation import Recommendation
 
@@ -74,7 +74,7 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
     return Result(stored, recommendation, document["settings"], folder, MappingProxyType(document))
 
 
-def _read_model(folder: Path, entry: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> Model:
+def _read_model(folder: Path, entry: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> DynamicModel:
     """Read the file of an entry of ``result.json``, which must be the model of the entry."""
     path = folder / "models" / f"{entry['rank']:02d}.json"
     model = read_model(path, primitives)

@@ -166,7 +166,9 @@ def compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[n
 
 
 def _simulate(
-    estimated: Iterable[FittedStructure | RefinedModel | EvaluationOutcome], validation: Dataset, warm_up: int
+    estimated: Iterable[FittedStructure | RefinedModel[Model] | EvaluationOutcome],
+    validation: Dataset,
+    warm_up: int,
 ) -> Iterator[tuple[Model, Simulation]]:
     """Yield the estimated models and their free runs on the validation data, except for diverging ones."""
     for found in estimated:

@@ -8,12 +8,11 @@ import numpy as np
 from islands.estimation.constraints.checks import ConstraintCheck
 from islands.evolution.search_result import SearchResult
 from islands.models.equations import (
-    named_equation,
     named_signals,
     named_statement,
-    named_term,
     signal_names,
 )
+from islands.models.narx import require_narx
 from islands.models.signal_statement import describe_values
 from islands.validation.assessment import Assessment
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE, ResidualStructure
@@ -54,7 +53,7 @@ def describe(found: SearchResult) -> list[str]:
     """
     return [
         describe_choice(found),
-        f"    {named_equation(found.recommended.model)}",
+        f"    {found.recommended.model.equation().named}",
         f"    {describe_units(found)}",
         *describe_findings(found),
     ]
@@ -165,16 +164,20 @@ def _list_doubtful(found: SearchResult, entry: Assessment) -> list[tuple[str, fl
     """Return the terms that are not certain, each with the probability of its inclusion."""
     if found.ensemble is None:
         return []
-    inclusion = [found.ensemble.inclusion(item) for item in entry.model.regressors]
+    inclusion = map(found.ensemble.inclusion, entry.model.parameter_names)
     return [
-        (named_term(entry.model, position), share)
-        for position, share in enumerate(inclusion)
+        (term, share)
+        for term, share in zip(entry.model.equation().terms, inclusion, strict=True)
         if share < _CERTAIN
     ]
 
 
 def _describe_constraints(entry: Assessment) -> Iterator[str]:
-    met = [named_statement(check.text, entry.model) for check in _list_statements(entry) if check.met]
+    met = [
+        named_statement(check.text, require_narx(entry.model))
+        for check in _list_statements(entry)
+        if check.met
+    ]
     if met:
         yield f"Constraints that the model meets: {'; '.join(met)}."
 
@@ -215,7 +218,7 @@ def _list_failures(found: SearchResult, entry: Assessment) -> Iterator[str]:
     for check in _list_statements(entry):
         if not check.met:
             value = f"{check.value:.6g}" if isfinite(check.value) else "undefined"
-            yield f"the constraint {named_statement(check.text, entry.model)} (value {value})"
+            yield f"the constraint {named_statement(check.text, require_narx(entry.model))} (value {value})"
     if errors["validation"].r2 < _GOOD_R2:
         yield f"simulation from the inputs alone: R2 {errors['validation'].r2:.3f}"
     physics = entry.physics
@@ -248,8 +251,8 @@ def _list_insignificant(entry: Assessment) -> list[str]:
         return []
     values = zip(model.parameters, model.standard_errors, strict=True)
     return [
-        named_term(model, position)
-        for position, (theta, error) in enumerate(values)
+        term
+        for term, (theta, error) in zip(model.equation().terms, values, strict=True)
         if abs(theta) < _SIGNIFICANT * error
     ]
 

@@ -5,7 +5,7 @@ from islands.io.certificates import summarise_certificates
 from islands.io.result_text.model_description import describe_choice, describe_findings, describe_units
 from islands.io.result_text.model_table import LEGEND, table
 from islands.io.result_text.text_layout import term_table, wrap
-from islands.models.equations import named_equation, named_signals
+from islands.models.equations import named_signals
 
 
 def summary(found: SearchResult) -> str:
@@ -37,7 +37,7 @@ def method_text(found: SearchResult) -> str:
         *(line for text in summarise_certificates(found) for line in wrap(text)),
         "",
         *wrap(_describe_names(found)),
-        *(f"{rank:2d}  {named_equation(entry.model)}" for rank, entry in enumerate(found.models, start=1)),
+        *(f"{rank:2d}  {entry.model.equation().named}" for rank, entry in enumerate(found.models, start=1)),
     ]
     return "\n".join(lines) + "\n"
 

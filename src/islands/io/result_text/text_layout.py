@@ -2,8 +2,8 @@
 
 from textwrap import fill
 
-from islands.models.equations import named_term, signal_names
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
+from islands.models.equations import signal_names
 
 #: Largest number of characters of a line.
 WIDTH = 80
@@ -21,20 +21,19 @@ def wrap(text: str, indent: str = "  ") -> list[str]:
     ).splitlines()
 
 
-def term_table(model: Model) -> list[str]:
+def term_table(model: DynamicModel) -> list[str]:
     """Return the equation as lines of at most 80 characters, unless a factor is longer.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
         Model with parameters.
     """
     errors = model.standard_errors
     heading = "" if errors is None else _HEADING
     lines = [f"{signal_names(model)[0]}(k) =".ljust(WIDTH - len(heading)) + heading]
-    for position, theta in enumerate(model.parameters):
+    for position, (term, theta) in enumerate(zip(model.equation().terms, model.parameters, strict=True)):
         error = "" if errors is None else (f"{errors[position]:.2g}" if errors[position] else _FIXED)
-        term = named_term(model, position)
         weight = f"  {'-' if theta < 0 else '+'} {abs(theta):<11.6g}"
         lines += _break_term(weight if term == "1" else f"{weight} * {term}", error, len(weight) + 3)
     return [line.rstrip() for line in lines]

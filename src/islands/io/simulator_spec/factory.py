@@ -31,7 +31,7 @@ from islands.discrepancy.simulators.python_function import PythonFunctionSimulat
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, RecordError, SettingsError, lookup, suggest
-from islands.io.models import model_from_json
+from islands.io.models import narx_from_json
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.document import read_scales
 from islands.io.simulator_spec.ode_spec import OdeSpec, read_built_in
@@ -227,7 +227,7 @@ def make_fmu(spec: FmuSpec, record: Dataset, _columns: Mapping[str, Any]) -> Sim
 
 def make_identified_model(spec: ModelSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
     """Make a simulator of the identified model in a specification."""
-    return make_model_simulator(model_from_json(json.dumps(spec.model), spec.name), spec.name, record)
+    return make_model_simulator(narx_from_json(json.dumps(spec.model), spec.name), spec.name, record)
 
 
 def make_model_simulator(model: Model, name: str, record: Dataset) -> Simulator:

@@ -14,7 +14,7 @@ from islands.data.preprocessing import preprocess
 from islands.data.signal_map import match_rate
 from islands.errors import RecordError, SettingsError
 from islands.export import export
-from islands.io.coupled_models import read_coupled_model, write_coupled_model
+from islands.io.models import read_coupled_model, write_model
 from islands.models.coupled_narx import CoupledModel, measured_coupled_model
 from islands.simulation.coupled_free_run import CoupledSimulator, coupled_free_run, match_coupled
 from islands.simulation.outcome import Status
@@ -149,7 +149,7 @@ def preprocessed(steps, average=1):
 
 
 def written_and_read(model, folder):
-    write_coupled_model(model, folder / "model.json")
+    write_model(model, folder / "model.json")
     return read_coupled_model(folder / "model.json")
 
 

@@ -13,7 +13,7 @@ import islands
 from islands.data.dataset import Dataset
 from islands.evolution.presets import PRESETS
 from islands.io.records import write_record
-from islands.models.narx import Model
+from islands.models.dynamic_model import DynamicModel
 from islands.progress import Steps, StoppedError
 from islands.reproduction.published import estimate_again
 from islands.reproduction.searches import read_document, search_island
@@ -91,7 +91,7 @@ def demo(
         show("figures", None)
         drawing = Steps(stop=stop)
         result.save(out, drawing)
-        models = dict[str, Model]()
+        models = dict[str, DynamicModel]()
         with suppress(StoppedError):
             models = _make_paper_models(records, Steps(show, stop))
     output.print(f"{out}/: {RESULT_FILES}", markup=False)
@@ -124,10 +124,12 @@ def demo(
     output.print("    islands reproduce all")
 
 
-def _make_paper_models(records: Mapping[str, Dataset], steps: Steps) -> dict[str, Model]:
+def _make_paper_models(records: Mapping[str, Dataset], steps: Steps) -> dict[str, DynamicModel]:
     """Return the published models, estimated again, and the model that the paper's search selects."""
     estimation, validation = (records[part] for part in SELECTING)
-    models = {f"({number})": estimate_again(PUBLISHED[number], estimation) for number in ("12", "13")}
+    models: dict[str, DynamicModel] = {
+        f"({number})": estimate_again(PUBLISHED[number], estimation) for number in ("12", "13")
+    }
     found = search_island(
         *(estimation, {SELECTING[1]: validation}, PAPER_PRESET, {"generations": PAPER_GENERATIONS}, 0),
         simulate_holds=False,
@@ -145,7 +147,7 @@ def _describe_origin(name: str) -> str:
     return "estimated again"
 
 
-def _compute_metrics(model: Model, record: Dataset, warm_up: int) -> Metrics:
+def _compute_metrics(model: DynamicModel, record: Dataset, warm_up: int) -> Metrics:
     """Return the metrics of a free run."""
     return metrics(record.y, free_run(model, record, warm_up).y)
 

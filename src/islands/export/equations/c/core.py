@@ -1,6 +1,5 @@
 """Simulations in discrete time in C."""
 
-from islands.export.block import make_block
 from islands.export.equations.c.signals import find_unused
 from islands.export.equations.equation_code import EquationCode
 from islands.export.equations.extended_equations import SampledCore
@@ -44,7 +43,7 @@ def _write_model(core: SampledCore, u: str, measured: str) -> str:
     model = core.model
     assert model is not None
     lag = model.maximum_lag
-    block = make_block(model)
+    block = model.block()
     added = block.terms(0, lambda name, lag: f"{name}[k - {lag}]", c_name)
     start = f"for (size_t k = 0; k < r->samples && k < {lag}; ++k) y[k] = {measured}[k];"
     each = ["double total = 0.0;", *(f"total += {each};" for each in added), "y[k] = total;"]

@@ -1,6 +1,5 @@
 """Simulations in discrete time in MATLAB."""
 
-from islands.export.block import make_block
 from islands.export.equations.equation_code import EquationCode
 from islands.export.equations.extended_equations import SampledCore
 from islands.export.equations.sampled_core import MEASURED, RECORDED
@@ -36,7 +35,7 @@ def _write_model(core: SampledCore, u: str, measured: str) -> str:
     model = core.model
     assert model is not None
     lag = model.maximum_lag
-    block = make_block(model)
+    block = model.block()
     added = block.terms(0, lambda name, lag: f"{name}(k-{lag})", matlab_name)
     each = ["total = 0;", *(f"total = total + {each};" for each in added), "y(k) = total;"]
     lines = [

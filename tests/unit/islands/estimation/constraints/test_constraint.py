@@ -7,7 +7,7 @@ from islands.errors import SettingsError
 from islands.estimation.parameter_constraints import constraint, count_free_parameters
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
-from islands.models.narx import canonical_order
+from islands.models.narx import Model, canonical_order
 from islands.models.regressor import regressor
 from islands.simulation.outcome import EvaluationOutcome, Status
 
@@ -97,9 +97,11 @@ def test_term_that_overflows_at_the_point_is_removed(text):
 def test_rows_that_follow_from_others_do_not_count():
     items = make_regressors(*TERMS)
     # The mirrored point makes the constraints on the odd and on the even terms separate.
-    assert count_free_parameters(items, "fixed-point = 1, 1") == 4
-    assert count_free_parameters(items, "fixed-point = 1, 1; fixed-point = 1, 1.0") == 4
-    assert count_free_parameters(make_regressors("y(k-1)", "u(k-1)"), "gain = 2; fixed-point = 1, 2") == 1
+    assert count_free_parameters(Model(items), "fixed-point = 1, 1") == 4
+    assert count_free_parameters(Model(items), "fixed-point = 1, 1; fixed-point = 1, 1.0") == 4
+    assert (
+        count_free_parameters(Model(make_regressors("y(k-1)", "u(k-1)")), "gain = 2; fixed-point = 1, 2") == 1
+    )
 
 
 def test_contradiction_is_infeasible():

@@ -12,7 +12,6 @@ import islands
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.export import export
-from islands.export.block import make_block
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
 from islands.performance.benchmark.compiled_c import compile_model
@@ -39,7 +38,7 @@ def folder(tmp_path_factory):
 
 
 def of_the_library(exported):
-    return any(entry.name in OF_THE_LIBRARY for entry in make_block(exported).primitives)
+    return any(entry.name in OF_THE_LIBRARY for entry in exported.block().primitives)
 
 
 @pytest.mark.ci

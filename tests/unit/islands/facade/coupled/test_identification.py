@@ -13,8 +13,8 @@ from islands.data.dataset import join
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.facade.coupled.identification import fit_coupled, identify_coupled
 from islands.facade.coupled.selection import measure_error
+from islands.facade.load import load
 from islands.facade.results.saved_result import read_result
-from islands.io.coupled_models import read_coupled_model
 from islands.simulation.coupled_free_run import coupled_free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures
@@ -55,7 +55,7 @@ def test_the_errors_are_those_of_the_common_free_run(found) -> None:
 def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> None:
     with undrawn_figures():
         folder = found.save(tmp_path / "result")
-    assert read_coupled_model(folder) == found.model
+    assert load(folder).model == found.model
     loaded = islands.load(folder)
     assert (loaded.model, loaded.warm_up) == (found.model, found.warm_up)
     document = json.loads((folder / "result.json").read_text())

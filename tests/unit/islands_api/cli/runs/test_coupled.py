@@ -62,7 +62,7 @@ def test_preprocessed_outputs_are_simulated_as_measured(record, tmp_path) -> Non
     printed = " ".join(succeed("simulate", folder, record, "--out", out).split())
     assert "y1 is the deviation from" in printed
     assert "behind a zero-phase low-pass filter of 1 Hz" in printed
-    model = islands.read_coupled_model(folder)
+    model = islands.load(folder).model
     assert all(each.preprocessing.output_offset for each in model.models)
     assert model.preprocessing.input_offsets[0] != 0.0
     data = CoupledRecord(tuple(islands.read_record(record, "u", name) for name in ("y1", "y2")))

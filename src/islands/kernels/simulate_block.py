@@ -19,19 +19,20 @@ LANES, MANY_LANES = VECTOR * _NARROW, VECTOR * _WIDE
 
 
 @kernel
-def simulate_coupled(
-    program,  # terms of all equations, those of the first output first; channels are outputs, then inputs
-    theta,  # float64 [term, lane], `LANES` or `MANY_LANES` of them
-    ends,  # int64 [output]: the term after the last one of the equation
+def simulate_block(
+    program,  # terms of the equations, in the order of the signals; channels are these signals, then inputs
+    weights,  # float64 [term, lane], `LANES` or `MANY_LANES` of them
+    constants,  # float64 [constant, lane]: values of the first temporaries
+    ends,  # int64 [signal]: the term after the last one of the equation
     warm_up,  # rows before the first predicted one, at least the largest lag
-    signals,  # float64 [channel, row * lane]: the outputs after the warm-up are overwritten
+    signals,  # float64 [channel, row * lane]: computed signals after the warm-up are overwritten
 ):
-    """Simulate all outputs of a block of runs in place; the caller checks the bound."""
+    """Simulate all computed signals of several runs in place; the caller checks the bound."""
     # There is one function per width, so that the compiler knows the number of lanes of a row.
-    if theta.shape[1] == MANY_LANES:
-        _wide(program, theta, ends, warm_up, signals)
+    if weights.shape[1] == MANY_LANES:
+        _wide(program, weights, constants, ends, warm_up, signals)
     else:
-        _narrow(program, theta, ends, warm_up, signals)
+        _narrow(program, weights, constants, ends, warm_up, signals)
 
 
 def _make_simulator(count):
@@ -39,11 +40,11 @@ def _make_simulator(count):
     lanes = VECTOR * count
 
     @kernel
-    def run(program, theta, ends, warm_up, signals):
+    def run(program, weights, constants, ends, warm_up, signals):
         flat = signals.shape[1]
         temporaries = padded_size(max(1, program.temporaries) * lanes)
-        for index in range(program.constants.size):
-            write(address(temporaries, index * lanes), broadcast(program.constants[index], count))
+        for index in range(constants.shape[0]):
+            write(address(temporaries, index * lanes), read(address(constants, index * lanes), count))
         code, addresses, factors, degree = program.code, program.addresses, program.factors, program.degree
         operands = program.operands
         places, strides = np.empty(len(operands), np.int64), np.empty(len(operands), np.int64)
@@ -60,16 +61,16 @@ def _make_simulator(count):
                 first, second = places[code[index, 2]], places[code[index, 3]]
                 execute(code[index, 0], target, first, second, addresses[index], count, 1)
             term = 0
-            for output in range(ends.size):
+            for signal in range(ends.size):
                 # The terms of an equation are added in their order, as in the simulation of a single one.
                 y = broadcast(0.0, count)
-                while term < ends[output]:
+                while term < ends[signal]:
                     a, b = places[factors[term, 0]], places[factors[term, 1]]
                     c, d = places[factors[term, 2]], places[factors[term, 3]]
                     product = multiply_factors(a, b, c, d, degree[term], count)
-                    y = add(y, multiply(read(address(theta, term * lanes), count), product))
+                    y = add(y, multiply(read(address(weights, term * lanes), count), product))
                     term += 1
-                write(address(signals, output * flat + row * lanes), y)
+                write(address(signals, signal * flat + row * lanes), y)
             for index in range(places.size):
                 places[index] += strides[index]
 

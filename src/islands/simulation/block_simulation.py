@@ -1,0 +1,208 @@
+"""Simulation of a block on signals, for several sets of parameters and several intervals at once."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.errors import SettingsError
+from islands.expressions.evaluation import value
+from islands.expressions.primitives import ADD, MUL
+from islands.expressions.tree import Apply, Expression, Lagged, Symbol, remove_shifts, replace
+from islands.kernels.interpreter import Program
+from islands.kernels.simulate_block import LANES, MANY_LANES, simulate_block
+from islands.models.block import Block
+from islands.program.term_pool import link
+from islands.simulation.layout import check_warm_up, find_intervals
+
+
+class BlockSimulator:
+    """A block with its program and the intervals of a record, which are built once for many simulations.
+
+    Parameters
+    ----------
+    block : Block
+        Its parameters are passed to the calls.
+    outputs : ndarray, shape (outputs, samples)
+        Measured outputs, which are read during the warm-up of every interval.
+    inputs : ndarray, shape (inputs, samples)
+    start, length : ndarray of int64, shape (intervals,)
+        First predicted sample and number of samples of every interval.
+    warm_up : int
+        Number of samples before the first prediction that may be read, at least the largest lag.
+    """
+
+    def __init__(
+        self,
+        block: Block,
+        outputs: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        start: NDArray[np.int64],
+        length: NDArray[np.int64],
+        warm_up: int,
+    ) -> None:
+        self._block, self._warm_up = block, warm_up
+        self._program, self._weights = _link(block)
+        self._ends = np.cumsum([len(equation) for equation in block.equations], dtype=np.int64)
+        self._outputs, self._inputs = outputs, inputs
+        self._start, self._length = start, length
+        self._order = np.argsort(-length, kind="stable")
+
+    def __call__(self, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Simulate every interval with every set of parameters.
+
+        Parameters
+        ----------
+        parameters : ndarray, shape (sets, parameters)
+
+        Returns
+        -------
+        ndarray, shape (sets, computed signals, samples)
+            NaN outside of the intervals. A set and an interval do not depend on the others.
+        """
+        computed = self._block.computed
+        found: NDArray[np.float64] = np.full((len(parameters), computed, self._outputs.shape[1]), np.nan)
+        runs = [(number, int(interval)) for interval in self._order for number in range(len(parameters))]
+        for lanes in _make_groups(runs):
+            signals = self._run(parameters, lanes)
+            for lane, (number, interval) in enumerate(lanes):
+                first, length = self._start[interval], self._length[interval]
+                found[number, :, first : first + length] = signals[
+                    :computed, self._warm_up : self._warm_up + length, lane
+                ]
+        return found
+
+    @property
+    def intervals(self) -> NDArray[np.int64]:
+        """Number of samples of every interval, in the order of time."""
+        return self._length[np.argsort(self._start)]
+
+    @property
+    def predicted(self) -> NDArray[np.bool_]:
+        """Whether each sample is in an interval, shape (samples,)."""
+        found = np.zeros(self._outputs.shape[1], bool)
+        for start, length in zip(self._start, self._length, strict=True):
+            found[start : start + length] = True
+        return found
+
+    def remove_diverged(self, y: NDArray[np.float64], bound: float) -> int | None:
+        """Set one output to NaN from a divergence to the end of its interval.
+
+        Parameters
+        ----------
+        y : ndarray, shape (samples,)
+        bound : float
+            A prediction with a larger absolute value has diverged.
+
+        Returns
+        -------
+        int or None
+            First diverged sample; None if there is none.
+        """
+        failures = []
+        for start, length in zip(self._start, self._length, strict=True):
+            run = y[start : start + length]
+            outside = ~(np.abs(run) <= bound)
+            if outside.any():
+                first = int(np.argmax(outside))
+                failures.append(int(start) + first)
+                run[first:] = np.nan
+        return min(failures, default=None)
+
+    def _run(self, parameters: NDArray[np.float64], lanes: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
+        """Simulate as many runs as a row of the kernel has lanes, shape (channels, rows, lanes)."""
+        width = LANES if len(lanes) <= LANES else MANY_LANES
+        # Lanes that are left over repeat the runs, and are ignored.
+        repeated = [lanes[lane % len(lanes)] for lane in range(width)]
+        sets = parameters[[number for number, _ in repeated]].T
+        intervals = np.array([interval for _, interval in repeated])
+        rows = self._warm_up + int(self._length[intervals].max())
+        samples = np.minimum(
+            (self._start[intervals] - self._warm_up) + np.arange(rows)[:, None], self._outputs.shape[1] - 1
+        )
+        states = np.zeros((len(self._block.starts), rows, width))
+        signals = np.concatenate([self._outputs[:, samples], states, self._inputs[:, samples]])
+        self._start_states(signals, sets)
+        ones = np.ones(width)
+        weights = np.array([ones if place is None else sets[place] for place in self._weights])
+        constants = np.empty((self._program.constants.size, width))
+        for row, number, fixed in zip(
+            constants, self._program.parameters, self._program.constants, strict=True
+        ):
+            row[:] = sets[number - 1] if number else fixed
+        flat = signals.reshape(len(signals), -1)
+        simulate_block(self._program, weights, constants, self._ends, self._warm_up, flat)
+        return flat.reshape(signals.shape)
+
+    def _start_states(self, signals: NDArray[np.float64], sets: NDArray[np.float64]) -> None:
+        """Write the states of the warm-up."""
+        named = dict(zip(self._block.parameters, sets, strict=True))
+        first = signals[:, : self._warm_up]
+        for place, start in enumerate(self._block.starts, start=self._block.outputs):
+            first[place] = value(start, lambda channel, _lag: first[channel], named)
+
+
+def make_simulator(block: Block, record: Dataset, interval: int | None, warm_up: int) -> BlockSimulator:
+    """Return the simulator of a block of one output on the intervals of a record.
+
+    Parameters
+    ----------
+    block : Block
+    record : Dataset
+        Signals of the block.
+    interval : int or None
+        Length of a shooting interval in samples, 1 for one-step-ahead prediction; None is the free run over
+        each whole segment. A block whose states are not determined by measured outputs cannot restart: its
+        prediction from the past is the free run for any interval (Ljung 1999, section 4.2: the predictor of
+        an output error model).
+    warm_up : int
+        Number of samples before the first prediction.
+
+    Raises
+    ------
+    RecordError
+        No segment is longer than the warm-up, or the output is missing in a warm-up.
+    SettingsError
+        The interval is less than 1.
+    """
+    if interval is not None and interval < 1:
+        raise SettingsError(f"a shooting interval has at least 1 sample, got {interval}")
+    start, length = find_intervals(record, warm_up, interval if block.restarts_from_outputs else None)
+    check_warm_up(record.y, start, warm_up)
+    return BlockSimulator(block, record.y[None], record.u.T, start, length, warm_up)
+
+
+def _make_groups(runs: Sequence[tuple[int, int]]) -> Iterator[Sequence[tuple[int, int]]]:
+    """Yield runs that are simulated together."""
+    lanes = LANES if len(runs) <= LANES else MANY_LANES
+    for begin in range(0, len(runs), lanes):
+        yield runs[begin : begin + lanes]
+
+
+def _link(block: Block) -> tuple[Program, list[int | None]]:
+    """Return the program of all terms, and the place of the parameter that multiplies each term."""
+    names = list(block.parameters)
+    places = {name: place for place, name in enumerate(names)}
+    terms = [term for equation in block.equations for term in equation]
+    program = link([_read_past(block, term.expression) for term in terms], names)
+    return program, [places[term.weight] if term.weight else None for term in terms]
+
+
+def _read_past(block: Block, expression: Expression) -> Expression:
+    """Replace sample k of the states by their equations: the kernel evaluates all equations at once."""
+
+    def find(part: Expression) -> Expression | None:
+        return _sum_terms(block, part.channel) if isinstance(part, Lagged) and part.lag == 0 else None
+
+    return replace(remove_shifts(expression), find)
+
+
+def _sum_terms(block: Block, channel: int) -> Expression:
+    """Return the right side of the equation of a signal."""
+    terms = [
+        Apply(MUL, (Symbol(term.weight), term.expression)) if term.weight else term.expression
+        for term in block.equations[channel]
+    ]
+    read = [_read_past(block, term) for term in terms]
+    return read[0] if len(read) == 1 else Apply(ADD, tuple(read))
