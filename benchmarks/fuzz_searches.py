@@ -30,7 +30,7 @@ from threadpoolctl import threadpool_limits
 import islands
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
-from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.diagnosis.result import Diagnosis
 from islands.errors import IslandsError
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.facade.coupled.result import CoupledResult

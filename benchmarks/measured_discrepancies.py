@@ -24,8 +24,8 @@ for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np  # noqa: E402 - after the environment is set
 
 import islands  # noqa: E402
-from islands.discrepancy.detectability import diagnose_surrogate  # noqa: E402
-from islands.discrepancy.surrogates import SurrogateCase, injection_strengths, make_surrogates  # noqa: E402
+from islands.diagnosis.detectability import diagnose_surrogate  # noqa: E402
+from islands.diagnosis.surrogates import SurrogateCase, injection_strengths, make_surrogates  # noqa: E402
 from islands.io.simulator_spec.document import extended_document  # noqa: E402
 from islands.io.simulator_spec.factory import make_simulator  # noqa: E402
 

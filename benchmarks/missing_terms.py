@@ -18,14 +18,14 @@ from time import process_time
 import numpy as np
 
 import islands
-from islands.discrepancy.calibration.levenberg_marquardt import calibrate
-from islands.discrepancy.calibration.preparation import make_context, make_target
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.diagnosis.calibration.levenberg_marquardt import calibrate
+from islands.diagnosis.calibration.preparation import make_context, make_target
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.result import Diagnosis
 from islands.errors import RecordError
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
+from islands.simulators.extended import ExtendedSimulator
 
 STEPS = 10
 

@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 
 import islands
-from islands.discrepancy.monitoring.record_follower import Alarm
+from islands.diagnosis.monitoring.record_follower import Alarm
 from islands.facade.record_monitor import create_monitor, monitor_record
 
 DT, SAMPLES, MONTH, TRAINING = 0.01, 600, 720, 24

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.simulator import get_tolerances
-from islands.discrepancy.planning.experiment import Experiment, make_model
-from islands.discrepancy.planning.experiment_setup import make_experiment
+from islands.diagnosis.planning.experiment import Experiment, make_model
+from islands.diagnosis.planning.experiment_setup import make_experiment
+from islands.diagnosis.procedure import diagnose
+from islands.effects.interface.effect import Effect
 from islands.io.simulator_spec.factory import make_simulator
 from islands.performance.trials.injection.noise import NOISES
+from islands.simulators.interface import get_tolerances
 from islands.systems.signals import sines
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -16,13 +16,13 @@ import numpy as np
 from planned_experiments import EXPERIMENTS, NoisePlans, make_plans
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import calibrate, evaluate_fit, whiten_target
-from islands.discrepancy.calibration.preparation import make_target
-from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.planning.cause import Cause, CauseScale
-from islands.discrepancy.planning.experiment import Experiment, ExperimentModel
-from islands.discrepancy.planning.noise_free_fit import NoiseFreeFit, fit_noise_free
-from islands.discrepancy.planning.response_dictionary import ResponseDictionary
+from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit, whiten_target
+from islands.diagnosis.calibration.preparation import make_target
+from islands.diagnosis.planning.cause import Cause, CauseScale
+from islands.diagnosis.planning.experiment import Experiment, ExperimentModel
+from islands.diagnosis.planning.noise_free_fit import NoiseFreeFit, fit_noise_free
+from islands.diagnosis.planning.response_dictionary import ResponseDictionary
+from islands.effects.interface.effect import Effect
 from islands.performance.trials.injection.noise import NOISES
 
 #: Kinds of noise, and the number of records of each cause.

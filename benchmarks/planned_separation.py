@@ -20,19 +20,19 @@ import numpy as np
 from planned_experiments import EXPERIMENTS, Planned, make_plans
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.interfaces.simulator import get_tolerances
-from islands.discrepancy.planning.cause import CauseScale
-from islands.discrepancy.planning.decisive_experiment import design_experiment
-from islands.discrepancy.planning.experiment import make_model
-from islands.discrepancy.planning.experiment_setup import make_experiment
-from islands.discrepancy.planning.isolability import Isolability, find_isolability
-from islands.discrepancy.planning.pair_separation import CausePair
-from islands.discrepancy.planning.planned_input import find_limits
-from islands.discrepancy.planning.response_dictionary import ResponseDictionary
-from islands.discrepancy.planning.separation import require_detection
+from islands.diagnosis.planning.cause import CauseScale
+from islands.diagnosis.planning.decisive_experiment import design_experiment
+from islands.diagnosis.planning.experiment import make_model
+from islands.diagnosis.planning.experiment_setup import make_experiment
+from islands.diagnosis.planning.isolability import Isolability, find_isolability
+from islands.diagnosis.planning.pair_separation import CausePair
+from islands.diagnosis.planning.planned_input import find_limits
+from islands.diagnosis.planning.response_dictionary import ResponseDictionary
+from islands.diagnosis.planning.separation import require_detection
+from islands.diagnosis.procedure import diagnose
 from islands.io.simulator_spec.factory import make_simulator
 from islands.performance.trials.injection.noise import NOISES
+from islands.simulators.interface import get_tolerances
 
 #: Number of records of each cause.
 SEEDS = 10

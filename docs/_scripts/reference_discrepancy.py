@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from tables import code, codes, escape, page, section, table
 
-from islands.discrepancy.effects import CATALOGUE, EFFECTS, OF_EACH
-from islands.discrepancy.effects.free_forms import FREE_FORMS
-from islands.discrepancy.inference.noise_detectors import DETECTORS, NoiseDetector
-from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, SimulationContext
-from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
+from islands.diagnosis.inference.noise_detectors import DETECTORS, NoiseDetector
+from islands.effects.catalogue import CATALOGUE, EFFECTS, OF_EACH
+from islands.effects.free_forms import FREE_FORMS
+from islands.effects.interface.context import ForceCoordinate, Parameter, SimulationContext
+from islands.effects.interface.effect import Effect, EffectTemplate
 from islands.expressions.parsing import NAMED_FUNCTIONS
 from islands.expressions.primitives import EQUATION_FUNCTIONS
 from islands.io.simulator_spec.specification import SIMULATORS

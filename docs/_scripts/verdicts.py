@@ -23,7 +23,7 @@ from islands.figures.style import (
     save,
 )
 from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.systems.ode.system import OdeParameter
+from islands.simulators.ode.system import OdeParameter
 
 PICTURE = Path(__file__).parents[1] / "pictures" / "verdicts.svg"
 

@@ -9,7 +9,7 @@ import pytest
 from _pytest.mark import ParameterSet
 
 from acceptance import test_hidden as checks
-from islands.discrepancy.effects import CATALOGUE
+from islands.effects.catalogue import CATALOGUE
 from islands.performance.trials import trial as trials_module
 from islands.performance.trials.injection.piezo import PIEZO
 from islands.performance.trials.trial import Trial, TrialOutcome

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands.discrepancy.detectability import NOTHING, SelfTest, SurrogateOutcome, self_test
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.surrogates import SurrogateCase
+from islands.diagnosis.detectability import NOTHING, SelfTest, SurrogateOutcome, self_test
+from islands.diagnosis.result import Diagnosis
+from islands.diagnosis.surrogates import SurrogateCase
 from islands.io.records import write_record
 from islands.parallel import ParallelMap
 from islands.performance.trials.injection.measurement import inject
+from islands.simulators.interface import Simulator
 from support.command_line import fail, succeed, write_offset
 from support.undrawn import undrawn_figures
 

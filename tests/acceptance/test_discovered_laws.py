@@ -7,7 +7,7 @@ laws, and measures how often each is found.
 import pytest
 from missing_terms import LAWS, MAX_ERROR, run_trial
 
-from islands.discrepancy.inference.verdict import Verdict
+from islands.diagnosis.inference.verdict import Verdict
 
 #: First seed; no seed from here on was used for tuning.
 SEED = 910_000

@@ -11,8 +11,8 @@ import pytest
 
 import islands
 import islands_api
-from islands.discrepancy.effects import CATALOGUE, OF_EACH
-from islands.discrepancy.inference.noise_detectors import DETECTORS
+from islands.diagnosis.inference.noise_detectors import DETECTORS
+from islands.effects.catalogue import CATALOGUE, OF_EACH
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.gene_structure import STRUCTURES

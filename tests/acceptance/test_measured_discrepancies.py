@@ -7,8 +7,8 @@ import pytest
 from benchmarks.measured_discrepancies import CASES, DATA, errors
 
 import islands
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.inference.finding import Finding
+from islands.diagnosis.inference.finding import Finding
+from islands.diagnosis.result import Diagnosis
 
 pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]
 

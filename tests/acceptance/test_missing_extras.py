@@ -17,7 +17,7 @@ import pytest
 import islands
 from islands.errors import IslandsError
 from islands.facade.engine_choice import open_engine
-from islands.systems.fmu.fmi_description import import_fmpy
+from islands.simulators.fmu.fmi_description import import_fmpy
 from islands_api.cli.app import EXTRAS as COMMAND_EXTRAS
 from islands_api.web.auth import make_verifier
 from islands_service.engines import serial_notice

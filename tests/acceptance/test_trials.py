@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from islands.discrepancy.effects import CATALOGUE
+from islands.effects.catalogue import CATALOGUE
 from islands.performance.trials.cases import CASES
 from islands.performance.trials.injection.noise import NOISES
 from islands.performance.trials.trial import Trial, run_trial

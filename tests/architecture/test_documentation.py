@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from tables import attributes, summarise
 
-from islands.discrepancy.effects import CATALOGUE, OF_EACH
-from islands.discrepancy.inference.noise_detectors import DETECTORS
+from islands.diagnosis.inference.noise_detectors import DETECTORS
+from islands.effects.catalogue import CATALOGUE, OF_EACH
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.gene_structure import STRUCTURES

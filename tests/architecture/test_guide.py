@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from islands.discrepancy.effects import CATALOGUE, OF_EACH
-from islands.discrepancy.inference.noise_detectors import DETECTORS
-from islands.discrepancy.inference.verdict import Verdict
+from islands.diagnosis.inference.noise_detectors import DETECTORS
+from islands.diagnosis.inference.verdict import Verdict
+from islands.effects.catalogue import CATALOGUE, OF_EACH
 from support.repository import DOCS, ROOT
 
 DIAGNOSE = (DOCS / "how-to" / "diagnose-a-simulation.md").read_text()

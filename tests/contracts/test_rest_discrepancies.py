@@ -341,7 +341,8 @@ import json
 _check_spec(DiscrepancyRequest.model_validate(json.loads(sys.argv[1])), ServiceSettings())
 heavy = {"numba", "llvmlite", "scipy", "matplotlib", "h5py", "ray"}
 print(sorted(heavy & {name.partition(".")[0] for name in sys.modules}))
-print([name for name in sys.modules if name.startswith(("islands.kernels", "islands.discrepancy"))])
+unused = ("islands.kernels", "islands.diagnosis", "islands.effects")
+print([name for name in sys.modules if name.startswith(unused)])
 """
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 import islands
-from islands.discrepancy.monitoring import alarm_rate, record_follower
+from islands.diagnosis.monitoring import alarm_rate, record_follower
 from islands.errors import RecordError
 from islands.facade.record_monitor import reject_record
 from islands.io.checkpoints import monitor_state

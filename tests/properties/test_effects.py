@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.interfaces.effect import SimulationContext, Site
-from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.effect import SimulationContext, Site
+from islands.simulators.extended import ExtendedSimulator
 from support.built_in_simulators import make_piezo
 
 

@@ -6,25 +6,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
-from islands.discrepancy.effects import catalogue_order
-from islands.discrepancy.interfaces.context import SimulationContext
-from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.simulators import (
-    fmu,
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.effects.catalogue import catalogue_order
+from islands.effects.interface.context import SimulationContext
+from islands.effects.interface.effect import Effect, Site
+from islands.export.fmu.compiler import find_compiler
+from islands.io.simulator_spec.specification import SIMULATORS, PhysicalSpec
+from islands.simulators import (
     intersample,
     linear,
     narx,
-    ode,
     output_equation,
     python_function,
     recorded_output,
     saved_extension,
 )
-from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.export.fmu.compiler import find_compiler
-from islands.io.simulator_spec.specification import SIMULATORS, PhysicalSpec
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.fmu import simulator as fmu
+from islands.simulators.interface import Simulator
+from islands.simulators.ode import simulator as ode
 from support.simulated_records import made, names
 
 #: Classes of the simulators that are not physical systems; those of "held" and "terms" are

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from islands.discrepancy.simulators.ode import OdeSimulator
-from islands.discrepancy.simulators.ode_preparation import make_ode_simulator
 from islands.io.simulator_spec.ode_spec import read_built_in
+from islands.simulators.ode.preparation import make_ode_simulator
+from islands.simulators.ode.simulator import OdeSimulator
 from support.simulated_records import recorded, wave
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.interfaces.context import ForceCoordinate, SimulationContext
-from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.discrepancy.simulators.intersample import ResampledSimulator
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.context import ForceCoordinate, SimulationContext
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.intersample import ResampledSimulator
 from support.built_in_simulators import make_oscillator
 
 DT = 0.01

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from islands.data.dataset import Dataset
-from islands.systems.memory_operators import play_from
+from islands.kernels.memory_operators import play_from
 
 Signal = NDArray[np.float64]
 

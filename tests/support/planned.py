@@ -7,17 +7,17 @@ import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.noise_model import NoiseModel
-from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.interfaces.effect import Effect, Signal
-from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.planning.cause import Cause, CauseScale
-from islands.discrepancy.planning.channel_noise import ChannelNoise, NoiseOrigin
-from islands.discrepancy.planning.experiment import Experiment
-from islands.discrepancy.planning.experiment_setup import make_experiment
-from islands.discrepancy.planning.pair_separation import CausePair
-from islands.discrepancy.planning.response_dictionary import ResponseDictionary
-from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
+from islands.diagnosis.calibration.noise_model import NoiseModel
+from islands.diagnosis.planning.cause import Cause, CauseScale
+from islands.diagnosis.planning.channel_noise import ChannelNoise, NoiseOrigin
+from islands.diagnosis.planning.experiment import Experiment
+from islands.diagnosis.planning.experiment_setup import make_experiment
+from islands.diagnosis.planning.pair_separation import CausePair
+from islands.diagnosis.planning.response_dictionary import ResponseDictionary
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.effect import Effect, Signal
+from islands.simulators.interface import Simulator
+from islands.simulators.python_function import PythonFunctionSimulator
 
 DT = 0.01
 

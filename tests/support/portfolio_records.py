@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.context import SimulationContext
-from islands.systems.memory_operators import play_from
+from islands.effects.interface.context import SimulationContext
+from islands.kernels.memory_operators import play_from
 from support.built_in_simulators import make_piezo
 
 Signal = NDArray[np.float64]

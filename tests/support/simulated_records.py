@@ -11,7 +11,6 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.simulator import Simulator
 from islands.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.factory import make_simulator
@@ -25,6 +24,7 @@ from islands.io.simulator_spec.specification import (
     ModelSpec,
     PhysicalSpec,
 )
+from islands.simulators.interface import Simulator
 from support.oscillator_fmus import write_oscillator
 from support.repository import ROOT
 

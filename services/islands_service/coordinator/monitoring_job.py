@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.context import Signal
+from islands.effects.interface.context import Signal
 from islands.errors import RecordError
 from islands.facade.record_monitor import create_monitor, monitor_record
 from islands.io.checkpoints.monitor_document import (

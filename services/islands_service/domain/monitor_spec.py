@@ -19,7 +19,7 @@ from islands_service.domain.job_spec import (
     parse_document,
 )
 
-#: Defaults and limit of `islands.discrepancy.monitoring`, which this module does not import for its
+#: Defaults and limit of `islands.diagnosis.monitoring`, which this module does not import for its
 #: numerical packages. A test compares them.
 DEFAULT_RATE, TRAINING, MIN_TRAINING = "1 per month", 24, 12
 
@@ -32,7 +32,7 @@ _SHORT_INTERVAL = 1e-9
 
 def _check_rate(text: str) -> str:
     # The rate is checked again with the interval between the records, which may be that of the first one.
-    from islands.discrepancy.monitoring.alarm_rate import parse_alarm_rate  # noqa: PLC0415
+    from islands.diagnosis.monitoring.alarm_rate import parse_alarm_rate  # noqa: PLC0415
 
     try:
         parse_alarm_rate(text, _SHORT_INTERVAL)

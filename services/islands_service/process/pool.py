@@ -27,7 +27,7 @@ _CHECK_SECONDS = 0.1
 #: Modules that are imported once, in the process from which the others are forked.
 _PRELOADED = [
     "__main__",
-    "islands.discrepancy.diagnosis",
+    "islands.diagnosis.procedure",
     "islands.io.simulator_spec.factory",
     "scipy.signal",
 ]

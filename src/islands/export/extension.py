@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from islands.discrepancy.effects import get_summary
+from islands.effects.catalogue import get_summary
 from islands.errors import ModelError
 from islands.export import export
 from islands.export.closed_form import closed_form
@@ -15,7 +15,7 @@ from islands.io.simulator_spec.ode_spec import OdeParameterSpec, OdeSpec
 from islands.io.simulator_spec.spec_base import ValueSpec
 from islands.io.simulator_spec.specification import LocalExtendedSpec
 from islands.models.narx import Model
-from islands.systems.ode.output_system import SYMBOL_MEANINGS
+from islands.simulators.ode.output_system import SYMBOL_MEANINGS
 
 
 def as_text(spec: LocalExtendedSpec) -> str:

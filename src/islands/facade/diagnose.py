@@ -7,13 +7,11 @@ from threadpoolctl import threadpool_limits
 
 from islands.data.dataset import Dataset
 from islands.data.split import hold_out
-from islands.discrepancy.diagnosis import diagnose as diagnose_simulator
-from islands.discrepancy.effects import EFFECTS
-from islands.discrepancy.interfaces.effect import Effect, Signal
-from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.planning.experiment_plan import DecisiveLimits, ExperimentPlan
-from islands.discrepancy.planning.experiment_plan import plan_experiment as plan_with_simulator
-from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
+from islands.diagnosis.planning.experiment_plan import DecisiveLimits, ExperimentPlan
+from islands.diagnosis.planning.experiment_plan import plan_experiment as plan_with_simulator
+from islands.diagnosis.procedure import diagnose as diagnose_simulator
+from islands.effects.catalogue import EFFECTS
+from islands.effects.interface.effect import Effect, Signal
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.data_frames import as_record
 from islands.io.simulator_spec.factory import make_model_simulator, make_simulator
@@ -21,6 +19,8 @@ from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
 from islands.models.narx import Model
 from islands.parallel import ParallelMap
 from islands.progress import ProgressCallback, ignore_progress
+from islands.simulators.interface import Simulator
+from islands.simulators.python_function import PythonFunctionSimulator
 
 if TYPE_CHECKING:
     from islands.io.data_frames import RecordLike

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.findings import ResidualFormula
-from islands.discrepancy.inference.verdict import Verdict
+from islands.diagnosis.findings import ResidualFormula
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.result import Diagnosis
 from islands.evolution.engine import Engine
 from islands.evolution.search_state import SearchState
 from islands.facade.engine_choice import Ray

@@ -9,15 +9,14 @@ from pydantic import TypeAdapter, ValidationError
 
 from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.context import Signal
-from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.monitoring.alarm_rate import DEFAULT_RATE, parse_alarm_rate
-from islands.discrepancy.monitoring.record_follower import (
+from islands.diagnosis.monitoring.alarm_rate import DEFAULT_RATE, parse_alarm_rate
+from islands.diagnosis.monitoring.record_follower import (
     TRAINING,
     MonitorSettings,
     MonitorState,
     follow_record,
 )
+from islands.effects.interface.context import Signal
 from islands.errors import RecordError, SettingsError
 from islands.io.checkpoints.monitor_state import RejectedRecord, SavedMonitor
 from islands.io.simulator_spec.document import describe_extension
@@ -30,6 +29,7 @@ from islands.io.simulator_spec.specification import (
     is_extended,
     parse_spec,
 )
+from islands.simulators.interface import Simulator
 
 _LOCAL_SPEC: TypeAdapter[LocalSpec] = TypeAdapter(LocalSpec)
 

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.interfaces.context import Signal
-from islands.discrepancy.interfaces.segments import fill_gaps, map_segments
+from islands.data.segments import fill_gaps, map_segments
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.result import Diagnosis
+from islands.effects.interface.context import Signal
 from islands.figures.diverging_lines import break_line
 from islands.figures.downsampling import VERTICES, downsample
 from islands.figures.style import (

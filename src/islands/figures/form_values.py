@@ -2,10 +2,10 @@
 
 from matplotlib.figure import Figure
 
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.discovery.effect_shape import EffectShape
-from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.inference.finding import Finding
+from islands.diagnosis.discovery.effect_shape import EffectShape
+from islands.diagnosis.inference.finding import Finding
+from islands.diagnosis.result import Diagnosis
+from islands.effects.catalogue import CATALOGUE
 from islands.figures.style import FRAME, MEASURED, SIMULATED, blank, finish, house_style, label
 
 

@@ -8,8 +8,8 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from islands.discrepancy.interfaces.context import Signal
-from islands.discrepancy.monitoring.record_follower import MonitorState
+from islands.diagnosis.monitoring.record_follower import MonitorState
+from islands.effects.interface.context import Signal
 from islands.figures.style import (
     BAND,
     FRAME,

@@ -5,7 +5,7 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from islands.discrepancy.planning.isolability import Isolability
+from islands.diagnosis.planning.isolability import Isolability
 from islands.figures.style import FRAME, RESIDUAL, SHADE, SIMULATED, WIDTH, blank, finish, house_style
 
 #: Smallest margin for the names, in inches, and their width per character and point of font size.

@@ -4,11 +4,11 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from islands.discrepancy.detectability import SelfTest
-from islands.discrepancy.diagnosis_result import Candidate, Diagnosis
-from islands.discrepancy.discovery.effect_shape import EffectShape
-from islands.discrepancy.findings import ResidualFormula
-from islands.discrepancy.inference.finding import Finding
+from islands.diagnosis.detectability import SelfTest
+from islands.diagnosis.discovery.effect_shape import EffectShape
+from islands.diagnosis.findings import ResidualFormula
+from islands.diagnosis.inference.finding import Finding
+from islands.diagnosis.result import Candidate, Diagnosis
 from islands.io.result_folder import record_document
 
 SCHEMA = "islands.discrepancy/1"

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from islands.discrepancy.planning.alternative_experiments import AlternativeExperiment, choose_cheapest
-from islands.discrepancy.planning.channel_noise import ChannelNoise
-from islands.discrepancy.planning.decisive_experiment import DecisiveExperiment
-from islands.discrepancy.planning.experiment_plan import ExperimentPlan
-from islands.discrepancy.planning.isolability import IsolabilityRow
-from islands.discrepancy.planning.pair_separation import PairSeparation
+from islands.diagnosis.planning.alternative_experiments import AlternativeExperiment, choose_cheapest
+from islands.diagnosis.planning.channel_noise import ChannelNoise
+from islands.diagnosis.planning.decisive_experiment import DecisiveExperiment
+from islands.diagnosis.planning.experiment_plan import ExperimentPlan
+from islands.diagnosis.planning.isolability import IsolabilityRow
+from islands.diagnosis.planning.pair_separation import PairSeparation
 from islands.io.result_folder import record_document
 
 SCHEMA = "islands.plan/1"

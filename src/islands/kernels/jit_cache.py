@@ -44,7 +44,7 @@ STAMP = "complete"
 UNUSED_DAYS = 30
 
 #: Folders of the package that contain compiled functions.
-COMPILED = ("kernels", "systems", "discrepancy/effects")
+COMPILED = ("kernels", "effects", "simulators/fmu", "simulators/ode", "systems")
 
 _PACKAGE = Path(__file__).absolute().parents[1]
 

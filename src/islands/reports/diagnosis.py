@@ -1,9 +1,9 @@
 """HTML report of a diagnosis: sentences, numbers and figures."""
 
-from islands.discrepancy.detectability import NOTHING, SelfTest
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.findings import ResidualFormula
-from islands.discrepancy.surrogates import STRENGTHS
+from islands.diagnosis.detectability import NOTHING, SelfTest
+from islands.diagnosis.findings import ResidualFormula
+from islands.diagnosis.result import Diagnosis
+from islands.diagnosis.surrogates import STRENGTHS
 from islands.figures.discrepancy import DISCREPANCY_FIGURES
 from islands.figures.form_values import draw_effect_shape, draw_free_forms, list_free_forms
 from islands.io.result_text.diagnosis_text import (

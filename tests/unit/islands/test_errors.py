@@ -9,7 +9,7 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.data.preprocessing_steps import PreprocessingSteps
-from islands.discrepancy.monitoring.alarm_rate import parse_alarm_rate
+from islands.diagnosis.monitoring.alarm_rate import parse_alarm_rate
 from islands.errors import IslandsError, suggest
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.presets import resolve_settings

@@ -12,15 +12,14 @@ import typer
 
 from islands.data.dataset import Dataset
 from islands.data.split import hold_out
-from islands.discrepancy.calibration.fit_journal import FitJournal
-from islands.discrepancy.detectability import SelfTest, self_test
-from islands.discrepancy.diagnosis import diagnose as run_diagnosis
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.findings import ResidualFormula
-from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.interim_findings import InterimFindings
-from islands.discrepancy.planning.experiment_plan import plan_experiment
+from islands.diagnosis.calibration.fit_journal import FitJournal
+from islands.diagnosis.detectability import SelfTest, self_test
+from islands.diagnosis.findings import ResidualFormula
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.interim_findings import InterimFindings
+from islands.diagnosis.planning.experiment_plan import plan_experiment
+from islands.diagnosis.procedure import diagnose as run_diagnosis
+from islands.diagnosis.result import Diagnosis
 from islands.errors import SettingsError
 from islands.facade.explain_residual import FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, REPORT_FILE, DiagnosisResult
@@ -30,6 +29,7 @@ from islands.io.result_text.text_layout import wrap
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import ColumnSpec, innermost, parse_spec
 from islands.progress import Steps, StoppedError
+from islands.simulators.interface import Simulator
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from islands.discrepancy.calibration.fit_journal import FitJournal, journal_from_document
+from islands.diagnosis.calibration.fit_journal import FitJournal, journal_from_document
 from islands_api.cli.console import errors
 from islands_api.cli.stop_requests import REPEAT
 

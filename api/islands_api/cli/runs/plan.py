@@ -10,8 +10,8 @@ import typer
 
 from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
-from islands.discrepancy.planning.experiment_plan import DecisiveLimits, ExperimentPlan
-from islands.discrepancy.planning.planned_input import InputForm, InputLimits, PlannedInput
+from islands.diagnosis.planning.experiment_plan import DecisiveLimits, ExperimentPlan
+from islands.diagnosis.planning.planned_input import InputForm, InputLimits, PlannedInput
 from islands.errors import SettingsError, lookup
 from islands.figures.separability import draw_separability
 from islands.figures.style import save

@@ -7,8 +7,8 @@ from typing import Any, TextIO
 
 import structlog
 
-from islands.discrepancy.calibration.fit_journal import FitJournal, journal_from_document
-from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.diagnosis.calibration.fit_journal import FitJournal, journal_from_document
+from islands.diagnosis.result import Diagnosis
 from islands.errors import ModelError
 from islands.evolution.search_state import SearchState
 from islands.io.checkpoints import (

@@ -5,8 +5,8 @@ from time import sleep
 
 import structlog
 
-from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.interim_findings import InterimFindings
+from islands.diagnosis.interim_findings import InterimFindings
+from islands.diagnosis.procedure import diagnose
 from islands.facade.explain_residual import FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.simulator_spec.factory import make_simulator

@@ -22,9 +22,9 @@ from islands.expressions.tree import (
     substitute,
 )
 from islands.models.block import quote_name
-from islands.systems.ode.equation_parser import TIME
-from islands.systems.ode.output_system import SIMULATED
-from islands.systems.ode.system import sort_variables
+from islands.simulators.ode.equation_parser import TIME
+from islands.simulators.ode.output_system import SIMULATED
+from islands.simulators.ode.system import sort_variables
 
 #: Functions that are not functions of every language, and the names of their definitions in programs.
 DEFINED = {

@@ -7,18 +7,10 @@ from math import isinf
 import numpy as np
 
 from islands.data.channel_names import parse_channel_name
-from islands.discrepancy.effects import CATALOGUE, get_summary
-from islands.discrepancy.effects.channels import TEMPERATURES
-from islands.discrepancy.effects.time_variation import GAIN_EFFECTS
-from islands.discrepancy.interfaces.effect import Effect, ForceLaw, SimulationContext, Site
-from islands.discrepancy.interfaces.mapped_input import count_sampled_maps
-from islands.discrepancy.simulators.ode_effects import (
-    LAW_STATE,
-    extend_system,
-    is_term,
-    list_terms,
-    parse_law,
-)
+from islands.effects.catalogue import CATALOGUE, get_summary
+from islands.effects.channels import TEMPERATURES
+from islands.effects.interface.effect import Effect, ForceLaw, SimulationContext, Site
+from islands.effects.time_variation import GAIN_EFFECTS
 from islands.errors import ModelError
 from islands.export.equations.extended_equations import (
     ExtendedEquations,
@@ -35,8 +27,16 @@ from islands.expressions.tree import Apply, Constant, Expression, Primitive, Sym
 from islands.io.simulator_spec.document import read_scales
 from islands.io.simulator_spec.spec_base import EffectSpec
 from islands.io.simulator_spec.specification import ExtendedSpec
-from islands.systems.ode.system import OdeSystem
-from islands.systems.ode.system_parts import OdeEffect
+from islands.simulators.mapped_input import count_sampled_maps
+from islands.simulators.ode.effects import (
+    LAW_STATE,
+    extend_system,
+    is_term,
+    list_terms,
+    parse_law,
+)
+from islands.simulators.ode.system import OdeSystem
+from islands.simulators.ode.system_parts import OdeEffect
 
 #: Signal that is the factor of the gain; no name in equations has brackets.
 GAIN_SIGNAL = "gain(t)"

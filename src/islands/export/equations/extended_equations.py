@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from islands.expressions.tree import Expression
 from islands.models.narx import Model
-from islands.systems.ode.system import OdeSystem
+from islands.simulators.ode.system import OdeSystem
 
 
 @dataclass(frozen=True, slots=True)

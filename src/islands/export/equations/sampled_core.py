@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.discrepancy.simulators.linear import LinearSimulator
 from islands.export.equations.extended_equations import NamedValue, SampledCore
 from islands.export.equations.program_system import refuse
 from islands.expressions.primitives import ADD, MUL, SUB
@@ -14,8 +13,9 @@ from islands.io.models import narx_from_json
 from islands.io.simulator_spec.specification import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
 from islands.models.equations import equation
 from islands.models.narx import measured_model
-from islands.systems.ode.output_system import INPUT, SIMULATED, make_output_system
-from islands.systems.ode.system import OdeSystem
+from islands.simulators.linear import LinearSimulator
+from islands.simulators.ode.output_system import INPUT, SIMULATED, make_output_system
+from islands.simulators.ode.system import OdeSystem
 
 #: Names of the columns that a program reads besides the input: the measured and a simulated output.
 MEASURED, RECORDED = "y_measured", "simulated"

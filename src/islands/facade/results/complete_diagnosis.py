@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from islands.discrepancy.detectability import SelfTest
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.findings import ResidualFormula
+from islands.diagnosis.detectability import SelfTest
+from islands.diagnosis.findings import ResidualFormula
+from islands.diagnosis.result import Diagnosis
 from islands.errors import ModelError, lookup
 from islands.facade.results.notebook_html import render_sentences
 from islands.facade.results.saved_simulation import SavedSimulation

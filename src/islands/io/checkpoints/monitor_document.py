@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from islands.discrepancy.monitoring.record_follower import Alarm, MonitoredRecord, MonitorState
+from islands.diagnosis.monitoring.record_follower import Alarm, MonitoredRecord, MonitorState
 from islands.io.checkpoints.monitor_state import SavedMonitor
 from islands.io.result_text.monitor_text import describe_change
 

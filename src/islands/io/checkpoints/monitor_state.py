@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from islands.discrepancy.monitoring.record_follower import MonitoredRecord, MonitorState
+from islands.diagnosis.monitoring.record_follower import MonitoredRecord, MonitorState
 from islands.errors import SettingsError
 from islands.io.checkpoints.writing import replace_file
 from islands.io.simulator_spec.specification import LocalSpec

@@ -2,12 +2,12 @@
 
 from math import ceil, log10
 
-from islands.discrepancy.detectability import SelfTest
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.findings import ResidualFormula
-from islands.discrepancy.inference.finding import Finding, Value
-from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.surrogates import STRENGTHS
+from islands.diagnosis.detectability import SelfTest
+from islands.diagnosis.findings import ResidualFormula
+from islands.diagnosis.inference.finding import Finding, Value
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.result import Diagnosis
+from islands.diagnosis.surrogates import STRENGTHS
 
 #: Sentence for each verdict.
 _VERDICTS = {

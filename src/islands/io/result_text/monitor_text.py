@@ -1,7 +1,7 @@
 """Records and alarms of a monitor as lines of text."""
 
-from islands.discrepancy.monitoring.change_point import ChangeForm
-from islands.discrepancy.monitoring.record_follower import Alarm, AlarmKind, MonitorState
+from islands.diagnosis.monitoring.change_point import ChangeForm
+from islands.diagnosis.monitoring.record_follower import Alarm, AlarmKind, MonitorState
 
 
 def describe_last_record(state: MonitorState) -> str:

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 
-from islands.discrepancy.planning.alternative_experiments import AlternativeExperiment, choose_cheapest
-from islands.discrepancy.planning.channel_noise import NoiseOrigin
-from islands.discrepancy.planning.decisive_experiment import DecisiveExperiment
-from islands.discrepancy.planning.experiment_plan import ExperimentPlan
-from islands.discrepancy.planning.isolability import REFERENCE_MISFIT, Isolability, IsolabilityRow
+from islands.diagnosis.planning.alternative_experiments import AlternativeExperiment, choose_cheapest
+from islands.diagnosis.planning.channel_noise import NoiseOrigin
+from islands.diagnosis.planning.decisive_experiment import DecisiveExperiment
+from islands.diagnosis.planning.experiment_plan import ExperimentPlan
+from islands.diagnosis.planning.isolability import REFERENCE_MISFIT, Isolability, IsolabilityRow
 from islands.io.result_text.text_layout import WIDTH, wrap
 
 #: A cause is separable as soon as it is detected up to this factor of the smallest detectable strength.

@@ -15,12 +15,12 @@ from pydantic import BeforeValidator, Field, FiniteFloat
 from islands.errors import SettingsError
 from islands.io.simulator_spec.ode_spec import OdeForceSpec, OdeParameterSpec
 from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
-from islands.systems.fmu.fmi_description import read_description
-from islands.systems.fmu.model import FmuModel, FmuParameterChoice, choose_variables
-from islands.systems.fmu.system import make_fmu_system, render_extension
-from islands.systems.ode.equation_parser import MAX_CHARACTERS
-from islands.systems.ode.system import OdeSystem
-from islands.systems.ode.system_document import MAX_PARAMETERS, describe_system, make_force, make_parameter
+from islands.simulators.fmu.fmi_description import read_description
+from islands.simulators.fmu.model import FmuModel, FmuParameterChoice, choose_variables
+from islands.simulators.fmu.system import make_fmu_system, render_extension
+from islands.simulators.ode.equation_parser import MAX_CHARACTERS
+from islands.simulators.ode.system import OdeSystem
+from islands.simulators.ode.system_document import MAX_PARAMETERS, describe_system, make_force, make_parameter
 
 _Name = Annotated[str, Field(min_length=1, max_length=500)]
 

@@ -7,21 +7,10 @@ from typing import Any
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
-from islands.discrepancy.effects import model_form
-from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
-from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.discrepancy.simulators.fmu import FmuSimulator
-from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
-from islands.discrepancy.simulators.linear import LinearSimulator
-from islands.discrepancy.simulators.narx import NarxSimulator
-from islands.discrepancy.simulators.ode import OdeSimulator
-from islands.discrepancy.simulators.output_equation import OutputEquation
-from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
-from islands.discrepancy.simulators.recorded_output import RecordedOutput
-from islands.discrepancy.simulators.saved_extension import SavedExtension
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
+from islands.effects import model_form
+from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, Site
 from islands.io.models import model_json
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.ode_spec import OdeSpec, OutputEquationSpec
@@ -34,6 +23,17 @@ from islands.io.simulator_spec.specification import (
     ModelSpec,
     PhysicalSpec,
 )
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.fmu.simulator import FmuSimulator
+from islands.simulators.interface import Simulator
+from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.linear import LinearSimulator
+from islands.simulators.narx import NarxSimulator
+from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.output_equation import OutputEquation
+from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.saved_extension import SavedExtension
 
 
 def extended_json(fit: CalibrationResult, record: Dataset) -> str:

@@ -14,22 +14,11 @@ from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset, same_dt
 from islands.data.magnitudes import check_magnitudes
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
-from islands.discrepancy.calibration.levenberg_marquardt import calibrate
-from islands.discrepancy.calibration.preparation import estimation_part, make_context, make_target
-from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.segments import fill_gaps
-from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.discrepancy.simulators.fmu import make_fmu_simulator
-from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
-from islands.discrepancy.simulators.linear import LinearSimulator, estimate_linear
-from islands.discrepancy.simulators.narx import NarxSimulator
-from islands.discrepancy.simulators.ode_preparation import make_ode_simulator
-from islands.discrepancy.simulators.output_equation import OutputEquation
-from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
-from islands.discrepancy.simulators.recorded_output import RecordedOutput
-from islands.discrepancy.simulators.saved_extension import SavedExtension
+from islands.data.segments import fill_gaps
+from islands.diagnosis.calibration.levenberg_marquardt import calibrate
+from islands.diagnosis.calibration.preparation import estimation_part, make_context, make_target
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.effect import Effect
 from islands.errors import ModelError, RecordError, SettingsError, lookup, suggest
 from islands.io.models import narx_from_json
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
@@ -50,7 +39,18 @@ from islands.io.simulator_spec.specification import (
 )
 from islands.models.narx import Model, measured_model
 from islands.models.signal_statement import describe_values
-from islands.systems.ode.output_system import SIMULATED
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.fmu.simulator import make_fmu_simulator
+from islands.simulators.interface import Simulator
+from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.linear import LinearSimulator, estimate_linear
+from islands.simulators.narx import NarxSimulator
+from islands.simulators.ode.output_system import SIMULATED
+from islands.simulators.ode.preparation import make_ode_simulator
+from islands.simulators.output_equation import OutputEquation
+from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.saved_extension import SavedExtension
 
 #: Smallest number of samples from which parameters and the initial state are estimated.
 MIN_SAMPLES = 20

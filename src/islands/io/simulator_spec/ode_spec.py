@@ -12,10 +12,10 @@ from pydantic_core import PydanticCustomError
 
 from islands.errors import ModelError, SettingsError
 from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
-from islands.systems.ode.equation_parser import MAX_CHARACTERS
-from islands.systems.ode.output_system import make_output_system
-from islands.systems.ode.system import OdeSystem
-from islands.systems.ode.system_document import (
+from islands.simulators.ode.equation_parser import MAX_CHARACTERS
+from islands.simulators.ode.output_system import make_output_system
+from islands.simulators.ode.system import OdeSystem
+from islands.simulators.ode.system_document import (
     MAX_PARAMETERS,
     MAX_STATES,
     MAX_STEPS,
@@ -153,6 +153,6 @@ class OdeSpec(SimulatorSpec):
 @cache
 def read_built_in(name: str) -> OdeSystem:
     """Return the equations of a built-in simulator."""
-    document = files("islands.systems").joinpath("built_in", f"{name}.toml").read_text(encoding="utf-8")
+    document = files("islands.simulators").joinpath("built_in", f"{name}.toml").read_text(encoding="utf-8")
     system = OdeSpec.model_validate({**tomllib.loads(document), "kind": "ode"}).make_system()
     return replace(system, is_built_in=True)

@@ -24,7 +24,7 @@ from islands.io.simulator_spec.spec_base import (
     SpecModel,
     read_object,
 )
-from islands.systems.ode.system_document import MAX_STATES, MAX_STEPS
+from islands.simulators.ode.system_document import MAX_STATES, MAX_STEPS
 
 #: Name of the file of an extended simulation in the folder of a diagnosis.
 EXTENDED_FILE = "extended.json"
@@ -132,7 +132,7 @@ class LocalExtendedSpec(ExtendedSpec):
     core: "LocalSpec"  # type: ignore[assignment]
 
 
-_ESTIMATORS = "islands.discrepancy.simulators.built_in"
+_ESTIMATORS = "islands.simulators.built_in_estimates"
 _FACTORY = "islands.io.simulator_spec.factory"
 
 _ENTRIES = (

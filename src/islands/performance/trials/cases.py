@@ -5,9 +5,6 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.simulators.narx import NarxSimulator
-from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import refine
@@ -24,6 +21,9 @@ from islands.performance.trials.injection.tanks import TANKS
 from islands.performance.trials.targets import EXACT, IDENTIFIED, Targets
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
+from islands.simulators.interface import Simulator
+from islands.simulators.narx import NarxSimulator
+from islands.simulators.recorded_output import RecordedOutput
 
 #: Parameter constraint of the identified actuator: the output stays constant under a constant input.
 _CONSTRAINT = "hysteresis"

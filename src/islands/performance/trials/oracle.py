@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, calibrate
-from islands.discrepancy.calibration.preparation import select_effects
-from islands.discrepancy.calibration.target import Target
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.effects import catalogue_order, model_form
-from islands.discrepancy.inference.screening import transfer_parameters
-from islands.discrepancy.interfaces.effect import Effect
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.diagnosis.calibration.preparation import select_effects
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.screening import transfer_parameters
+from islands.diagnosis.result import Diagnosis
+from islands.effects import model_form
+from islands.effects.catalogue import catalogue_order
+from islands.effects.interface.effect import Effect
 
 #: Number of starting points of each effect that are fitted, the most promising ones.
 _STARTS = 3

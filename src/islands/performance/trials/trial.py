@@ -5,16 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.discovery.missing_terms import MISSING_TERM
-from islands.discrepancy.effects import CATALOGUE, model_form
-from islands.discrepancy.effects.free_forms import FREE_FORMS
-from islands.discrepancy.interfaces.simulator import Simulator
+from islands.diagnosis.discovery.missing_terms import MISSING_TERM
+from islands.diagnosis.procedure import diagnose
+from islands.effects import model_form
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.free_forms import FREE_FORMS
 from islands.errors import RecordError
 from islands.performance.trials.cases import CASES, SimulatedCase
 from islands.performance.trials.injection.measurement import FaultyRecord, inject
 from islands.performance.trials.injection.piezo import PIEZO
 from islands.performance.trials.oracle import compute_gain_share
+from islands.simulators.interface import Simulator
 
 #: Stated tolerances of the piezo's parameters.
 TOLERANCE = PIEZO.tolerance

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.inference.verdict import Verdict
+from islands.diagnosis.inference.verdict import Verdict
 from islands.expressions.parsing import parse
 from islands.facade import explain_residual as module
 from islands.models.narx import make_model

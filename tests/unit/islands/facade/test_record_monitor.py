@@ -7,7 +7,7 @@ import pytest
 import scipy
 from benchmarks.monitor import run
 
-from islands.discrepancy.monitoring.record_follower import AlarmKind, MonitorSettings
+from islands.diagnosis.monitoring.record_follower import AlarmKind, MonitorSettings
 from islands.errors import RecordError, SettingsError
 from islands.facade.record_monitor import monitor_record
 from islands.io.checkpoints.monitor_document import describe_alarm, describe_status, monitor_document

@@ -2,7 +2,7 @@
 
 import pytest
 
-from islands.discrepancy.monitoring.record_follower import MonitorSettings, MonitorState
+from islands.diagnosis.monitoring.record_follower import MonitorSettings, MonitorState
 from islands.figures.monitored_states import draw_monitored_states
 from support.monitored_oscillator import ONSET, follow, make_records, undisturbed_monitor
 

@@ -6,8 +6,8 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.planning.isolability import DetectableStrength, Isolability, IsolabilityRow
+from islands.diagnosis.planning.isolability import DetectableStrength, Isolability, IsolabilityRow
+from islands.effects.catalogue import CATALOGUE
 from islands.figures.separability import draw_separability
 
 WEAKEST = DetectableStrength(0.1, 0.01, 1.0, "V")

@@ -8,11 +8,11 @@ import pytest
 import scipy
 
 import islands
-from islands.discrepancy.detectability import SelfTest, estimate_rate
-from islands.discrepancy.diagnosis_result import Diagnosis
-from islands.discrepancy.discovery.missing_terms import Discovery
-from islands.discrepancy.inference.finding import Value
-from islands.discrepancy.inference.verdict import Verdict
+from islands.diagnosis.detectability import SelfTest, estimate_rate
+from islands.diagnosis.discovery.missing_terms import Discovery
+from islands.diagnosis.inference.finding import Value
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.result import Diagnosis
 from islands.io.result_text.diagnosis_text import summarise_diagnosis, summarise_self_test
 from islands.reports.diagnosis import diagnosis_report
 

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.monitoring.alarm_rate import DEFAULT_RATE
-from islands.discrepancy.monitoring.record_follower import TRAINING
+from islands.diagnosis.monitoring.alarm_rate import DEFAULT_RATE
+from islands.diagnosis.monitoring.record_follower import TRAINING
 from islands.errors import IslandsError, SettingsError
 from islands.facade.record_monitor import (
     create_monitor,

@@ -2,7 +2,7 @@
 
 import re
 
-from islands.discrepancy.interfaces.segments import MAX_RANGE_AT_REST
+from islands.data.segments import MAX_RANGE_AT_REST
 from islands.export.equations.c.core import write_c_core
 from islands.export.equations.c.operators import C_OPERATORS
 from islands.export.equations.c.signals import find_unused, write_signals
@@ -27,7 +27,7 @@ from islands.export.equations.equation_collection import CHANNEL_OPERATORS
 from islands.export.equations.extended_equations import ExtendedEquations, SignalMap
 from islands.expressions.printing import render
 from islands.expressions.tree import Symbol
-from islands.systems.ode.output_system import SIMULATED
+from islands.simulators.ode.output_system import SIMULATED
 
 
 def c_equations(equations: ExtendedEquations) -> str:

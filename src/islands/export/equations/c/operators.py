@@ -1,4 +1,4 @@
-"""Operators of maps as C functions; see `islands.discrepancy.interfaces.map_equation.OPERATORS`.
+"""Operators of maps as C functions; see `islands.effects.interface.map_equation.OPERATORS`.
 
 Each function writes its result for the signal ``x`` to ``z``, or returns a number.
 """

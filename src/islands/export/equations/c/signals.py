@@ -4,12 +4,12 @@ import re
 import textwrap
 from collections.abc import Sequence
 
-from islands.discrepancy.simulators.intersample import REACH, design_low_pass
 from islands.export.equations.equation_code import EquationCode
 from islands.export.equations.extended_equations import ExtendedEquations
 from islands.expressions.printing import render
 from islands.expressions.tree import RATE, Apply, Expression, Symbol
-from islands.systems.ode.equation_parser import TIME
+from islands.simulators.intersample import REACH, design_low_pass
+from islands.simulators.ode.equation_parser import TIME
 
 _INTERPOLATE = """\
 /* Return a signal that is linear between its samples, a part of a step after the start of the step. */

@@ -2,7 +2,7 @@
 
 import re
 
-from islands.discrepancy.interfaces.segments import MAX_RANGE_AT_REST
+from islands.data.segments import MAX_RANGE_AT_REST
 from islands.export.equations.equation_code import EquationCode, make_step
 from islands.export.equations.equation_collection import CHANNEL_OPERATORS
 from islands.export.equations.extended_equations import ExtendedEquations, SignalMap
@@ -22,7 +22,7 @@ from islands.export.equations.matlab.templates import (
     SAMPLED_LOOP,
 )
 from islands.expressions.tree import Symbol
-from islands.systems.ode.output_system import SIMULATED
+from islands.simulators.ode.output_system import SIMULATED
 
 #: Functions that are complex outside the domain of real numbers.
 _REAL = {"sqrt": "root", "log": "logarithm", "pow": "raise"}

@@ -1,4 +1,4 @@
-"""Operators of maps as MATLAB functions; see `islands.discrepancy.interfaces.map_equation.OPERATORS`.
+"""Operators of maps as MATLAB functions; see `islands.effects.interface.map_equation.OPERATORS`.
 
 Each function returns its result for the signal ``x``, a column.
 """

@@ -1,11 +1,11 @@
 """Signals between the samples in MATLAB: the input, its gain, channels, their rates and delays."""
 
-from islands.discrepancy.simulators.intersample import REACH, design_low_pass
 from islands.export.equations.equation_code import EquationCode
 from islands.export.equations.extended_equations import ExtendedEquations
 from islands.expressions.printing import render
 from islands.expressions.tree import RATE, Apply, Expression, Symbol
-from islands.systems.ode.equation_parser import TIME
+from islands.simulators.intersample import REACH, design_low_pass
+from islands.simulators.ode.equation_parser import TIME
 
 _INTERPOLATE = """\
 function value = interpolate(x, step, part, c)

@@ -7,7 +7,7 @@ from islands.export.equations.common_parts import take_common_parts
 from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
 from islands.expressions.printing import render
-from islands.systems.curve import VALUES, write_curve
+from islands.kernels.curve import VALUES, write_curve
 
 
 def test_a_part_that_occurs_twice_is_computed_once():

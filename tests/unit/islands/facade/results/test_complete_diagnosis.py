@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 import islands
-from islands.discrepancy.inference.verdict import Verdict
+from islands.diagnosis.inference.verdict import Verdict
 from islands.io.records import write_record
 from support.command_line import succeed
 

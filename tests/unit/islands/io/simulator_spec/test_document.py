@@ -8,15 +8,12 @@ import pytest
 from pydantic import ValidationError
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
-from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
-from islands.discrepancy.calibration.target import Target
-from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.effects import CATALOGUE, catalogue_order
-from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.discrepancy.simulators.ode import OdeSimulator
-from islands.discrepancy.simulators.saved_extension import SavedExtension
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.procedure import diagnose
+from islands.effects.catalogue import CATALOGUE, catalogue_order
+from islands.effects.interface.effect import Effect
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.export.extension import as_json
 from islands.io.simulator_spec.document import describe_extension, extended_document, extended_json
@@ -28,6 +25,9 @@ from islands.io.simulator_spec.specification import (
     innermost,
     parse_spec,
 )
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.saved_extension import SavedExtension
 from support.simulated_records import SpecAndRecord, made, names
 
 NAMES = names()

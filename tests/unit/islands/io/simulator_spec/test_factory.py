@@ -9,8 +9,7 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.data.preprocessing import preprocess
-from islands.discrepancy.calibration.preparation import make_context
-from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.diagnosis.calibration.preparation import make_context
 from islands.errors import RecordError
 from islands.expressions.parsing import parse
 from islands.io.models import model_json
@@ -19,6 +18,7 @@ from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import ModelSpec
 from islands.models.narx import make_model
 from islands.simulation.predictors import free_run
+from islands.simulators.extended import ExtendedSimulator
 
 DT = 0.01
 

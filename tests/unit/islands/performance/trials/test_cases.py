@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
-from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.diagnosis_result import Diagnosis
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.diagnosis.procedure import diagnose
+from islands.diagnosis.result import Diagnosis
 from islands.performance.trials.cases import CASES, identify_actuator
 from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.injection.piezo import PIEZO

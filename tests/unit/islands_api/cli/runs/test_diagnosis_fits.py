@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.fit_journal import FitJournal
-from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.inference.screening import StartFinder
-from islands.discrepancy.simulators.recorded_output import RecordedOutput
+from islands.diagnosis.calibration.fit_journal import FitJournal
+from islands.diagnosis.inference.screening import StartFinder
+from islands.diagnosis.procedure import diagnose
+from islands.effects.catalogue import CATALOGUE
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.parallel import ParallelMap
+from islands.simulators.recorded_output import RecordedOutput
 from islands_api.cli.runs.diagnosis_fits import CONTINUE, FITS, explain_continuation, keep_fits, write_fits
 from islands_api.cli.stop_requests import REPEAT
 from support.simulated_records import recorded, wave

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands.discrepancy.planning import decisive_experiment, experiment_setup
-from islands.discrepancy.planning.planned_input import InputForm
+from islands.diagnosis.planning import decisive_experiment, experiment_setup
+from islands.diagnosis.planning.planned_input import InputForm
 from islands.errors import SettingsError
 from islands.io.records import read_record
 from islands.io.records.writer import write_input

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from sqlalchemy import update
 
-from islands.discrepancy.inference import noise_floor
+from islands.diagnosis.inference import noise_floor
 from islands.evolution import engine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.search_state import SearchState

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands.discrepancy.inference import noise_floor
+from islands.diagnosis.inference import noise_floor
 from islands.errors import RecordError, SettingsError
 from islands.facade.explain_residual import FORMULA
 from islands_service.coordinator.diagnosis import job as diagnosis_job

@@ -9,10 +9,9 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
-from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.interfaces.effect import Site
-from islands.discrepancy.interfaces.map_equation import OPERATORS
-from islands.discrepancy.simulators.ode import OdeSimulator
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.effect import Site
+from islands.effects.interface.map_equation import OPERATORS
 from islands.export.equations.c.operators import C_OPERATORS
 from islands.export.equations.equation_collection import CHANNEL_OPERATORS
 from islands.export.equations.matlab.operators import MATLAB_OPERATORS
@@ -21,8 +20,9 @@ from islands.export.fmu.compiler import find_compiler
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.io.simulator_spec.specification import LocalExtendedSpec
-from islands.systems.ode.system import OUTPUT
-from islands.systems.ode.system_parts import OdeParameter
+from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.ode.system import OUTPUT
+from islands.simulators.ode.system_parts import OdeParameter
 from support.equation_programs import compare, extend, fix_states, list_effects, run_c
 from support.simulated_records import EQUATIONS, made, recorded, wave
 

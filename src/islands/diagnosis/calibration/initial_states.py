@@ -1,0 +1,36 @@
+"""Initial states of recordings that the estimation part does not determine."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from islands.data.segments import find_bounds
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, evaluate_fit
+from islands.diagnosis.calibration.target import Target
+
+
+def fit_initial_states(fit: CalibrationResult, target: Target, first_sample: int) -> CalibrationResult:
+    """Fit the initial states of the recordings after the first one that begin at ``first_sample`` or later.
+
+    All other parameters keep their values. Other recordings do not predict the initial state of a recording
+    in the hold-out part; with a wrong one, the errors would be those of the transient.
+
+    Parameters
+    ----------
+    fit : CalibrationResult
+    target : Target
+        Target of the fit; the states are fitted to the unweighted output of their recordings.
+    """
+    simulation = fit.simulation
+    bounds = find_bounds(simulation.context.segments, target.y.size)
+    recordings = [index for index, (first, _) in enumerate(bounds) if index and first >= first_sample]
+    is_state = np.isin(simulation.recordings, recordings)
+    if not is_state.any():
+        return fit
+    is_fitted = np.zeros(target.y.size, dtype=bool)
+    for index in recordings:
+        is_fitted[slice(*bounds[index])] = True
+    is_fitted &= ~np.isnan(target.y)
+    of_states = replace(target, noise=None, estimation_part=is_fitted, prior_std={})
+    values = calibrate(simulation, of_states, fit.values, is_fixed=~is_state).values
+    return evaluate_fit(simulation, target, values)

@@ -1,0 +1,92 @@
+"""Selection of the intersample behaviour and the step size of a simulator, before effects are screened.
+
+Errors of either imitate physics: a wrong intersample behaviour looks like a delay, too coarse a step looks
+like damping.
+"""
+
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.diagnosis.calibration.target import Target
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.interface import Simulator
+from islands.simulators.intersample import InterSample, ResampledSimulator
+
+#: Maximum number of steps per sample.
+MAX_OVERSAMPLING = 32
+
+#: Largest accepted RMS change of the output when the step is halved, relative to the RMS of the residual.
+MAX_STEP_ERROR = 0.05
+
+#: Largest ratio of the changes by two successive halvings of a step, if smaller steps improve the output.
+MAX_CHANGE_RATIO = 0.7
+
+#: Least decrease of minus twice the log-likelihood for which another intersample behaviour is selected.
+MIN_IMPROVEMENT = 10.0
+
+#: Intersample behaviour, and number of steps in a sample.
+Discretisation: TypeAlias = tuple[InterSample, int]
+
+
+def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
+    """Return the simulator of a fit with the intersample behaviour and the step size that suit the record."""
+    simulator = fit.simulation.simulator
+    if not simulator.is_continuous_time:
+        return simulator
+    inner, current = (
+        (simulator.simulator, simulator.intersample)
+        if isinstance(simulator, ResampledSimulator)
+        else (simulator, InterSample.FOH)
+    )
+    tried = {}
+    for intersample in (current, *(each for each in InterSample if each != current)):
+        candidate = _refine_steps(inner, intersample, fit)
+        refitted = calibrate(_with_simulator(fit.simulation, candidate), target, fit.values)
+        tried[intersample] = (refitted.score, candidate)
+    best = min(tried, key=lambda intersample: tried[intersample][0])
+    return tried[best if tried[best][0] < tried[current][0] - MIN_IMPROVEMENT else current][1]
+
+
+def get_discretisation(simulator: Simulator) -> Discretisation:
+    """Return the discretisation of a simulator."""
+    return (
+        (simulator.intersample, simulator.oversampling)
+        if isinstance(simulator, ResampledSimulator)
+        else (InterSample.FOH, 1)
+    )
+
+
+def _with_simulator(simulation: ExtendedSimulator, simulator: Simulator) -> ExtendedSimulator:
+    return replace(simulation, simulator=simulator)
+
+
+def _refine_steps(inner: Simulator, intersample: InterSample, fit: CalibrationResult) -> Simulator:
+    """Halve the step until the change of the output is small compared with the residual.
+
+    A change that does not decrease is no error of the integration: the simulation is chaotic, or states of
+    shooting intervals are at another minimum. The step then remains as it is.
+    """
+    accepted = MAX_STEP_ERROR * float(np.sqrt(fit.mean_square))
+    oversampling, before = 1, np.inf
+    resampled = ResampledSimulator(inner, intersample, oversampling)
+    coarse = _with_simulator(fit.simulation, resampled).simulate(fit.values)
+    while oversampling < MAX_OVERSAMPLING:
+        resampled = ResampledSimulator(inner, intersample, 2 * oversampling)
+        fine = _with_simulator(fit.simulation, resampled).simulate(fit.values)
+        with np.errstate(over="ignore", invalid="ignore"):
+            change = float(np.sqrt(np.mean((fine - coarse) ** 2)))
+        if change > MAX_CHANGE_RATIO * before:
+            oversampling = 1
+            break
+        if change < accepted:
+            break
+        oversampling, coarse = 2 * oversampling, fine
+        before = change if np.isfinite(change) else np.inf
+    return (
+        inner
+        if oversampling == 1 and intersample == InterSample.FOH
+        else ResampledSimulator(inner, intersample, oversampling)
+    )

@@ -1,0 +1,189 @@
+"""Candidate terms of an equation: small expressions of states, input, the rate of the input, and time.
+
+The output of an FMU, or of a simulation without equations, is one more signal, in terms that are added to
+it.
+"""
+
+import itertools
+from collections.abc import Iterator, Mapping, Set
+from dataclasses import dataclass
+
+import numpy as np
+
+from islands.diagnosis.discovery.term_unit import divide_units, find_expression_unit, find_factor_unit
+from islands.expressions.evaluation import evaluate
+from islands.expressions.parsing import parse_expression
+from islands.expressions.printing import render
+from islands.expressions.tree import FMU, Apply, Expression, Symbol, find_symbols, substitute
+from islands.simulators.ode.equation_parser import TIME
+from islands.simulators.ode.system import OUTPUT, OdeSystem
+from islands.simulators.ode.system_parts import OdeParameter
+
+#: Functions of one signal ``a``.
+UNARY = ("a", "a**2", "a**3", "a**5", "abs(a)", "abs(a)*a", "sign(a)", "max(a, 0)", "sqrt(abs(a))*sign(a)")
+
+#: Functions of the rate ``a`` of the input.
+RATE_FORMS = ("a", "abs(a)", "sign(a)", "abs(a)*a", "a**3")
+
+#: Factors of products of two signals.
+FACTORS = ("a", "a**2", "abs(a)", "sign(a)")
+
+#: Factors of the rate in its products with the factors of the input, for damping and friction that depend on
+#: the position where the input is the coordinate.
+RATE_FACTORS = ("a", "abs(a)", "sign(a)")
+
+#: Largest number of signals of which products are candidates: these grow with the cube of the number.
+MAX_MULTIPLIED_SIGNALS = 8
+
+#: Functions with a scale that is fitted, and its nominal value relative to the largest value of their signal:
+#: a saturation, and two forms of the Stribeck curve (Armstrong-Helouvry, Dupont and Canudas de Wit, A survey
+#: of models, analysis tools and compensation methods for the control of machines with friction, 1994).
+SCALED_FORMS = {
+    "tanh({signal}/{scale})": 0.3,
+    "sign({signal})*exp(-abs({signal}/{scale}))": 0.1,
+    "sign({signal})*exp(-({signal}/{scale})**2)": 0.1,
+}
+
+#: Further scales from which a fit starts, relative to the nominal one.
+STARTING_SCALES = (0.3, 3.0)
+
+#: Nominal value and bound of a coefficient, relative to that of a term as large as the rest of its equation.
+NOMINAL, LIMIT = 1e-3, 1e4
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateTerm:
+    """A term that may be missing, without its coefficient.
+
+    Attributes
+    ----------
+    target : str
+        State to whose derivative the term is added, or ``output``.
+    text : str
+        Expression, with ``{scale}`` for a scale that is fitted.
+    size : float
+        Typical largest value of the expression.
+    scale : float or None
+        Nominal scale; None if the expression has none.
+    unit, scale_unit : str
+        Units of the coefficient and of the scale; empty if they are not known.
+    """
+
+    target: str
+    text: str
+    size: float
+    scale: float | None = None
+    unit: str = ""
+    scale_unit: str = ""
+
+    @property
+    def value_count(self) -> int:
+        """Number of values that are fitted: the coefficient, and the scale if there is one."""
+        return 1 if self.scale is None else 2
+
+    def name_parameters(self, number: int) -> tuple[str, ...]:
+        """Return the names of the coefficient, and of the scale if there is one, of a numbered term."""
+        return (f"a{number}", f"s{number}")[: self.value_count]
+
+    def add_to(self, system: OdeSystem, number: int, target_size: float) -> OdeSystem:
+        """Return a system with this term.
+
+        Parameters
+        ----------
+        number : int
+            Number of the term in the names of its parameters.
+        target_size : float
+            Largest absolute value of the right-hand side, for the bounds of the coefficient.
+        """
+        coefficient, *scales = self.name_parameters(number)
+        size = target_size / self.size
+        # The typical change of a parameter is relative to its nominal value, which is therefore not zero.
+        parameters = [
+            OdeParameter(coefficient, NOMINAL * size, self.unit, lower=-LIMIT * size, upper=LIMIT * size),
+        ]
+        parameters += [
+            OdeParameter(name, self.scale, self.scale_unit) for name in scales if self.scale is not None
+        ]
+        text = self.text.format(scale="".join(scales))
+        return system.with_term(self.target, f"{coefficient}*({text})", parameters)
+
+
+def find_free_numbers(used: Set[str], count: int) -> list[int]:
+    """Return the smallest numbers of terms whose parameters have names that are not used."""
+    free = (number for number in itertools.count(1) if not {f"a{number}", f"s{number}"} & used)
+    return list(itertools.islice(free, count))
+
+
+def list_candidate_terms(
+    system: OdeSystem, sizes: Mapping[str, float], duration: float, units: Mapping[str, str]
+) -> tuple[CandidateTerm, ...]:
+    """Return the candidate terms of a system.
+
+    Equations that only define a rate, such as ``dx/dt = v``, get no terms: they are definitions.
+
+    Parameters
+    ----------
+    sizes : mapping
+        Largest absolute values of the states, of the input, and of its rate (``rate(u)``).
+    duration : float
+        Duration of the record in seconds.
+    units : mapping
+        Units of the states, of the input, and of the output (``output``); empty if they are not known.
+    """
+    states = [name for name, _ in system.derivatives]
+    # Only the output can depend on the output of an FMU or of another simulation.
+    outputs = [render(Apply(FMU, (Symbol(name),))) for name in system.of_fmu if name not in states]
+    outputs += system.simulated
+    rate = f"rate({system.input})"
+    values, units = {**sizes, TIME: duration}, {**units, TIME: "s"}
+    terms = []
+    for target in (*system.balances, OUTPUT):
+        own = system.output if target == OUTPUT else dict(system.derivatives)[target]
+        unit = units.get(target, "") if target == OUTPUT else divide_units(units.get(target, ""), "s")
+        signals = [*states, *(outputs if target == OUTPUT else ()), system.input]
+        for text in dict.fromkeys(_list_texts(signals, rate)):
+            expression = parse_expression(text)
+            # Calibration absorbs gains, which a simulation without equations may have anywhere.
+            is_gain = bool(system.simulated) and expression == Symbol(system.input)
+            if is_gain or render(expression) == render(own):
+                continue
+            size, own_unit = _compute_size(expression, values), find_factor_unit(unit, expression, units)
+            terms.append(CandidateTerm(target, text, size, unit=own_unit))
+        for signal in signals:
+            scale_unit = find_expression_unit(parse_expression(signal), units)
+            for form, scale in SCALED_FORMS.items():
+                text = form.format(signal=signal, scale="{scale}")
+                terms.append(CandidateTerm(target, text, 1.0, scale * sizes[signal], unit, scale_unit))
+    return tuple(terms)
+
+
+def _list_texts(signals: list[str], rate: str) -> Iterator[str]:
+    for signal in signals:
+        yield from (_insert(form, signal) for form in UNARY)
+    yield from (_insert(form, rate) for form in RATE_FORMS)
+    yield TIME
+    for signal in signals:
+        yield f"{TIME}*{signal}"
+        yield f"{rate}*{signal}"
+        yield f"abs({rate})*{signal}"
+    for first, second in itertools.product(RATE_FACTORS, FACTORS):
+        yield f"{_insert(first, rate)}*{_insert(second, signals[-1])}"
+    if len(signals) > MAX_MULTIPLIED_SIGNALS:
+        return
+    for one, other in itertools.combinations(signals, 2):
+        for first in FACTORS:
+            for second in FACTORS:
+                yield f"{_insert(first, one)}*{_insert(second, other)}"
+    for three in itertools.combinations(signals, 3):
+        yield "*".join(three)
+
+
+def _insert(form: str, signal: str) -> str:
+    """Write a form with a signal in place of ``a``."""
+    return render(substitute(parse_expression(form), {"a": parse_expression(signal)}))
+
+
+def _compute_size(expression: Expression, values: Mapping[str, float]) -> float:
+    """Return the value of an expression at the largest values of its signals."""
+    found = abs(float(evaluate(expression, {**dict.fromkeys(find_symbols(expression), 1.0), **values})))
+    return found if np.isfinite(found) and found > 0.0 else 1.0

@@ -1,0 +1,251 @@
+"""Discovery of missing terms: equations with more terms that explain a record better than the catalogue."""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from islands.diagnosis.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    estimate_deviations,
+    evaluate_fit,
+)
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.joint_search import JointResult, search_jointly
+from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
+from islands.diagnosis.inference.confidence import CONFIDENCE_TEMPERATURE
+from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN, Finding, Rival, Value
+from islands.diagnosis.inference.holdout import (
+    bound_reduction,
+    compute_holdout_errors,
+    cross_validate_gain,
+)
+from islands.diagnosis.inference.hypothesis import Hypothesis
+from islands.diagnosis.inference.screening import bic_penalty
+from islands.diagnosis.inference.strategies import SearchOutcome, analyse_residual
+from islands.diagnosis.inference.verdict import Verdict, explained_fraction
+from islands.diagnosis.run import DiagnosisRun
+from islands.simulators.output_equation import OutputEquation
+
+#: Part of the gain of the terms by which they have to be better than effects. The catalogue has one form of
+#: each effect, and another one, such as a sign for a smoothed sign, is no other cause.
+MIN_RELATIVE_GAIN = 0.1
+
+#: Terms that are the law of an effect, which the catalogue has smoothed, as regular expressions.
+SMOOTHED_LAWS = {"coulomb-friction": r"sign\([^*]*\)"}
+
+#: Name and family of a discovered term in findings.
+MISSING_TERM, FAMILY = "missing-term", "discovered"
+
+
+@dataclass(frozen=True, slots=True)
+class Discovery:
+    """Equations with missing terms, and the nearest effects of the catalogue.
+
+    Attributes
+    ----------
+    equations : str
+        Extended equations, and the values of their new parameters.
+    effects : tuple of str
+        Names of the effects that act in addition to the terms.
+    nearest : tuple of str
+        Names of the effects that explain the record best without the terms, except those in ``effects``.
+    worse_by : float
+        Difference between the score of the effects and that of the equations; negative if effects without
+        terms explain the record better.
+    """
+
+    equations: str
+    effects: tuple[str, ...]
+    nearest: tuple[str, ...]
+    worse_by: float
+
+
+@dataclass(frozen=True, slots=True)
+class MissingTerms:
+    """Result of a search for missing terms, compared with the effects of the catalogue.
+
+    Attributes
+    ----------
+    search : TermSearchResult
+    discovery : Discovery
+    outcome : SearchOutcome or None
+        Effects that act in addition to the terms.
+    """
+
+    search: TermSearchResult
+    discovery: Discovery
+    outcome: SearchOutcome | None = None
+
+    @property
+    def rival(self) -> Rival | None:
+        """Missing terms as an alternative of the effects, at most as good; None if they are the same law.
+
+        If they were better by more than another form of an effect, they would replace it.
+        """
+        law = SMOOTHED_LAWS.get(" ".join(self.discovery.nearest))
+        if law is not None and all(re.fullmatch(law, each.term.text) for each in self.search.terms):
+            return None
+        lead = min(self.discovery.worse_by, 0.0)
+        return Rival(MISSING_TERM, self.search.fit, lead, len(self.search.terms), self.search.effects)
+
+    def is_better(self, alone: SearchOutcome) -> bool:
+        """Return whether the terms explain clearly more than effects alone."""
+        found, hypothesis = self.search, alone.hypothesis
+        margin = max(EQUIVALENCE_MARGIN, MIN_RELATIVE_GAIN * found.gain)
+        if any(effect.is_free for effect in hypothesis.effects):
+            margin = 0.0  # A formula is preferred to a curve that explains as much.
+        else:
+            values = sum(len(term.parameters) for term in found.terms)
+            if values + _count_values(found.fit) < _count_values(hypothesis.fit):
+                margin = EQUIVALENCE_MARGIN  # Effects with more values are no idealisation of the terms.
+        return self.discovery.worse_by >= margin
+
+
+def find_missing_terms(
+    base: CalibrationResult,
+    alone: SearchOutcome,
+    target: Target,
+    run: DiagnosisRun,
+) -> MissingTerms | None:
+    """Search for missing terms, and compare them with the effects of the catalogue.
+
+    Effects in addition to the terms are searched for if a single effect does not explain the record as well.
+
+    Parameters
+    ----------
+    base : CalibrationResult
+        The simulation without effects, calibrated to unweighted residuals.
+    alone : SearchOutcome
+        Outcome of the search for effects. If it has none, the nearest one is the best of those screened.
+    target : Target
+        Target of ``base``.
+    run : DiagnosisRun
+
+    Returns
+    -------
+    MissingTerms or None
+        None if no term gains enough.
+    """
+    effects_alone = _score_effects(alone, base, target)
+    found = search_terms(base, target, run, effects_alone.cost)
+    terms = None if found is None else _compare(JointResult(found), effects_alone)
+    if alone.target.effective_samples is not None:
+        return terms  # A search with model error has no noise model that further effects could whiten.
+    is_better = terms is not None and terms.is_better(alone)
+    if not is_better and len(alone.hypothesis.effects) == 1 and alone.verdict == Verdict.NAMED:
+        return terms
+    if terms and is_better and _is_contradicted(terms.search.fit, effects_alone.fit, target, run.rng):
+        return terms
+    joint = search_jointly(found, base, alone, effects_alone.cost, target, run)
+    if joint is None:
+        return terms
+    together = _compare(joint, effects_alone)
+    if terms is None or (together.is_better(alone), -joint.terms.cost) > (is_better, -terms.search.cost):
+        return together
+    return terms
+
+
+def explain_all(base: CalibrationResult, target: Target, run: DiagnosisRun, seed: int) -> bool:
+    """Return whether missing terms at the output of a simulation leave nothing but noise.
+
+    It is for simulations without equations, whose terms are found in a tenth of the time that the search with
+    model error takes. Of other simulations it returns False.
+
+    Parameters
+    ----------
+    base, target, run
+        Arguments of `find_missing_terms`.
+    seed : int
+        Seed of the surrogates of the residual.
+    """
+    if not isinstance(base.simulation.simulator, OutputEquation):
+        return False
+    found = search_terms(base, target, run)
+    if found is None:
+        return False
+    return not analyse_residual(found.fit, target, np.random.default_rng(seed)).is_structured
+
+
+def _is_contradicted(
+    after: CalibrationResult, before: CalibrationResult, target: Target, rng: np.random.Generator
+) -> bool:
+    """Return whether a fit with the better score has the larger error in the hold-out part.
+
+    The residual is then no noise, and scores of further terms say nothing.
+    """
+    old, new = (compute_holdout_errors(each, target) for each in (before, after))
+    return bound_reduction(old, new, rng)[1] < 0.0
+
+
+def _score_effects(alone: SearchOutcome, base: CalibrationResult, target: Target) -> Hypothesis:
+    """Return the effects alone, or the nearest one if there are none, with their cost for a target."""
+    hypothesis = alone.hypothesis
+    nearest = [] if hypothesis.effects else [each for each in alone.screened if not each.effect.is_free][:1]
+    effects = hypothesis.effects or tuple(each.effect for each in nearest)
+    fit = nearest[0].fit if nearest else hypothesis.fit
+    # The scores of a search with model error count other samples.
+    scored = evaluate_fit(fit.simulation, target, fit.values)
+    return Hypothesis(scored, scored.score + sum(bic_penalty(effect, base) for effect in effects), effects)
+
+
+def _compare(joint: JointResult, alone: Hypothesis) -> MissingTerms:
+    """Compare terms with effects alone."""
+    terms = joint.terms
+    added, replaced = (
+        tuple(dict.fromkeys(effect.cause for effect in each))
+        for each in (terms.effects, [effect for effect in alone.effects if effect not in terms.effects])
+    )
+    discovery = Discovery(terms.describe(), added, replaced, alone.cost - terms.cost)
+    return MissingTerms(terms, discovery, joint.outcome)
+
+
+def replaces_effects(
+    terms: MissingTerms,
+    base: CalibrationResult,
+    alone: SearchOutcome,
+    target: Target,
+    rng: np.random.Generator,
+) -> bool:
+    """Return whether missing terms explain clearly more than effects, also on blocks that are left out.
+
+    Parameters
+    ----------
+    base, alone, target
+        Arguments of `find_missing_terms`.
+    """
+    if not terms.is_better(alone):
+        return False
+    return cross_validate_gain(base, False, terms.search.fit, target, rng) > 0.0
+
+
+def _count_values(fit: CalibrationResult) -> int:
+    """Count the values of the effects of a fit, without initial states."""
+    context, effects = fit.simulation.context, fit.simulation.effects
+    return sum(not parameter.initial for effect in effects for parameter in effect.parameters(context))
+
+
+def describe_terms(
+    found: TermSearchResult, discovery: Discovery, base: CalibrationResult, target: Target, floor: float
+) -> tuple[Finding, ...]:
+    """Return a finding for each term.
+
+    Parameters
+    ----------
+    floor : float
+        Mean square of the noise.
+    """
+    fit = found.fit
+    deviations = estimate_deviations(fit, target)
+    places = {parameter.name: index for index, parameter in enumerate(fit.simulation.parameters)}
+    confidence = 1.0 / (1.0 + float(np.exp(-discovery.worse_by / (2 * CONFIDENCE_TEMPERATURE))))
+    findings = []
+    for each in found.terms:
+        values = {}
+        for name in each.parameters:
+            value, half = float(fit.values[places[name]]), 1.96 * float(deviations[places[name]])
+            unit = fit.simulation.parameters[places[name]].unit
+            values[name] = Value(value, unit, (value - half, value + half))
+        share = explained_fraction(base, fit, floor)
+        findings.append(Finding(MISSING_TERM, FAMILY, confidence, (), values, each.gain, share))
+    return tuple(findings)

@@ -1,0 +1,107 @@
+"""Ranking of candidate terms by the part of the residual that they explain."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
+from islands.diagnosis.calibration.projection import Projection
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.candidate_terms import CandidateTerm, find_free_numbers
+from islands.diagnosis.discovery.equation_simulator import add_terms, find_used_names, get_system
+from islands.effects.interface.context import Signal
+from islands.parallel import ParallelMap
+
+#: Number of terms whose responses are simulated in one call. The equations of every lane contain all of them:
+#: more terms in a call save nothing.
+TERMS_PER_CALL = 8
+
+#: Ratio of the parts of the residual that a response and a linear response explain, from which the former is
+#: another one.
+MIN_NONLINEAR_GAIN = 1.1
+
+
+class RankedTerm(NamedTuple):
+    """A term, and estimates of its coefficient at which it explains more than its linear response."""
+
+    term: CandidateTerm
+    coefficients: tuple[float, ...]
+
+
+def rank_terms(
+    fit: CalibrationResult,
+    targets: Sequence[Target],
+    candidates: Sequence[CandidateTerm],
+    target_sizes: Mapping[str, float],
+    parallel_map: ParallelMap,
+) -> list[RankedTerm]:
+    """Return the terms in the order of the part of the residual that their responses explain.
+
+    Each term is simulated with a small coefficient, and with the one at which that response explains most:
+    the response to a term that changes within few samples, such as friction, is far from linear.
+
+    Parameters
+    ----------
+    fit : CalibrationResult
+        The equations without the terms.
+    targets : sequence of Target
+        Targets with different noise models; the best rank of a term counts. A noise model of a residual that
+        is mainly caused by what the equations lack suppresses this, and without one, slow noise hides it.
+    candidates : sequence of CandidateTerm
+    target_sizes : mapping
+        Largest absolute values of the right-hand sides.
+    parallel_map : ParallelMap
+        Simulates the terms.
+    """
+    projections = [Projection(fit, target) for target in targets]
+
+    def explain_group(group: Sequence[CandidateTerm]) -> NDArray[np.float64]:
+        numbers = find_free_numbers(find_used_names(fit), len(group))
+        numbered = list(zip(group, numbers, strict=True))
+        simulation, start = add_terms(fit, get_system(fit), numbered, target_sizes)
+        index = {parameter.name: place for place, parameter in enumerate(simulation.parameters)}
+        places = [index[term.name_parameters(number)[0]] for term, number in numbered]
+
+        def respond(coefficients: Signal) -> Signal:
+            """Return the responses to one term at a time, shape (rows, terms, samples)."""
+            points = np.tile(start, (coefficients.size, 1))
+            points[np.arange(len(points)), np.tile(places, len(coefficients))] = coefficients.ravel()
+            responses = simulation.simulate_batch(points) - fit.output
+            return responses.reshape(*coefficients.shape, -1)
+
+        small = np.array([[simulation.parameters[place].nominal for place in places]])
+        (responses,) = respond(small)
+        linear = np.array([[_explain(each, projection) for each in responses] for projection in projections])
+        large = small * linear[:, :, 1]
+        # All targets share a call, since the lanes of one would not fill it.
+        explained = [
+            [_explain(each, projection)[0] for each in responses]
+            for responses, projection in zip(respond(large), projections, strict=True)
+        ]
+        return np.dstack([linear[:, :, 0], explained, large])
+
+    groups = [
+        candidates[first : first + TERMS_PER_CALL] for first in range(0, len(candidates), TERMS_PER_CALL)
+    ]
+    # Of shape (targets, terms, 3): parts that the linear and the other response explain, and the coefficient.
+    found = np.concatenate(list(parallel_map(explain_group, groups)), axis=1)
+    explained = found[:, :, :2].max(axis=2)
+    rank = np.argsort(np.argsort(-explained, axis=1, kind="stable"), axis=1).min(axis=0)
+    ranked = []
+    for index in np.argsort(rank, kind="stable"):
+        if explained[:, index].max() > 0.0:
+            chosen = found[:, index]
+            is_other = chosen[:, 1] > MIN_NONLINEAR_GAIN * chosen[:, 0]
+            ranked.append(RankedTerm(candidates[index], tuple(chosen[is_other, 2].tolist())))
+    return ranked
+
+
+def _explain(response: Signal, projection: Projection) -> tuple[float, float]:
+    """Return the sum of squares of the residual that a response explains, and its factor in the residual."""
+    if not np.isfinite(response).all():
+        return 0.0, 0.0
+    projected = projection(response)
+    energy, product = float(projected @ projected), float(projected @ projection.residual)
+    return (product**2 / energy, product / energy) if energy > 0.0 else (0.0, 0.0)

@@ -1,0 +1,265 @@
+"""Search for terms that the equations of a simulation lack.
+
+Each candidate term is simulated in its equation. Its response to a small coefficient, without the part that
+the other parameters reproduce, says how much of the residual it explains: forward selection by the error
+reduction ratio (Billings, Nonlinear System Identification, section 3), with responses instead of regressors.
+The most promising terms are then fitted with all parameters by the Levenberg-Marquardt method.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from islands.diagnosis.calibration.intersample_selection import get_discretisation, select_intersample
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
+from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, calibrate_all
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.candidate_terms import (
+    STARTING_SCALES,
+    CandidateTerm,
+    find_free_numbers,
+    list_candidate_terms,
+)
+from islands.diagnosis.discovery.equation_simulator import (
+    add_terms,
+    find_equations,
+    find_used_names,
+    get_system,
+)
+from islands.diagnosis.discovery.term_ranking import RankedTerm, rank_terms
+from islands.diagnosis.inference.screening import bic_penalty
+from islands.diagnosis.inference.stepwise_search import MIN_GAIN
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect
+from islands.expressions.printing import render
+from islands.simulators.coordinates import peak_amplitude
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.ode.output_system import SYMBOL_MEANINGS
+from islands.simulators.ode.system import OUTPUT, OdeSystem
+
+#: Maximum number of terms.
+MAX_TERMS = 3
+
+#: Number of terms of each step that are fitted with all parameters.
+FITTED_TERMS = 12
+
+#: Ratio of the gains of a term and of the one before that is expected at most. Of terms that act together,
+#: the second one may gain more than the first.
+MAX_GAIN_RATIO = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class DiscoveredTerm:
+    """A term that has been added to an equation.
+
+    Attributes
+    ----------
+    term : CandidateTerm
+    number : int
+        Number of the term in the names of its parameters.
+    gain : float
+        Decrease of minus twice the log-likelihood when it was added, less the penalty.
+    penalty : float
+        BIC penalty of its values, and the logarithm of the number of terms that could gain by chance.
+    """
+
+    term: CandidateTerm
+    number: int
+    gain: float
+    penalty: float
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of its parameters in the equations: the coefficient, and the scale if there is one."""
+        return self.term.name_parameters(self.number)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TermSearchResult:
+    """Equations with the terms that a search has added.
+
+    Attributes
+    ----------
+    base : CalibrationResult
+        The simulation without the terms. It may have effects.
+    fit : CalibrationResult
+    terms : tuple of DiscoveredTerm
+        In the order in which they were found.
+    """
+
+    base: CalibrationResult
+    fit: CalibrationResult
+    terms: tuple[DiscoveredTerm, ...]
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects of the simulation."""
+        return self.fit.simulation.effects
+
+    @property
+    def cost(self) -> float:
+        """Score of the fit plus the penalties of its terms and effects; less is better."""
+        effects = sum(bic_penalty(effect, self.fit) for effect in self.effects)
+        return self.fit.score + sum(each.penalty for each in self.terms) + effects
+
+    @property
+    def gain(self) -> float:
+        """Score gain of the terms in minus twice the log-likelihood, less their penalties."""
+        return self.base.score - self.fit.score - sum(each.penalty for each in self.terms)
+
+    def describe(self) -> str:
+        """Return the extended equations and the values of their new parameters as one line."""
+        system = get_system(self.fit)
+        right_sides = {**dict(system.derivatives), OUTPUT: system.output}
+        changed = dict.fromkeys(each.term.target for each in self.terms)
+        lines = [
+            f"{target if target == OUTPUT else f'd{target}/dt'} = {render(right_sides[target])}"
+            for target in changed
+        ]
+        values = {
+            parameter.name: f"{parameter.name} = {value:.4g} {parameter.unit}".rstrip()
+            for parameter, value in zip(self.fit.simulation.parameters, self.fit.values, strict=True)
+        }
+        new = [values[name] for each in self.terms for name in each.parameters]
+        return "; ".join([*lines, ", ".join(new), *([SYMBOL_MEANINGS] if system.simulated else [])])
+
+
+def search_terms(
+    base: CalibrationResult,
+    target: Target,
+    run: DiagnosisRun,
+    least: float = np.inf,
+    start: TermSearchResult | None = None,
+    max_terms: int = MAX_TERMS,
+) -> TermSearchResult | None:
+    """Add terms to the equations of a simulation as long as each gains more than any would by chance.
+
+    Parameters
+    ----------
+    base : CalibrationResult
+        The calibrated simulation. It keeps its effects.
+    target : Target
+    run : DiagnosisRun
+    least : float
+        Cost of another explanation. The search ends if further terms are not expected to reach it.
+    start : TermSearchResult, optional
+        Result of a search with fewer terms, which is continued.
+    max_terms : int
+        Maximum number of terms.
+
+    Returns
+    -------
+    TermSearchResult or None
+        None if no term gains enough.
+    """
+    equations = find_equations(base.simulation.simulator)
+    assert equations is not None
+    context = base.simulation.context
+    system = equations.system
+    rate = peak_amplitude(context.take_differences(context.u)) / context.dt
+    sizes = {**equations.sizes, system.input: context.input_peak, f"rate({system.input})": rate}
+    units = {each.name: each.unit for each in system.states}
+    units |= {system.input: context.input_unit, OUTPUT: context.output_unit}
+    units |= dict.fromkeys(system.simulated, context.output_unit)
+    candidates = list_candidate_terms(system, sizes, context.duration, units)
+    target_sizes = {
+        OUTPUT: context.output_peak,
+        **{name: sizes[f"d{name}/dt"] for name, _ in system.derivatives},
+    }
+    found, unweighted = start or TermSearchResult(base, base, ()), target
+    while len(found.terms) < max_terms:
+        target = whiten_target(target, found.fit)
+        found = _improve(found, calibrate(found.fit.simulation, target, found.fit.values))
+        best = _find_best_term(found, target, unweighted, candidates, target_sizes, run)
+        if best is None or best.cost > found.cost - MIN_GAIN:
+            break
+        before = found.cost
+        best = _select_discretisation(best, target)
+        found = _eliminate_terms(best, system, target, target_sizes, run)
+        missing = max_terms - len(found.terms)
+        if found.cost - missing * MAX_GAIN_RATIO * (before - found.cost) > least:
+            break
+    return found if found.terms else None
+
+
+def _improve(found: TermSearchResult, fit: CalibrationResult) -> TermSearchResult:
+    """Return the equations with another fit, if that is better."""
+    return replace(found, fit=fit) if fit.score < found.fit.score else found
+
+
+def _select_discretisation(found: TermSearchResult, target: Target) -> TermSearchResult:
+    """Select the intersample behaviour again, which the missing term may have hidden."""
+    simulator = select_intersample(found.fit, target)
+    if get_discretisation(simulator) == get_discretisation(found.fit.simulation.simulator):
+        return found
+    simulation = replace(found.fit.simulation, simulator=simulator)
+    return replace(found, fit=calibrate(simulation, target, found.fit.values))
+
+
+def _eliminate_terms(
+    found: TermSearchResult,
+    system: OdeSystem,
+    target: Target,
+    target_sizes: Mapping[str, float],
+    run: DiagnosisRun,
+) -> TermSearchResult:
+    """Remove terms that later ones have made unnecessary; ``system`` has none of them."""
+    while len(found.terms) > 1:
+        reduced = [tuple(each for each in found.terms if each is not left_out) for left_out in found.terms]
+        tasks = []
+        for kept in reduced:
+            numbered = [(each.term, each.number) for each in kept]
+            simulation, start = add_terms(found.fit, system, numbered, target_sizes)
+            tasks.append((simulation, [start]))
+        fits = calibrate_all(StartsCalibrator(target), tasks, run.parallel_map)
+        smaller = [replace(found, fit=fit, terms=kept) for fit, kept in zip(fits, reduced, strict=True)]
+        best = min(smaller, key=lambda each: each.cost)
+        if best.cost > found.cost + MIN_GAIN:
+            break
+        found = best
+    return found
+
+
+def _find_best_term(
+    found: TermSearchResult,
+    target: Target,
+    unweighted: Target,
+    candidates: Sequence[CandidateTerm],
+    target_sizes: Mapping[str, float],
+    run: DiagnosisRun,
+) -> TermSearchResult | None:
+    """Return the equations with the term that is best after a calibration of all parameters."""
+    fit, used = found.fit, {(each.term.target, each.term.text) for each in found.terms}
+    (number,) = find_free_numbers(find_used_names(fit), 1)
+    free = [each for each in candidates if (each.target, each.text) not in used]
+    log_n, log_choices = float(np.log(fit.noise.effective_samples)), 2.0 * float(np.log(len(candidates)))
+    ranked = rank_terms(fit, [target, unweighted], free, target_sizes, run.parallel_map)[:FITTED_TERMS]
+    tasks = []
+    for each in ranked:
+        simulation, start = add_terms(fit, get_system(fit), [(each.term, number)], target_sizes)
+        tasks.append((simulation, _list_starts(simulation, start, each, number)))
+    # Any of the candidates could gain by chance.
+    penalties = [each.term.value_count * log_n + log_choices for each in ranked]
+    results = []
+    fits = calibrate_all(StartsCalibrator(target), tasks, run.parallel_map)
+    for each, penalty, fitted in zip(ranked, penalties, fits, strict=True):
+        if np.isfinite(fitted.score):
+            added = DiscoveredTerm(each.term, number, fit.score - fitted.score - penalty, penalty)
+            results.append(replace(found, fit=fitted, terms=(*found.terms, added)))
+    return min(results, key=lambda each: each.cost, default=None)
+
+
+def _list_starts(
+    simulation: ExtendedSimulator, start: Signal, ranked: RankedTerm, number: int
+) -> list[Signal]:
+    """Return starting points: coefficients of zero with several scales, and the estimated coefficients."""
+    places = {parameter.name: index for index, parameter in enumerate(simulation.parameters)}
+    coefficient, *scales = (places[name] for name in ranked.term.name_parameters(number))
+    changes = [(scale, factor * start[scale]) for scale in scales for factor in STARTING_SCALES]
+    changes += [(coefficient, value) for value in ranked.coefficients]
+    starts = np.tile(start, (len(changes) + 1, 1))
+    for point, (place, value) in zip(starts[1:], changes, strict=True):
+        point[place] = value
+    return list(starts)

@@ -1,0 +1,128 @@
+"""Test for data from a closed loop: whether the input depends on earlier errors of the simulation.
+
+Without feedback, the noise of the output is independent of the input. Residual and input are both whitened,
+and their cross-correlations are compared with those of circular shifts (Haugh, Checking the independence of
+two covariance-stationary time series, 1976). Feedback correlates the residual with later inputs. An error of
+the simulation correlates it with earlier ones, so that correlations with later inputs have to predominate.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.gross_errors.record_finding import RecordFinding
+from islands.effects.interface.effect import Signal
+
+#: Size of the pulse with which the response of a simulation is tested, relative to the largest input.
+PULSE = 0.01
+
+#: Largest response at the sample of a pulse, relative to the largest one, without direct feedthrough.
+MAX_DIRECT_RESPONSE = 0.1
+
+#: Order of the autoregressions that whiten residual and input.
+ORDER = 20
+
+#: Number of lags on each side, in samples.
+LAGS = 10
+
+#: Distance from the null distribution above which feedback is reported, in standard deviations.
+MIN_DISTANCE = 4.0
+
+#: Least ratio of the squared correlations with later inputs to those with earlier ones.
+MIN_RATIO = 2.0
+
+#: Least number of samples, and of circular shifts that give the null distribution.
+MIN_SAMPLES = 10 * ORDER
+
+#: Circular shifts below this number of samples are not part of the null distribution.
+MIN_SHIFT = 4 * LAGS
+
+
+def find_closed_loop(fit: CalibrationResult, target: Target, input_name: str) -> tuple[RecordFinding, ...]:
+    """Return a finding if the input depends on earlier errors of a simulation; otherwise nothing.
+
+    Parameters
+    ----------
+    fit : CalibrationResult
+        The best simulation.
+    """
+    u, residual = fit.simulation.context.u[: target.fitted], (target.y - fit.output)[: target.fitted]
+    residual = np.where(np.isnan(residual), np.nanmean(residual), residual)
+    # Feedback within a sample and a simulation that responds at once are alike.
+    first = 1 if acts_at_once(fit) else 0
+    feedback = measure_feedback(u, residual, first)
+    if feedback is None:
+        return ()
+    lag, correlation, distance = feedback
+    return (
+        RecordFinding(
+            "closed-loop",
+            f"The input {input_name} depends on earlier errors of the output, as that of a controller does: "
+            f"the correlation of the whitened residual with the input {lag} samples later is "
+            f"{correlation:.2g}, {distance:.1f} standard deviations beyond chance. In a closed loop the "
+            "input contains the noise: estimated parameters are biased unless the noise model is right, and "
+            "effects that act through the input are less certain.",
+            "Give known parameters with --tolerance instead of estimating them, and change the setpoint "
+            "during the test, or use a record without the controller.",
+            {"correlation": (correlation, ""), "lag": (float(lag), "samples")},
+        ),
+    )
+
+
+def measure_feedback(u: Signal, residual: Signal, first: int) -> tuple[int, float, float] | None:
+    """Return lag and size of the largest correlation with later inputs, and its distance from chance.
+
+    Parameters
+    ----------
+    u, residual : ndarray, shape (samples,)
+        Input and residual.
+    first : int
+        First of the `LAGS` lags that belong to feedback, 0 or 1.
+
+    Returns
+    -------
+    tuple or None
+        None without significant feedback.
+    """
+    if u.size < MIN_SAMPLES or np.ptp(u) == 0.0 or np.ptp(residual) == 0.0:
+        return None
+    errors, inputs = _whiten(residual), _whiten(u)
+    spectrum = np.conj(np.fft.rfft(errors)) * np.fft.rfft(inputs)
+    size = float(np.sqrt((errors @ errors) * (inputs @ inputs)))
+    if size == 0.0:
+        return None
+    # Element j is the correlation of a residual with the input j samples later.
+    correlation = np.fft.irfft(spectrum, errors.size) / size
+    squares = np.convolve(np.concatenate([correlation, correlation[: LAGS - 1]]) ** 2, np.ones(LAGS), "valid")
+    later, earlier = float(squares[first]), float(squares[first - LAGS])
+    null = np.log(squares[MIN_SHIFT : -MIN_SHIFT - LAGS])
+    distance = (float(np.log(later)) - float(null.mean())) / float(null.std())
+    if distance < MIN_DISTANCE or later < MIN_RATIO * earlier:
+        return None
+    lag = first + int(np.argmax(np.abs(correlation[first : first + LAGS])))
+    return lag, float(correlation[lag]), distance
+
+
+def acts_at_once(fit: CalibrationResult) -> bool:
+    """Return whether the simulated output responds to the input of the same sample.
+
+    A response below a tenth of the largest one is that of the interpolation between samples.
+    """
+    context = fit.simulation.context
+    middle = context.u.size // 2
+    u = context.u.copy()
+    u[middle] += PULSE * context.input_peak
+    simulation = replace(fit.simulation, context=replace(context, u=u))
+    response = np.abs(simulation.simulate(fit.values) - fit.output)
+    return not response[middle] < MAX_DIRECT_RESPONSE * np.max(response)
+
+
+def _whiten(signal: Signal) -> NDArray[np.float64]:
+    """Return the innovations of a signal under an autoregression; the first `ORDER` samples are left out."""
+    centred = signal - signal.mean()
+    lagged = np.column_stack([centred[ORDER - lag : centred.size - lag] for lag in range(1, ORDER + 1)])
+    later = centred[ORDER:]
+    return np.asarray(later - lagged @ np.linalg.lstsq(lagged, later, rcond=None)[0])

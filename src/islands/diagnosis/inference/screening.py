@@ -1,0 +1,221 @@
+"""Screening: a simulation extended by each effect in turn, calibrated and sorted by score."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from operator import itemgetter
+
+import numpy as np
+
+from islands.data.segments import fill_gaps
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
+from islands.diagnosis.calibration.projection import Projection
+from islands.diagnosis.calibration.starts_calibrator import calibrate_best
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.catalogue import catalogue_order
+from islands.effects.interface.effect import Effect, Signal, invalid_effect_error
+from islands.simulators.extended import ExtendedSimulator
+
+#: Maximum number of starting points per effect that are calibrated.
+MAX_STARTS = 3
+
+#: Largest factor by which the strength of a starting point is scaled.
+MAX_SCALING = 5.0
+
+#: Scores that differ by less than this are ties. Ties keep the catalogue order, in which effects that belong
+#: to one simulator come last.
+SCORE_TIE = 0.5
+
+#: Singular values below this fraction of the largest one are linear dependences of responses.
+DEPENDENCE = 1e-6
+
+#: Minimum number of effects that are calibrated in addition to others, even if their linear responses promise
+#: no gain.
+MIN_CALIBRATED_EFFECTS = 5
+
+#: Fraction of the best promised gain below which a further effect is not calibrated. If the noise is small,
+#: every effect promises more than its penalty.
+MIN_PROMISE = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScreenedEffect:
+    """A simulation with one additional effect.
+
+    Attributes
+    ----------
+    effect : Effect
+    fit : CalibrationResult
+    """
+
+    effect: Effect
+    fit: CalibrationResult
+
+    def score_gain(self, base: CalibrationResult) -> float:
+        """Return the decrease of the score relative to ``base``, less the BIC penalty of the effect."""
+        return base.score - self.fit.score - bic_penalty(self.effect, base)
+
+
+def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
+    """Return the BIC penalty of an effect: log n for each of its degrees of freedom."""
+    parameters = effect.parameters(base.simulation.context)
+    further_recordings = max(len(base.simulation.parts) - 1, 0)
+    values = len(parameters) + further_recordings * sum(each.initial for each in parameters)
+    return (values + effect.extra_degrees_of_freedom) * float(np.log(base.noise.effective_samples))
+
+
+def screen_effects(base: CalibrationResult, target: Target, run: DiagnosisRun) -> list[ScreenedEffect]:
+    """Extend a simulation by each effect in turn and calibrate it; return the best first."""
+    projection = Projection(base, target)
+    candidates = [
+        (starts[0][0], effect, [values for _, values in starts])
+        for effect, starts in zip(
+            run.effects, run.parallel_map(StartFinder(base, target, projection), run.effects), strict=True
+        )
+        if starts
+    ]
+    is_noise = target.effective_samples is None
+    if base.simulation.effects and is_noise:
+        # If the simulation has effects already, only the most promising further ones are worth a calibration.
+        candidates.sort(key=lambda candidate: candidate[0])
+        promises = [projection.score_decrease(remaining) for remaining, *_ in candidates]
+        candidates = [
+            candidate
+            for index, (candidate, promise) in enumerate(zip(candidates, promises, strict=True))
+            if index < MIN_CALIBRATED_EFFECTS
+            or promise > max(bic_penalty(candidate[1], base), MIN_PROMISE * promises[0])
+        ]
+    tasks = [(_extend(base, effect), starts) for _, effect, starts in candidates]
+    penalties = [bic_penalty(effect, base) for _, effect, _ in candidates]
+    fits = calibrate_best(tasks, penalties, target, run.parallel_map)
+    screened = [ScreenedEffect(effect, fit) for (_, effect, _), fit in zip(candidates, fits, strict=True)]
+    return sorted(screened, key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
+
+
+def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSimulator) -> Signal:
+    """Return the values of a simulation for one with other effects; new effects have their nominal values."""
+    transferred = new.nominal
+    transferred[new.simulator_slice] = values[old.simulator_slice]
+    transfer_effects(values, old, transferred, new)
+    return transferred
+
+
+def transfer_effects(
+    values: Signal, old: ExtendedSimulator, transferred: Signal, new: ExtendedSimulator
+) -> None:
+    """Set the values of the effects that two simulations have in common, in place."""
+    for effect in new.effects:
+        if effect in old.effects:
+            transferred[new.get_slice(effect)] = values[old.get_slice(effect)]
+
+
+def get_starting_points(
+    effect: Effect, simulation: ExtendedSimulator, residual: Signal
+) -> Sequence[tuple[float, ...]]:
+    """Return the starting points of an effect after checking them."""
+    count = len(effect.parameters(simulation.context))
+    try:
+        points = effect.starting_points(simulation.context, residual)
+    except Exception as error:
+        raise invalid_effect_error(
+            effect, f"its starting points fail: {type(error).__name__}: {error}"
+        ) from error
+    if any(len(point) != count for point in points):
+        raise invalid_effect_error(effect, f"each of its starting points needs {count} values")
+    return points
+
+
+def simulate_starting_points(
+    base: CalibrationResult, simulation: ExtendedSimulator, effect: Effect, target: Target
+) -> tuple[Signal, Signal]:
+    """Simulate the starting points of an effect, at once if possible; those that diverge are left out.
+
+    Parameters
+    ----------
+    simulation : ExtendedSimulator
+        The simulation of ``base``, extended by the effect.
+
+    Returns
+    -------
+    ndarray, shape (points, parameters)
+        Values.
+    ndarray, shape (points, samples)
+        Changes of the output of ``base``.
+    """
+    given = get_starting_points(effect, simulation, fill_gaps(target.y - base.output))
+    points = np.tile(transfer_parameters(base.values, base.simulation, simulation), (len(given), 1))
+    if not given:
+        return points, np.empty((0, base.output.size))
+    points[:, simulation.get_slice(effect)] = [simulation.expand(effect, point) for point in given]
+    responses = simulation.simulate_batch(points) - base.output
+    is_finite = np.isfinite(responses).all(axis=1)
+    return points[is_finite], responses[is_finite]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StartFinder:
+    """Function that finds the starting points of an effect that explain most.
+
+    Attributes
+    ----------
+    base : CalibrationResult
+        Simulation without the effect.
+    target : Target
+    projection : Projection
+        Projection for the base.
+    """
+
+    base: CalibrationResult
+    target: Target
+    projection: Projection
+
+    def __call__(self, effect: Effect) -> list[tuple[float, Signal]]:
+        """Return starting points, each with its strength scaled if that explains more.
+
+        The starting points of a free form are combined to the one that explains most.
+
+        Returns
+        -------
+        list of (float, ndarray)
+            Remaining sum of squares and parameter values, the smallest sum first.
+        """
+        base, projection, simulation = self.base, self.projection, _extend(self.base, effect)
+        part = simulation.get_slice(effect)
+        points, changes = simulate_starting_points(base, simulation, effect, self.target)
+        responses = [projection(change) for change in changes]
+        if effect.is_free and responses:
+            weights = np.linalg.lstsq(np.column_stack(responses), projection.residual, rcond=DEPENDENCE)[0]
+            if not np.isfinite(weights).all():  # the responses are smaller than any normal number
+                return []
+            combined = points[:1].copy()
+            combined[0, part] = weights @ points[:, part]
+            points, responses = combined, [projection(simulation.simulate(combined[0]) - base.output)]
+        sizes = np.array([_sum_squares(response) for response in responses])
+        usable = np.flatnonzero(np.isfinite(sizes) & (sizes > 0.0))
+        starts = [(_sum_squares(projection.residual - responses[index]), points[index]) for index in usable]
+        if effect.linear_parameters and usable.size:
+            scaled = points[usable]
+            for values, index in zip(scaled, usable, strict=True):
+                factor = float(responses[index] @ projection.residual) / sizes[index]
+                values[part.start : part.start + effect.linear_parameters] *= np.clip(
+                    factor, -MAX_SCALING, MAX_SCALING
+                )
+            scaled = simulation.project(scaled)
+            others = simulation.simulate_batch(scaled) - base.output
+            starts = [
+                min(start, (_sum_squares(projection.residual - projection(other)), values), key=itemgetter(0))
+                for start, other, values in zip(starts, others, scaled, strict=True)
+            ]
+        return sorted((each for each in starts if np.isfinite(each[0])), key=itemgetter(0))[:MAX_STARTS]
+
+
+def _extend(base: CalibrationResult, effect: Effect) -> ExtendedSimulator:
+    """Return the simulation of a fit with one additional effect."""
+    return base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
+
+
+def _sum_squares(signal: Signal) -> float:
+    """Return the sum of squares; infinite if the signal has diverged."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        squares = float(signal @ signal)
+    return squares if np.isfinite(squares) else float("inf")

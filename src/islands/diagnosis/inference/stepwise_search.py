@@ -1,0 +1,217 @@
+"""Stepwise regression over effects: beam search, refinement by swaps and backward elimination."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from operator import attrgetter
+
+import numpy as np
+
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, whiten_target
+from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, calibrate_all
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.hypothesis import (
+    Alternatives,
+    Hypothesis,
+    find_alternatives,
+    remove_each,
+    screen_others,
+    with_effect,
+)
+from islands.diagnosis.inference.screening import SCORE_TIE, ScreenedEffect
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects import model_form
+from islands.effects.interface.effect import Effect
+from islands.parallel import ParallelMap
+
+#: Minimum score gain of an effect, in minus twice the log-likelihood: six is a likelihood ratio of twenty.
+MIN_GAIN = 6.0
+
+#: Number of hypotheses that are followed at the same time.
+BEAM_WIDTH = 3
+
+#: Fraction of the best gain below which a hypothesis is not followed, unless pairs are searched for.
+MIN_FOLLOWED_GAIN = 0.1
+
+#: Maximum number of effects of a hypothesis, not counting the model-form error; one more if pairs are
+#: searched for.
+MAX_EFFECTS = 3
+
+#: Number of single effects from which pairs are built.
+PAIR_SEEDS = 6
+
+#: Maximum number of refits with the noise model of the previous fit.
+MAX_REFITS = 6
+
+
+def stepwise_search(
+    base: CalibrationResult,
+    screened: Sequence[ScreenedEffect],
+    target: Target,
+    run: DiagnosisRun,
+    pairs: bool = False,
+) -> tuple[Hypothesis, Target]:
+    """Return the best hypothesis, and the target with its noise model.
+
+    The search adds one effect after another to the simulation, as long as the cost decreases by enough. It
+    estimates the noise model again after each step, since effects that were not found before were part of the
+    noise.
+
+    Parameters
+    ----------
+    base : CalibrationResult
+        The simulation without effects.
+    screened : sequence of ScreenedEffect
+        Effects screened on ``base``, the best first.
+    pairs : bool
+        Whether the first effect of a pair may have an insufficient gain alone: two causes may mask each
+        other.
+    """
+    best = Hypothesis(base, base.score, ())
+    beam = [best]
+    max_effects = MAX_EFFECTS + 1 if pairs else MAX_EFFECTS
+    while beam and _count_causes(beam[0]) < max_effects:
+        is_first = not beam[0].effects
+        if not is_first:
+            names = [effect.name for effect in beam[0].effects]
+            run.progress(f"effects in addition to {' and '.join(names)}", min(0.1 + 0.2 * len(names), 0.7))
+        min_gain = MIN_GAIN if is_first else _get_min_further_gain(target, run.effects)
+        is_open = is_first and pairs
+        width = PAIR_SEEDS if is_open else BEAM_WIDTH
+        candidates = [
+            (hypothesis, (screened if is_first else screen_others(hypothesis, target, run))[:width])
+            for hypothesis in beam
+        ]
+        beam = _extend_beam(candidates, None if is_open else min_gain)[:width]
+        beam, new_target = refit_with_ar_noise(beam, target, run.parallel_map)
+        if beam and beam[0].cost < best.cost - min_gain:
+            best, target = beam[0], new_target
+        elif not is_open:
+            break
+        if not pairs:
+            least = MIN_FOLLOWED_GAIN * (base.score - beam[0].cost)
+            beam = [each for each in beam if base.score - each.cost >= least]
+    return refine_by_swaps(best, target, run, max_effects)
+
+
+def _extend_beam(
+    candidates: Iterable[tuple[Hypothesis, Sequence[ScreenedEffect]]], min_gain: float | None
+) -> list[Hypothesis]:
+    """Return each hypothesis with each of its candidates, the best first; of equal sets of effects the best.
+
+    Parameters
+    ----------
+    min_gain : float or None
+        Least decrease of the cost; None to accept all candidates.
+    """
+    extended: dict[frozenset[str], Hypothesis] = {}
+    for hypothesis, effects in candidates:
+        for each in effects:
+            found = with_effect(hypothesis, each)
+            key = frozenset(effect.name for effect in found.effects)
+            is_accepted = min_gain is None or found.cost < hypothesis.cost - min_gain
+            if is_accepted and (key not in extended or found.cost < extended[key].cost):
+                extended[key] = found
+    return sorted(extended.values(), key=attrgetter("rank"))
+
+
+def _count_causes(hypothesis: Hypothesis) -> int:
+    """Count the effects of a hypothesis, not counting the model-form error of an identified model."""
+    return sum(effect.cause != model_form.CORE_SHAPE for effect in hypothesis.effects)
+
+
+def refit_with_ar_noise(
+    beam: list[Hypothesis], target: Target, parallel_map: ParallelMap = map
+) -> tuple[list[Hypothesis], Target]:
+    """Refit hypotheses, whitened by the noise model of the best one, until its cost stops decreasing."""
+    for _ in range(MAX_REFITS if beam and target.effective_samples is None else 0):
+        before = beam[0].cost
+        target = whiten_target(target, beam[0].fit)
+        tasks = [(each.fit.simulation, [each.fit.values]) for each in beam]
+        fits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
+        refitted = [
+            min(each, each.with_fit(fit), key=attrgetter("rank"))
+            for each, fit in zip(beam, fits, strict=True)
+        ]
+        beam = sorted(refitted, key=attrgetter("rank"))
+        if beam[0].cost > before - SCORE_TIE:
+            break
+    return beam, target
+
+
+def refine_by_swaps(
+    hypothesis: Hypothesis,
+    target: Target,
+    run: DiagnosisRun,
+    max_effects: int = MAX_EFFECTS,
+) -> tuple[Hypothesis, Target]:
+    """Refine a hypothesis: remove effects that are not needed, replace effects by better ones, and add more.
+
+    The first effects of a stepwise search may be wrong and become redundant, and after their removal others
+    may be worth adding. The cost decreases with every step, so that the refinement ends.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+        A hypothesis to which no single effect is worth adding, or which has the maximum number of effects.
+    """
+    complete = hypothesis.effects
+    min_gain = _get_min_further_gain(target, run.effects)
+    hypothesis = eliminate_backward(hypothesis, target, min_gain, run)
+    while hypothesis.effects:
+        alternatives: tuple[Alternatives, ...] = ()
+        candidates = []
+        if len(hypothesis.effects) > 1:
+            run.progress("screening alternative causes", 0.7)
+            alternatives = find_alternatives(hypothesis, target, run)
+            candidates = [
+                with_effect(each.without, screened) for each in alternatives for screened in each.screened[:1]
+            ]
+        if len(hypothesis.effects) < len(complete) and _count_causes(hypothesis) < max_effects:
+            larger = [
+                with_effect(hypothesis, screened) for screened in screen_others(hypothesis, target, run)[:1]
+            ]
+            candidates += [each for each in larger if each.cost < hypothesis.cost - min_gain]
+        best = min(candidates, key=attrgetter("rank"), default=hypothesis)
+        if best.cost > hypothesis.cost - SCORE_TIE:
+            return replace(hypothesis, alternatives=alternatives), target
+        if set(best.effects) == set(hypothesis.effects) and best.cost > hypothesis.cost - MIN_GAIN:
+            # Same effects with slightly better values: another pass would not find others.
+            refined = replace(hypothesis, fit=best.fit, cost=best.cost, alternatives=alternatives)
+            return refined, target
+        complete = best.effects
+        best = eliminate_backward(best, target, min_gain, run)
+        (hypothesis,), target = refit_with_ar_noise([best], target)
+    return hypothesis, target
+
+
+def _get_min_further_gain(target: Target, effects: Sequence[Effect]) -> float:
+    """Return the minimum score gain of an effect that is added to others.
+
+    It includes a correction for multiple comparisons, since any of the effects could gain by chance. Under
+    model error there is no correction: gains are not due to chance, and pairs need a lower threshold.
+    """
+    return (
+        MIN_GAIN
+        if target.effective_samples is not None
+        else MIN_GAIN + 2.0 * float(np.log(max(len(effects), 1)))
+    )
+
+
+def eliminate_backward(
+    hypothesis: Hypothesis, target: Target, min_gain: float, run: DiagnosisRun
+) -> Hypothesis:
+    """Remove effects that are redundant given the others, and sort the rest, the most important first.
+
+    The last effect may be removed too: refitted values and the noise model estimated with it may make it
+    unnecessary.
+    """
+    while hypothesis.effects:
+        reduced = remove_each(hypothesis, hypothesis.effects, target, run.parallel_map)
+        without = {effect.name: each for effect, each in zip(hypothesis.effects, reduced, strict=True)}
+        cheapest = min(without.values(), key=attrgetter("rank"))
+        threshold = min_gain if len(hypothesis.effects) > 1 else MIN_GAIN
+        if cheapest.cost - hypothesis.cost >= threshold:
+            ranked = sorted(hypothesis.effects, key=lambda effect: -without[effect.name].cost)
+            return Hypothesis(hypothesis.fit, hypothesis.cost, tuple(ranked))
+        hypothesis = cheapest
+    return hypothesis

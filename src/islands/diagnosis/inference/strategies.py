@@ -1,0 +1,221 @@
+"""Search strategies: the residual is either coloured noise or model error.
+
+The first strategy models the residual as an autoregression. A simulation whose form is wrong leaves more than
+that, and any effect that whitens the residual would be selected. The second strategy therefore fits the
+unweighted residual and counts its effective sample size.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from islands.diagnosis.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    calibrate,
+    evaluate_fit,
+    whiten_target,
+)
+from islands.diagnosis.calibration.noise_model import estimate_effective_samples
+from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, make_task_key
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.chance_gain import ForwardSelection
+from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis
+from islands.diagnosis.inference.noise_floor import (
+    MIN_FRACTION,
+    explainable_variance,
+    noise_variance_from_periods,
+)
+from islands.diagnosis.inference.residual_structure import find_residual_structure
+from islands.diagnosis.inference.screening import ScreenedEffect, screen_effects
+from islands.diagnosis.inference.stepwise_search import MAX_EFFECTS, MIN_GAIN, stepwise_search
+from islands.diagnosis.inference.verdict import (
+    Verdict,
+    choose_reference_fit,
+    classify,
+    explained_fraction,
+    remove_chance_effects,
+    validate_out_of_sample,
+    withdraw_effects,
+)
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.interface.effect import Effect
+from islands.effects.model_form import CORE_SHAPE
+from islands.parallel import memoised_map
+
+#: Fraction of the misfit that some single effect has to explain before pairs are searched for; no effect
+#: explains as much of noise.
+MIN_SINGLE_FRACTION = 0.1
+
+
+#: Probability that a residual without a cause is searched for model error.
+CHANCE_PROBABILITY = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchOutcome:
+    """Result of a search, with the evidence for its verdict.
+
+    Attributes
+    ----------
+    base : CalibrationResult
+        The simulation without effects.
+    screened : sequence of ScreenedEffect
+        Effects screened on ``base``, the best first.
+    target : Target
+        Target of the last calibration.
+    hypothesis : Hypothesis
+    noise_floor : float
+        Expected lower bound on the mean square of the residual, for any simulation.
+    is_noise_floor_measured : bool
+        Whether the noise floor is measured from repeated periods; otherwise it is an upper bound from the
+        flexible reference model.
+    residual_structure : mapping of str to float
+        Maps in which the residual is not random, with their distance in standard deviations.
+    verdict : Verdict
+    form_alternatives : mapping of str to Alternatives
+        Free forms that could take the place of each of several effects.
+    """
+
+    base: CalibrationResult
+    screened: Sequence[ScreenedEffect]
+    target: Target
+    hypothesis: Hypothesis
+    noise_floor: float
+    is_noise_floor_measured: bool
+    residual_structure: Mapping[str, float]
+    verdict: Verdict
+    form_alternatives: Mapping[str, Alternatives] = field(default_factory=dict)
+
+
+def search_with_ar_noise(
+    base: CalibrationResult,
+    screened: Sequence[ScreenedEffect],
+    target: Target,
+    run: DiagnosisRun,
+) -> SearchOutcome:
+    """Search for effects under the assumption that the residual is white or autoregressive noise.
+
+    Parameters
+    ----------
+    base, screened : CalibrationResult, sequence of ScreenedEffect
+        The simulation without effects, and the effects screened on it by ordinary least squares.
+    """
+    best = best_single(base, screened)
+    if best.noise.order:
+        # Ordinary least squares would fit the coloured noise as well.
+        run.progress("the noise is coloured: repeating with whitened residuals", 0.1)
+        target = whiten_target(target, best)
+        base = calibrate(base.simulation, target, base.values)
+        screened = screen_effects(base, target, run)
+    hypothesis, target = stepwise_search(base, screened, target, run)
+    return make_outcome(base, screened, target, hypothesis)
+
+
+def search_with_model_error(base: CalibrationResult, target: Target, run: DiagnosisRun) -> SearchOutcome:
+    """Search for effects under the assumption that the residual is model error."""
+    run.progress("the residual is model error: repeating with unweighted residuals", 0.4)
+    screened: Sequence[ScreenedEffect] = ()
+    hypothesis = Hypothesis(base, base.score, ())
+    # The effective sample size changes the score of a fit, but not the fit: both passes share results.
+    run = replace(run, parallel_map=memoised_map(run.parallel_map, StartsCalibrator, make_task_key))
+    for _ in range(2):
+        # Model error correlates neighbouring samples: the second pass counts them with the best effects
+        # included.
+        residual = target.residual(hypothesis.fit.output)
+        target = replace(
+            target, effective_samples=estimate_effective_samples(residual, target.fitted_segments)
+        )
+        base = evaluate_fit(base.simulation, target, base.values)
+        if not hypothesis.effects and not _may_have_causes(base, target, run.effects):
+            break
+        screened = screen_effects(base, target, run)
+        if not any(explained_fraction(base, each.fit, 0.0) > MIN_SINGLE_FRACTION for each in screened):
+            break
+        hypothesis, _ = stepwise_search(base, screened, target, run, pairs=True)
+        if not hypothesis.effects:
+            break
+    return make_outcome(base, screened, target, hypothesis)
+
+
+def make_exact_outcome(base: CalibrationResult, target: Target) -> SearchOutcome:
+    """Return the outcome for a residual that is rounding: there is nothing to be searched for."""
+    hypothesis = Hypothesis(base, base.score, ())
+    return replace(make_outcome(base, (), target, hypothesis), verdict=Verdict.NOTHING)
+
+
+def assess_evidence(outcome: SearchOutcome, run: DiagnosisRun) -> SearchOutcome:
+    """Remove effects that fail on other samples, analyse the residual, and classify the outcome."""
+    base, target, rng = outcome.base, outcome.target, run.rng
+    hypothesis = remove_chance_effects(outcome.hypothesis, base, target, run.effects)
+    hypothesis = validate_out_of_sample(hypothesis, base, target, rng)
+    rest = analyse_residual(hypothesis.fit, target, rng)
+    if rest.is_structured or target.effective_samples is not None:
+        confirmed = withdraw_effects(hypothesis, target, rng)
+        if confirmed is not hypothesis:
+            hypothesis, rest = confirmed, analyse_residual(confirmed.fit, target, rng)
+    # Under model error the noise floor is unknown: the fraction refers to the whole misfit.
+    explained = explained_fraction(
+        choose_reference_fit(hypothesis, base, target),
+        hypothesis.fit,
+        rest.noise_floor if target.effective_samples is None else 0.0,
+    )
+    verdict = classify(
+        explained, bool(hypothesis.effects), rest.is_structured, target.effective_samples is not None
+    )
+    causes = [effect for effect in hypothesis.effects if effect.name != CORE_SHAPE]
+    if causes and causes[0].is_free and verdict != Verdict.UNKNOWN:
+        verdict = Verdict.FAMILY
+    return replace(
+        outcome,
+        hypothesis=hypothesis,
+        noise_floor=rest.noise_floor,
+        is_noise_floor_measured=rest.is_noise_floor_measured,
+        residual_structure=rest.structure,
+        verdict=verdict,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ResidualAnalysis:
+    """Noise floor and structure of a residual; see `SearchOutcome`."""
+
+    noise_floor: float
+    is_noise_floor_measured: bool
+    structure: Mapping[str, float]
+    is_structured: bool
+
+
+def analyse_residual(fit: CalibrationResult, target: Target, rng: np.random.Generator) -> ResidualAnalysis:
+    """Estimate the noise floor, and decide whether the residual of a fit has structure."""
+    fitted, context = target.fitted, fit.simulation.context
+    output = fit.output[:fitted]
+    residual = target.y[:fitted] - output
+    explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
+    structure = find_residual_structure(residual, output, context, rng)
+    mean_square = float(np.mean(residual[target.estimation_part[:fitted]] ** 2))
+    measured_floor = noise_variance_from_periods(context.u[:fitted], target.y[:fitted], context.segments)
+    return ResidualAnalysis(
+        max(mean_square - explainable, 0.0) if measured_floor is None else measured_floor,
+        measured_floor is not None,
+        structure,
+        bool(structure) or explainable > MIN_FRACTION * mean_square,
+    )
+
+
+def _may_have_causes(base: CalibrationResult, target: Target, effects: Sequence[Effect]) -> bool:
+    """Return whether linear responses to the effects explain more of the residual than of noise."""
+    selection = ForwardSelection(base, target, effects, MAX_EFFECTS + 1)
+    return selection.compute_gain() > selection.compute_chance_gain(CHANCE_PROBABILITY)
+
+
+def best_single(base: CalibrationResult, screened: Sequence[ScreenedEffect]) -> CalibrationResult:
+    """Return the fit with the best single effect if its gain is sufficient, otherwise the fit without."""
+    return screened[0].fit if screened and screened[0].score_gain(base) > MIN_GAIN else base
+
+
+def make_outcome(
+    base: CalibrationResult, screened: Sequence[ScreenedEffect], target: Target, hypothesis: Hypothesis
+) -> SearchOutcome:
+    """Return an outcome that has not been assessed yet."""
+    return SearchOutcome(base, screened, target, hypothesis, 0.0, False, {}, Verdict.UNKNOWN)

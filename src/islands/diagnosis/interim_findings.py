@@ -1,0 +1,208 @@
+"""Findings of a diagnosis while it runs, from which a stopped one makes its result."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.assembly import make_diagnosis
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
+from islands.diagnosis.calibration.starts_calibrator import (
+    CalibratedStart,
+    CalibrationTask,
+    StartsCalibrator,
+    calibrate_all,
+)
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.missing_terms import MissingTerms
+from islands.diagnosis.gross_errors.closed_loop import find_closed_loop
+from islands.diagnosis.gross_errors.record_finding import RecordFinding
+from islands.diagnosis.inference.hypothesis import Hypothesis
+from islands.diagnosis.inference.screening import ScreenedEffect
+from islands.diagnosis.inference.strategies import SearchOutcome, analyse_residual, make_outcome
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.result import Diagnosis
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.interface.effect import Effect
+from islands.parallel import ParallelMap, intercepted_map
+
+#: Steps of a diagnosis after the calibration of the simulation, in their order.
+STEPS = (
+    GROSS_ERRORS := "gross errors of the record",
+    SCREENING := "screening of the effects",
+    COMBINATIONS := "combinations of effects",
+    EVIDENCE := "tests of the evidence",
+    MODEL_ERROR := "search with model error",
+    FREE_FORMS := "comparison with free forms",
+    MISSING_TERMS := "search for missing terms",
+    ALTERNATIVES := "alternative causes",
+    EXTENSION := "extension by missing terms",
+)
+
+
+class InterimFindings:
+    """Findings of a diagnosis up to its current step.
+
+    `diagnose` keeps them. If an exception ends it, such as `KeyboardInterrupt`, the caller gets the result so
+    far from `make_diagnosis`.
+    """
+
+    def __init__(self) -> None:
+        self._begun: tuple[Dataset, CalibrationResult, Target, Sequence[RecordFinding]] | None = None
+        self._fits: _ScreeningFits | None = None
+        self._screened: tuple[CalibrationResult, Sequence[ScreenedEffect]] | None = None
+        self._assessed: tuple[CalibrationResult, SearchOutcome, Sequence[Effect]] | None = None
+        self._terms: MissingTerms | None = None
+        self._found: Diagnosis | None = None
+        self._step: str | None = GROSS_ERRORS
+
+    def begin(
+        self,
+        record: Dataset,
+        base: CalibrationResult,
+        target: Target,
+        record_findings: Sequence[RecordFinding],
+    ) -> None:
+        """Keep the calibrated simulation, the first result of a diagnosis."""
+        self._begun = record, base, target, record_findings
+
+    def record_screening(self, base: CalibrationResult, parallel_map: ParallelMap) -> ParallelMap:
+        """Return a map that keeps the fits of the first screening while it runs."""
+        if self._screened is not None:
+            return parallel_map
+        self._step, self._fits = SCREENING, _ScreeningFits(base)
+        return self._fits.record(parallel_map)
+
+    def keep_screening(self, base: CalibrationResult, screened: Sequence[ScreenedEffect]) -> None:
+        """Keep the screened effects; combinations of them are searched for."""
+        self._screened, self._step = (base, screened), COMBINATIONS
+
+    def reach(self, step: str) -> None:
+        """Note that one of `STEPS` begins."""
+        self._step = step
+
+    def keep_outcome(
+        self, base: CalibrationResult, outcome: SearchOutcome, effects: Sequence[Effect], step: str
+    ) -> SearchOutcome:
+        """Keep the outcome of a search whose evidence was tested, and return it.
+
+        Parameters
+        ----------
+        base, outcome, effects
+            Arguments of `diagnosis_assembly.make_diagnosis`.
+        step : str
+            Step that begins.
+        """
+        self._assessed, self._step = (base, outcome, effects), step
+        return outcome
+
+    def keep_terms(self, terms: MissingTerms | None) -> MissingTerms | None:
+        """Keep the missing terms, and return them; alternative causes are screened."""
+        self._terms, self._step = terms, ALTERNATIVES
+        return terms
+
+    def keep_diagnosis(self, found: Diagnosis) -> Diagnosis:
+        """Keep the diagnosis without the last step, and return it."""
+        self._found, self._step = found, EXTENSION
+        return found
+
+    def complete(self, found: Diagnosis) -> Diagnosis:
+        """Keep the complete diagnosis, and return it."""
+        self._found, self._step = found, None
+        return found
+
+    def make_diagnosis(self, seed: int = 0) -> Diagnosis | None:
+        """Make the result so far, without further calibrations of effects.
+
+        Its verdict is that of the last search whose evidence was tested, and "stopped" before.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the random generator.
+
+        Returns
+        -------
+        Diagnosis or None
+            None if the simulation has not been calibrated. A complete diagnosis is returned as it is.
+        """
+        if self._step is None or self._begun is None:
+            return self._found
+        record, base, target, record_findings = self._begun
+        rng = np.random.default_rng(seed)
+        left_out = list(STEPS[STEPS.index(self._step) :])
+        if self._found is not None:
+            found = self._found
+        elif self._assessed is not None and _has_alternatives(self._assessed[1]):
+            base, outcome, effects = self._assessed
+            left_out.remove(ALTERNATIVES)
+            found = make_diagnosis(record, outcome, base, self._terms, DiagnosisRun(effects, rng))
+        else:
+            screened: Sequence[ScreenedEffect] = ()
+            if self._screened is not None:
+                base, screened = self._screened
+            elif self._fits is not None:
+                base, screened = self._fits.base, self._fits.rank()
+                if self._step == SCREENING:
+                    left_out[0] = f"{SCREENING} ({len(screened)} are screened)"
+            outcome = _make_outcome(base, screened, target, rng)
+            found = make_diagnosis(record, outcome, base, None, DiagnosisRun((), rng))
+        closed_loop = find_closed_loop(found.best, target, record.input_names[0])
+        return replace(found, record_findings=(*record_findings, *closed_loop), left_out=tuple(left_out))
+
+
+class _ScreeningFits:
+    """Rough fits of single effects, in the order in which a screening makes them."""
+
+    def __init__(self, base: CalibrationResult) -> None:
+        self.base = base
+        self._calibrator: StartsCalibrator | None = None
+        self._ended: list[tuple[CalibrationTask, list[CalibratedStart]]] = []
+
+    def record(self, parallel_map: ParallelMap) -> ParallelMap:
+        """Return a map that keeps rough calibrations."""
+
+        def keep(
+            calibrator: StartsCalibrator, tasks: Sequence[CalibrationTask]
+        ) -> Iterator[list[CalibratedStart]]:
+            if not calibrator.is_rough:
+                yield from parallel_map(calibrator, tasks)
+                return
+            self._calibrator = calibrator
+            for task, ends in zip(tasks, parallel_map(calibrator, tasks), strict=True):
+                self._ended.append((task, ends))
+                yield ends
+
+        return intercepted_map(parallel_map, StartsCalibrator, keep)
+
+    def rank(self) -> list[ScreenedEffect]:
+        """Return the screened effects, the best first."""
+        if self._calibrator is None:
+            return []
+        tasks, ends = [task for task, _ in self._ended], [each for _, each in self._ended]
+        fits = calibrate_all(self._calibrator, tasks, lambda _function, _tasks: iter(ends))  # type: ignore[arg-type]
+        screened = [ScreenedEffect(fit.simulation.effects[-1], fit) for fit in fits]
+        return sorted(screened, key=lambda each: -each.score_gain(self.base))
+
+
+def _has_alternatives(outcome: SearchOutcome) -> bool:
+    """Return whether the causes of an outcome can be described: with several, each has alternatives."""
+    return len(outcome.hypothesis.effects) < 2 or bool(outcome.hypothesis.alternatives)
+
+
+def _make_outcome(
+    base: CalibrationResult,
+    screened: Sequence[ScreenedEffect],
+    target: Target,
+    rng: np.random.Generator,
+) -> SearchOutcome:
+    """Return the outcome of a search that was stopped before a verdict."""
+    rest = analyse_residual(base, target, rng)
+    return replace(
+        make_outcome(base, screened, target, Hypothesis(base, base.score, ())),
+        noise_floor=rest.noise_floor,
+        is_noise_floor_measured=rest.is_noise_floor_measured,
+        residual_structure=rest.structure,
+        verdict=Verdict.STOPPED,
+    )

@@ -1,0 +1,86 @@
+"""Set-up of a planned experiment: checks, noise, and the effects that a diagnosis would search for."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.preparation import (
+    MIN_SAMPLES,
+    estimation_part,
+    make_context,
+    make_target,
+    select_effects,
+)
+from islands.diagnosis.planning.channel_noise import make_white_noise
+from islands.diagnosis.planning.experiment import Experiment, MeasuredChannel
+from islands.diagnosis.planning.noise_estimate import estimate_noise
+from islands.effects.catalogue import EFFECTS
+from islands.effects.interface.effect import Effect
+from islands.errors import RecordError, SettingsError
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.interface import Simulator
+from islands.simulators.recorded_output import RecordedOutput
+
+
+def make_experiment(
+    record: Dataset,
+    simulator: Simulator,
+    noise_std: float | None,
+    prior_std: Mapping[str, float],
+    catalogue: Sequence[Effect] = EFFECTS,
+) -> tuple[Experiment, list[Effect]]:
+    """Make the experiment with the input of a record, and list the effects that it could show.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record with the input, and further channels. Its output may be missing.
+    simulator : Simulator
+    noise_std : float or None
+        Standard deviation of the noise of the output, which is white then; None to estimate a noise model
+        from the measured output.
+    prior_std : mapping
+        Relative standard deviations of parameters about their nominal values.
+
+    Raises
+    ------
+    RecordError
+        The record is too short or has several recordings, the simulation diverges on it, or there is no
+        output to estimate the noise from.
+    SettingsError
+        The noise is not positive, or the simulation is a recorded column.
+    """
+    _check(record, simulator, noise_std)
+    fitted = estimation_part(record).samples
+    context = make_context(_fill_output(record), simulator, fitted)
+    if noise_std is None:
+        target = make_target(record, fitted, prior_std)
+        noise = estimate_noise(record, ExtendedSimulator(simulator, (), context), target)
+    else:
+        noise = make_white_noise(noise_std)
+    output = MeasuredChannel(record.output_name, record.output_unit, simulator, context, noise)
+    effects = select_effects(simulator, context, prior_std, catalogue)
+    return Experiment((output,), prior_std, fitted), effects
+
+
+def _check(record: Dataset, simulator: Simulator, noise_std: float | None) -> None:
+    if record.samples < MIN_SAMPLES:
+        raise RecordError(
+            f"the input has {record.samples} samples, and a diagnosis needs at least {MIN_SAMPLES}: plan a "
+            "longer experiment"
+        )
+    if len(record.segments) > 1:
+        raise RecordError(f"a plan is for one recording, and the record has {len(record.segments)}: give one")
+    if isinstance(simulator, RecordedOutput):
+        raise SettingsError(
+            "a recorded column cannot be simulated with other inputs: give a simulation that computes it"
+        )
+    if noise_std is not None and not (np.isfinite(noise_std) and noise_std > 0.0):
+        raise SettingsError(f"the noise is a positive number in the unit of the output, got {noise_std:g}")
+
+
+def _fill_output(record: Dataset) -> Dataset:
+    """Return a record whose output is zero where it is missing; the scale of a resting output needs it."""
+    return replace(record, y=np.nan_to_num(record.y))

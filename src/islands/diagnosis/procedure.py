@@ -1,0 +1,198 @@
+"""Diagnosis of a simulation on a record: discrepancies, their causes, and the gain of modelling them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.assembly import extend_equations, make_diagnosis, make_gross_diagnosis
+from islands.diagnosis.calibration.intersample_selection import (
+    Discretisation,
+    get_discretisation,
+    select_intersample,
+)
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.diagnosis.calibration.noise_model import is_rounding_error
+from islands.diagnosis.calibration.preparation import (
+    count_fitted_samples,
+    make_context,
+    make_target,
+    select_effects,
+    validate_prior,
+)
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.equation_simulator import find_equations
+from islands.diagnosis.discovery.form_search import compare_with_free_forms
+from islands.diagnosis.discovery.missing_terms import explain_all, find_missing_terms, replaces_effects
+from islands.diagnosis.gross_errors.channel_admission import admit_channels
+from islands.diagnosis.gross_errors.closed_loop import find_closed_loop
+from islands.diagnosis.gross_errors.record_finding import describe_gaps
+from islands.diagnosis.gross_errors.search import explain_divergence, find_gross_errors
+from islands.diagnosis.inference.screening import screen_effects
+from islands.diagnosis.inference.strategies import (
+    SearchOutcome,
+    assess_evidence,
+    best_single,
+    make_exact_outcome,
+    search_with_ar_noise,
+    search_with_model_error,
+)
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.interim_findings import (
+    EVIDENCE,
+    FREE_FORMS,
+    MISSING_TERMS,
+    MODEL_ERROR,
+    InterimFindings,
+)
+from islands.diagnosis.result import Diagnosis
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.catalogue import EFFECTS
+from islands.effects.interface.effect import Effect
+from islands.errors import RecordError
+from islands.parallel import ParallelMap
+from islands.progress import ProgressCallback, ignore_progress
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.interface import Simulator, find_read_channels, get_tolerances
+from islands.simulators.output_equation import add_output_equation
+
+#: Maximum number of intersample behaviours and step sizes with which effects are searched for.
+MAX_SEARCHES = 3
+
+
+def diagnose(
+    record: Dataset,
+    simulator: Simulator,
+    tolerance: Mapping[str, float] | None = None,
+    seed: int = 0,
+    progress: ProgressCallback = ignore_progress,
+    parallel_map: ParallelMap = map,
+    catalogue: Sequence[Effect] = EFFECTS,
+    interim: InterimFindings | None = None,
+) -> Diagnosis:
+    """Diagnose a simulation on a record.
+
+    Parameters
+    ----------
+    record : Dataset
+        Measured record. Its first input drives the simulation; further inputs are channels that may couple
+        in. Each of several recordings has its own initial states; all other parameters are common to them.
+    simulator : Simulator
+    tolerance : mapping, optional
+        Relative standard deviations of the simulator's parameters about their nominal values, in addition to
+        those that the simulator states. Other parameters are free: a misfit that calibrating them removes is
+        no discrepancy.
+    seed : int
+        Seed of the random generator.
+    progress : ProgressCallback
+        Takes a message at the start of each step, and the fraction of a typical diagnosis before it. It
+        decreases if a search is repeated.
+    parallel_map : ParallelMap
+        Calibrates the effects. The result does not depend on it.
+    catalogue : sequence of Effect
+        The effects that are searched for, and the free forms that they are compared with.
+    interim : InterimFindings, optional
+        Receives what is found on the way.
+
+    Raises
+    ------
+    RecordError
+        The record or one of its recordings is too short, or has too few outputs or a constant one, or the
+        simulation diverges on it.
+    SettingsError
+        A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, two effects have the
+        same name, or an effect is invalid.
+    """
+    interim = interim or InterimFindings()
+    prior_std = validate_prior({**get_tolerances(simulator), **(tolerance or {})}, simulator)
+    fitted = count_fitted_samples(record)
+    record, record_findings = admit_channels(record, fitted, find_read_channels(simulator))
+    record_findings += describe_gaps(record)
+    target = make_target(record, fitted, prior_std)
+    try:
+        context = make_context(record, simulator, fitted)
+    except RecordError as error:
+        raise explain_divergence(error, record, simulator, target) from error
+    run = DiagnosisRun((), np.random.default_rng(seed), parallel_map, progress)
+    if find_equations(simulator) is None:
+        simulator = add_output_equation(simulator, context)
+    simulation = ExtendedSimulator(simulator, (), context)
+    progress("calibrating the simulation", 0.0)
+    base = calibrate(simulation, target, simulation.nominal)
+    interim.begin(record, base, target, record_findings)
+    progress("looking for gross errors of the record", 0.01)
+    if gross_errors := find_gross_errors(record, simulator, base, target):
+        found = make_gross_diagnosis(record, base, gross_errors, target)
+        return interim.complete(replace(found, record_findings=(*found.record_findings, *record_findings)))
+    if is_rounding_error(record.y - base.output, record.y):
+        found = make_diagnosis(record, make_exact_outcome(base, target), base, None, run)
+        return interim.complete(replace(found, record_findings=tuple(record_findings)))
+    run = run.with_effects(select_effects(simulator, context, prior_std, catalogue))
+    base, outcome = _search(base, target, run, interim)
+    simulator = base.simulation.simulator
+    interim.reach(EVIDENCE)
+    progress("analysing the residual", 0.9)
+    outcome = interim.keep_outcome(base, assess_evidence(outcome, run), run.effects, step=MODEL_ERROR)
+    is_unknown = outcome.verdict == Verdict.UNKNOWN
+    is_noise = outcome.verdict == Verdict.NOTHING and outcome.hypothesis.fit.noise.order
+    if is_noise or (is_unknown and not explain_all(base, target, run, seed)):
+        second = assess_evidence(search_with_model_error(base, target, run), run)
+        outcome = second if second.verdict != Verdict.UNKNOWN else outcome
+    interim.keep_outcome(base, outcome, run.effects, step=FREE_FORMS)
+    # Coloured noise may hide a discrepancy that no effect of the catalogue explains.
+    is_clean = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
+    if not is_clean:
+        progress("comparing with free forms", 0.9)
+        forms = select_effects(simulator, context, prior_std, catalogue, free=True)
+        outcome = compare_with_free_forms(outcome, forms, run)
+        found_forms = [form for form in forms if form in outcome.hypothesis.effects]
+        run = run.with_effects([*run.effects, *found_forms])
+    interim.keep_outcome(base, outcome, run.effects, step=MISSING_TERMS)
+    progress("searching for missing terms", 0.92)
+    terms = interim.keep_terms(None if is_clean else find_missing_terms(base, outcome, target, run))
+    progress("screening alternative causes", 0.95)
+    found = interim.keep_diagnosis(make_diagnosis(record, outcome, base, terms, run))
+    if terms is not None and replaces_effects(terms, base, outcome, target, run.rng):
+        found = extend_equations(found, terms, target, run)
+    closed_loop = find_closed_loop(found.best, target, record.input_names[0])
+    return interim.complete(replace(found, record_findings=(*record_findings, *closed_loop)))
+
+
+def _search(
+    base: CalibrationResult,
+    target: Target,
+    run: DiagnosisRun,
+    interim: InterimFindings,
+) -> tuple[CalibrationResult, SearchOutcome]:
+    """Search with the intersample behaviour and the step size that suit the simulation with the effects.
+
+    Returns
+    -------
+    CalibrationResult
+        The simulation without effects, calibrated to unweighted residuals.
+    SearchOutcome
+    """
+    simulation, simulator = base.simulation, select_intersample(base, target)
+    tried: set[Discretisation] = set()
+    found: dict[Discretisation, tuple[CalibrationResult, SearchOutcome]] = {}
+    while True:
+        current = get_discretisation(simulator)
+        tried.add(current)
+        base = calibrate(replace(simulation, simulator=simulator), target, base.values)
+        run.progress(f"screening {len(run.effects)} effects", 0.02)
+        recorded = replace(run, parallel_map=interim.record_screening(base, run.parallel_map))
+        screened = screen_effects(base, target, recorded)
+        interim.keep_screening(base, screened)
+        selected = select_intersample(best_single(base, screened), target)
+        if (known := found.get(get_discretisation(selected))) is not None:
+            return known
+        if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
+            outcome = search_with_ar_noise(base, screened, target, run)
+            found[current] = base, outcome
+            selected = select_intersample(outcome.hypothesis.fit, outcome.target)
+            if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
+                return found[current]
+        # The missing effect had hidden that another intersample behaviour or a finer step fits better.
+        run.progress("intersample behaviour changed: repeating the search")
+        simulator = selected

@@ -1,0 +1,110 @@
+"""Result of a diagnosis."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
+from islands.diagnosis.discovery.effect_shape import EffectShape
+from islands.diagnosis.discovery.missing_terms import Discovery
+from islands.diagnosis.gross_errors.record_finding import RecordFinding
+from islands.diagnosis.inference.finding import Finding
+from islands.diagnosis.inference.holdout import HoldoutGain
+from islands.diagnosis.inference.verdict import Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A screened effect: the simulation extended by this effect alone.
+
+    Attributes
+    ----------
+    name : str
+    score : float
+        Score gain in minus twice the log-likelihood, less the BIC penalty.
+    explained_fraction : float
+        Fraction of the explainable misfit that the effect explains.
+    """
+
+    name: str
+    score: float
+    explained_fraction: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Diagnosis:
+    """Result of a diagnosis.
+
+    Attributes
+    ----------
+    verdict : Verdict
+    effects : tuple of Finding
+        The named causes, the most important first, then the properties of the noise. "nothing" has properties
+        of the noise only, and "unknown" and "stopped" have none.
+    candidates : tuple of Candidate
+        All screened effects, the best first.
+    gain : HoldoutGain or None
+        Errors over the hold-out part; None if no effect was added to the simulation.
+    residual_structure : mapping of str to float
+        Maps in which the residual is not random, with their distance in standard deviations.
+    suggested_experiment : str
+        Experiment that discriminates between the named causes and their equivalents; empty if there is none.
+    record : Dataset
+        The record without the channels that were left out.
+    estimation_samples : int
+        Number of samples, from the first on, that are used for estimation; the rest is the hold-out part.
+    base, best : CalibrationResult
+        The simulation calibrated without the effects, and with them.
+    noise_floor : float
+        Expected lower bound on the RMSE of any simulation.
+    is_noise_floor_measured : bool
+        Whether the noise floor is measured from repeated periods; otherwise it is an upper bound from a
+        flexible reference model.
+    nominal_rmse : float
+        RMSE of the simulation at its nominal values over the hold-out part.
+    record_findings : tuple of RecordFinding
+        Channels that were left out, and other findings about the record.
+    discovery : Discovery or None
+        Equations with missing terms. They are the cause if the verdict is "discovered", and equivalent to the
+        named cause otherwise. None if there are none.
+    shape : EffectShape or None
+        Curve of a single named effect next to the free curve in its place; None if it has none.
+    left_out : tuple of str
+        Steps that a stopped diagnosis has left out; empty for a complete one.
+    """
+
+    verdict: Verdict
+    effects: tuple[Finding, ...]
+    candidates: tuple[Candidate, ...]
+    gain: HoldoutGain | None
+    residual_structure: Mapping[str, float]
+    suggested_experiment: str
+    record: Dataset = field(repr=False)
+    estimation_samples: int
+    base: CalibrationResult = field(repr=False)
+    best: CalibrationResult = field(repr=False)
+    noise_floor: float
+    is_noise_floor_measured: bool
+    nominal_rmse: float
+    record_findings: tuple[RecordFinding, ...] = ()
+    discovery: Discovery | None = None
+    shape: EffectShape | None = None
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def causes(self) -> tuple[Finding, ...]:
+        """The named causes, the most important first."""
+        return tuple(each for each in self.effects if each.explained_fraction is not None)
+
+    @property
+    def noise(self) -> tuple[Finding, ...]:
+        """The properties of the noise. They are no discrepancy: alone they leave the verdict "nothing"."""
+        return tuple(each for each in self.effects if each.explained_fraction is None)
+
+    @property
+    def held_out_part(self) -> str:
+        """Name of the hold-out part in a sentence."""
+        if not self.record.held_out:
+            return "the last quarter of the record"
+        count = len(self.record[self.estimation_samples :].rows_by_recording)
+        return "the last recording" if count == 1 else f"the last {count} recordings"

@@ -1,1 +1,0 @@
-"""Diagnosis of a simulation: which effects it lacks, and how much they improve it. Read `diagnosis` first."""

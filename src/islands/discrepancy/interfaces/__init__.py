@@ -1,1 +1,0 @@
-"""Types that simulators and effects implement. Read `effect` and `simulator` first."""

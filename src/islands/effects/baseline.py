@@ -1,0 +1,169 @@
+"""Effects on the baseline: offsets, drifts and jumps."""
+
+from islands.effects.channels import channel, channel_range, channel_unit, has_channel
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
+from islands.effects.interface.map_equation import MapEquation
+from islands.effects.time_variation import (
+    candidate_instants,
+    instant_bounds,
+    smooth_step,
+    write_step,
+)
+
+
+def _offset_form(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
+    return y + values[0]
+
+
+def _offset_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),)
+
+
+def _offset_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.01 * context.output_peak,),)
+
+
+OFFSET = Effect(
+    name="offset",
+    summary="Zero offset of the output: y + c",
+    family="baseline",
+    site=Site.OUTPUT,
+    parameters=_offset_parameters,
+    starting_points=_offset_starting_points,
+    form=_offset_form,
+    equation=lambda _: MapEquation("x + n0"),
+    source="Doebelin, Measurement Systems, section 3",
+    similar_to="jump, even-nonlinearity, input-offset",
+    distinguished_by="the mean of the residual",
+)
+
+
+def input_offset(state: str, unit: str = "", size: float = 0.0) -> Effect:
+    """Return the offset in the balance of one state as an effect.
+
+    Its value has a unit and a typical size, by default those of the input.
+    """
+    label = f"{INPUT_OFFSET.name}:{state}"
+
+    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+        return (Parameter(label, unit or context.input_unit, 0.0, 0.01 * (size or context.input_peak)),)
+
+    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        return ((0.02 * (size or context.input_peak),),)
+
+    return Effect(
+        name=label,
+        summary=INPUT_OFFSET.summary,
+        family="baseline",
+        site=Site.CORE,
+        parameters=parameters,
+        starting_points=starting_points,
+        form=None,
+        source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
+    )
+
+
+INPUT_OFFSET = EffectTemplate(
+    "input-offset",
+    "Constant flow or force in addition to the input: + c in the balance of one state",
+    similar_to="offset, outflow-law",
+    distinguished_by="an offset filtered by the equation; in tanks it shifts with the level",
+)
+
+
+def _linear_drift_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * context.time / context.duration
+
+
+def _linear_drift_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),)
+
+
+def _linear_drift_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.01 * context.output_peak,),)
+
+
+LINEAR_DRIFT = Effect(
+    name="linear-drift",
+    summary="Linear drift of the output: y + c t / T over the record's duration T",
+    family="baseline",
+    site=Site.OUTPUT,
+    parameters=_linear_drift_parameters,
+    starting_points=_linear_drift_starting_points,
+    form=_linear_drift_form,
+    equation=lambda context: MapEquation(f"x + n0*t/{context.duration}"),
+    source="Doebelin, Measurement Systems, section 3",
+    similar_to="jump, thermal-drift, exponential-creep",
+    distinguished_by="the residual over time",
+)
+
+
+def _jump_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * smooth_step(context, values[1])
+
+
+def _jump_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),
+        Parameter("instant", "s", 0.0, 0.3 * context.fit_end_time / 45, *instant_bounds(context)),
+    )
+
+
+def _jump_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((0.02 * context.output_peak, instant) for instant in candidate_instants(context))
+
+
+JUMP = Effect(
+    name="jump",
+    summary="Jump of the output's zero: y + c after an instant",
+    family="baseline",
+    site=Site.OUTPUT,
+    parameters=_jump_parameters,
+    starting_points=_jump_starting_points,
+    form=_jump_form,
+    equation=lambda context: MapEquation(f"x + n0*{write_step(context, 'n1')}"),
+    source="Basseville and Nikiforov, Detection of Abrupt Changes",
+    extra_degrees_of_freedom=1,
+    similar_to="linear-drift, offset",
+    distinguished_by="the residual over time, before and after one instant",
+)
+
+
+def _thermal_drift_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * channel(context, True)
+
+
+def _thermal_drift_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "k",
+            f"{context.output_unit}/{channel_unit(context, True)}",
+            0.0,
+            0.01 * context.output_peak / channel_range(context, True),
+        ),
+    )
+
+
+def _thermal_drift_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.output_peak / channel_range(context, True),),)
+
+
+THERMAL_DRIFT = Effect(
+    name="thermal-drift",
+    summary="The output follows a temperature: y + k (T - T(0)), where T is a given channel",
+    family="baseline",
+    site=Site.OUTPUT,
+    parameters=_thermal_drift_parameters,
+    starting_points=_thermal_drift_starting_points,
+    form=_thermal_drift_form,
+    equation=lambda _: MapEquation("x + n0*z0", (("temperature",),)),
+    source="Doebelin, Measurement Systems, section 2",
+    is_applicable=lambda context: has_channel(context, True),
+    similar_to="cross-coupling; linear-drift if the temperature only rises",
+    distinguished_by="follows a channel in K, degC or degF",
+)

@@ -1,0 +1,111 @@
+"""Catalogue of effects.
+
+To add an effect, define it in the file of its family and add it to `EFFECTS`.
+"""
+
+from collections.abc import Iterable, Mapping
+
+from islands.effects.baseline import INPUT_OFFSET, JUMP, LINEAR_DRIFT, OFFSET, THERMAL_DRIFT
+from islands.effects.creep import EXPONENTIAL_CREEP, LOGARITHMIC_CREEP
+from islands.effects.disturbance import CROSS_COUPLING, PERIODIC_DISTURBANCE
+from islands.effects.free_forms import FREE_FORMS
+from islands.effects.friction import (
+    COULOMB_FRICTION,
+    QUADRATIC_DRAG,
+    VISCOUS,
+    VISCOUS_ASYMMETRY,
+)
+from islands.effects.hysteresis import (
+    BACKLASH,
+    LOOP_ASYMMETRY,
+    RATE_DEPENDENT_LOOP,
+    RELAXATION,
+    SECOND_HYSTERESIS,
+    STICTION,
+)
+from islands.effects.interface.effect import Effect, EffectTemplate
+from islands.effects.model_form import MODEL_FORM
+from islands.effects.nonlinearity import (
+    ABSOLUTE_VALUE_SENSOR,
+    CUBIC_STIFFNESS,
+    DEAD_ZONE,
+    EVEN_NONLINEARITY,
+    INPUT_SATURATION,
+    OUTFLOW_LAW,
+    OUTPUT_SATURATION,
+    STATE_CLIP,
+)
+from islands.effects.scale import INPUT_GAIN, SENSOR_GAIN, WRONG_PARAMETER
+from islands.effects.spatial_period import COGGING, CYCLIC_ERROR
+from islands.effects.time_variation import AGEING, GAIN_STEP
+from islands.effects.timing import CLOCK_SKEW, DELAY, RATE_LIMIT, RESONANCE, SENSOR_LAG
+
+#: All effects and free forms, in the order in which maps act on a signal. Drifts and disturbances move the
+#: scale of an encoder, so that they act before its cyclic error. The order also breaks ties between scores:
+#: another order changes results.
+EFFECTS: tuple[Effect, ...] = (
+    DELAY,
+    CLOCK_SKEW,
+    INPUT_GAIN,
+    DEAD_ZONE,
+    INPUT_SATURATION,
+    RATE_LIMIT,
+    BACKLASH,
+    STICTION,
+    RELAXATION,
+    RATE_DEPENDENT_LOOP,
+    LOOP_ASYMMETRY,
+    SECOND_HYSTERESIS,
+    GAIN_STEP,
+    AGEING,
+    VISCOUS,
+    COULOMB_FRICTION,
+    VISCOUS_ASYMMETRY,
+    QUADRATIC_DRAG,
+    EVEN_NONLINEARITY,
+    CUBIC_STIFFNESS,
+    COGGING,
+    EXPONENTIAL_CREEP,
+    LOGARITHMIC_CREEP,
+    SENSOR_LAG,
+    RESONANCE,
+    ABSOLUTE_VALUE_SENSOR,
+    OUTPUT_SATURATION,
+    OFFSET,
+    LINEAR_DRIFT,
+    JUMP,
+    THERMAL_DRIFT,
+    CROSS_COUPLING,
+    PERIODIC_DISTURBANCE,
+    CYCLIC_ERROR,
+    SENSOR_GAIN,
+    *FREE_FORMS,
+)
+
+#: Effects and free forms by name.
+CATALOGUE: Mapping[str, Effect] = {effect.name: effect for effect in EFFECTS}
+
+#: Templates of the effects that exist once for each state, parameter or model of a simulation, by name.
+OF_EACH: Mapping[str, EffectTemplate] = {
+    template.name: template
+    for template in (WRONG_PARAMETER, STATE_CLIP, INPUT_OFFSET, OUTFLOW_LAW, MODEL_FORM)
+}
+
+
+def get_summary(name: str) -> str:
+    """Return the summary of an effect, given its name with or without a state or parameter."""
+    cause = name.partition(":")[0]
+    return (CATALOGUE.get(cause) or OF_EACH[cause]).summary
+
+
+def catalogue_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Sort effects in the order in which they act: that of the catalogue, then other maps by name."""
+    places = {name: place for place, name in enumerate(CATALOGUE)}
+
+    def place(effect: Effect) -> tuple[int, str]:
+        if effect.name in places:
+            return places[effect.name], ""
+        # Effects on parameters and states are part of the equation; their order does not matter.
+        return (-1, "") if effect.form is None else (len(places), effect.name)
+
+    return tuple(sorted(effects, key=place))

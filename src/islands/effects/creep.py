@@ -1,0 +1,108 @@
+"""Creep: exponential and logarithmic."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from islands.data.segments import is_resting
+from islands.effects.filters import low_pass
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.map_equation import MapEquation
+
+#: Largest step before the first sample, times the fraction that creeps, relative to the largest output.
+_MAX_EARLIER_STEP = 10.0
+
+
+def _earlier_step(y: Signal, tau: float, context: SimulationContext) -> Signal | float:
+    """Return the creep after a step before the first sample, as large as the largest output.
+
+    Without a step within the estimation part, creep comes from an earlier one, whose size is unknown.
+    """
+    fitted = round((context.fit_end_time - context.start_time) / context.dt)
+    if fitted <= 0 or not is_resting(y[:fitted]):
+        return 0.0
+    return context.output_peak * -np.expm1(-context.dt * np.arange(y.size) / tau)
+
+
+def _write_creep(taus: Sequence[str], context: SimulationContext) -> MapEquation:
+    """Write the map of a creep with several time constants; an earlier step counts if the signal rests."""
+    parts = [
+        f"z{place} - z0 + z1*{context.output_peak}*(1 - exp(-t/{tau}))"
+        for place, tau in enumerate(taus, start=2)
+    ]
+    low_passes = tuple(("low-pass", tau) for tau in taus)
+    return MapEquation(f"x + n0*({' + '.join(parts)})", (("first",), ("rests",), *low_passes))
+
+
+def _limit_kappa(context: SimulationContext, lower: float, upper: float) -> tuple[float, float]:
+    """Return the bounds of kappa: the given ones, or wider ones for an earlier step of unknown size."""
+    return (-_MAX_EARLIER_STEP, _MAX_EARLIER_STEP) if context.has_resting_input else (lower, upper)
+
+
+def _exponential_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    tau = float(np.exp(values[1]))
+    return y + values[0] * (low_pass(y, tau, context.dt) - y[0] + _earlier_step(y, tau, context))
+
+
+def _exponential_creep_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter("kappa", "", 0.0, 0.02, *_limit_kappa(context, -0.5, 1.0)),
+        Parameter("log_tau", "ln s", 0.0, 0.3, np.log(5 * context.dt), np.log(1.5 * context.fit_end_time)),
+    )
+
+
+def _exponential_creep_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    taus = (max(part * context.fit_end_time, 6 * context.dt) for part in (0.003, 0.01, 0.03, 0.1, 0.3))
+    return tuple((0.03, float(np.log(tau))) for tau in taus)
+
+
+EXPONENTIAL_CREEP = Effect(
+    name="exponential-creep",
+    summary="Exponential creep of the output: y + kappa times y after a low-pass with time constant tau",
+    family="memory",
+    site=Site.OUTPUT,
+    parameters=_exponential_creep_parameters,
+    starting_points=_exponential_creep_starting_points,
+    form=_exponential_creep_form,
+    equation=lambda context: _write_creep(["exp(n1)"], context),
+    source="Kuhnen and Janocha, Inverse feedforward controller for complex hysteretic nonlinearities, 1999",
+    similar_to="relaxation, logarithmic-creep, linear-drift",
+    distinguished_by="the output continues at constant input, with one time constant",
+)
+
+#: Time constants of the low-passes of logarithmic creep, in seconds.
+TAUS = (0.3, 1.0, 3.0, 10.0, 30.0)
+
+
+def _logarithmic_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * sum(
+        low_pass(y, tau, context.dt) - y[0] + _earlier_step(y, tau, context) for tau in TAUS
+    )
+
+
+def _logarithmic_creep_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("kappa", "", 0.0, 0.005, *_limit_kappa(context, -0.3, 0.3)),)
+
+
+def _logarithmic_creep_starting_points(
+    _context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.01,),)
+
+
+LOGARITHMIC_CREEP = Effect(
+    name="logarithmic-creep",
+    summary="Logarithmic creep of the output: y + kappa times a sum of low-passes, two per decade",
+    family="memory",
+    site=Site.OUTPUT,
+    parameters=_logarithmic_creep_parameters,
+    starting_points=_logarithmic_creep_starting_points,
+    form=_logarithmic_creep_form,
+    equation=lambda context: _write_creep(list(map(str, TAUS)), context),
+    source="Jung and Gweon, Creep characteristics of piezoelectric actuators, 2000",
+    similar_to="exponential-creep",
+    distinguished_by="the output continues at constant input, by equal steps in each decade of time",
+)

@@ -1,0 +1,116 @@
+"""Disturbances: coupling of another channel, a periodic disturbance."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.effects.channels import channel, channel_range, channel_unit, has_channel
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.input_spectrum import LINE_WIDTH, compute_spectrum, find_single_frequency
+from islands.effects.interface.map_equation import MapEquation
+
+#: Error of the frequency of a line in the spectrum, relative to the resolution.
+LINE_ERROR = 0.1
+
+
+def _cross_coupling_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * channel(context, False)
+
+
+def _cross_coupling_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "k",
+            f"{context.output_unit}/{channel_unit(context, False)}",
+            0.0,
+            0.01 * context.output_peak / channel_range(context, False),
+        ),
+    )
+
+
+def _cross_coupling_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.output_peak / channel_range(context, False),),)
+
+
+CROSS_COUPLING = Effect(
+    name="cross-coupling",
+    summary="Another signal couples into the output: y + k w, where w is a given channel",
+    family="disturbance",
+    site=Site.OUTPUT,
+    parameters=_cross_coupling_parameters,
+    starting_points=_cross_coupling_starting_points,
+    form=_cross_coupling_form,
+    equation=lambda _: MapEquation("x + n0*z0", (("coupled",),)),
+    source="Ljung, System Identification, 2nd ed., section 13",
+    is_applicable=lambda context: has_channel(context, False),
+    similar_to="thermal-drift",
+    distinguished_by="follows a channel that is not a temperature",
+)
+
+
+def _periodic_disturbance_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    angle = 2 * np.pi * values[2] * context.time
+    return y + values[0] * np.cos(angle) + values[1] * np.sin(angle)
+
+
+def _periodic_disturbance_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter("cosine", context.output_unit, 0.0, 0.005 * context.output_peak),
+        Parameter("sine", context.output_unit, 0.0, 0.005 * context.output_peak),
+        Parameter(
+            "frequency", "Hz", 0.0, 0.1 / context.fit_end_time, 2.0 / context.fit_end_time, 0.499 / context.dt
+        ),
+    )
+
+
+def _find_input_harmonics(
+    frequencies: NDArray[np.floating[Any]], context: SimulationContext
+) -> NDArray[np.bool_]:
+    """Return which frequencies are multiples of that of an input with a single line in its spectrum.
+
+    A disturbance there cannot be distinguished from a distortion of the response.
+    """
+    line = find_single_frequency(context)
+    if line is None:
+        return np.zeros(frequencies.size, dtype=np.bool_)
+    order = np.round(frequencies / line)
+    distance = np.abs(frequencies - order * line)
+    return (order >= 1) & (distance < (LINE_WIDTH + LINE_ERROR * order) / context.fit_end_time)
+
+
+def _periodic_disturbance_starting_points(
+    context: SimulationContext, residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    fitted = int(context.fit_end_time / context.dt)
+    spectrum = compute_spectrum(residual[:fitted])
+    frequencies = np.fft.rfftfreq(4 * fitted, context.dt)
+    spectrum[frequencies < 2.0 / context.fit_end_time] = 0.0
+    spectrum[_find_input_harmonics(frequencies, context)] = 0.0
+    if not spectrum.any():
+        return ()
+    strongest = float(frequencies[np.argmax(spectrum)])
+    angle = 2 * np.pi * strongest * context.time[:fitted]
+    waves = np.column_stack([np.cos(angle), np.sin(angle)])
+    cosine, sine = np.linalg.lstsq(waves, residual[:fitted], rcond=None)[0]
+    return ((float(cosine), float(sine), strongest),)
+
+
+PERIODIC_DISTURBANCE = Effect(
+    name="periodic-disturbance",
+    summary="Sinusoidal disturbance of unknown frequency, added to the output",
+    family="disturbance",
+    site=Site.OUTPUT,
+    parameters=_periodic_disturbance_parameters,
+    starting_points=_periodic_disturbance_starting_points,
+    form=_periodic_disturbance_form,
+    equation=lambda _: MapEquation(f"x + n0*cos({2 * np.pi}*n2*t) + n1*sin({2 * np.pi}*n2*t)"),
+    source="Stoica and Moses, Spectral Analysis of Signals, section 4",
+    linear_parameters=2,
+    extra_degrees_of_freedom=2,
+    similar_to="resonance",
+    distinguished_by="a line in the spectrum that is no multiple of the frequency of the input",
+)

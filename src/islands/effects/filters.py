@@ -1,0 +1,82 @@
+"""Filters that several effects use: first-order low-pass and fractional delay."""
+
+from functools import lru_cache
+from math import exp, factorial
+
+import numpy as np
+import scipy
+
+from islands.effects.interface.effect import Signal
+
+#: Coefficients of s^0 to s^3 of the cubic Lagrange polynomials, one row for each neighbour at -1, 0, 1, 2.
+_LAGRANGE = np.array(
+    [
+        [0.0, -1 / 3, 1 / 2, -1 / 6],
+        [1.0, -1 / 2, -1.0, 1 / 2],
+        [0.0, 1.0, 1 / 2, -1 / 2],
+        [0.0, -1 / 6, 0, 1 / 6],
+    ]
+)
+
+#: Step, relative to the time constant, from which the moments are computed by recursion; by series below it.
+_RECURSION_STEP = 1.0
+
+#: Terms of the series of the moments.
+_SERIES_TERMS = 20
+
+
+def low_pass(signal: Signal, tau: float, dt: float) -> Signal:
+    """Filter a signal with a first-order low-pass; exact if the signal is a cubic through four neighbours.
+
+    Linear interpolation between samples is accurate for slow signals only: at ten samples per period, its
+    error makes a lag of half a sample look like another effect.
+    """
+    step = dt / tau
+    weights = _compute_weights(step)
+    start = signal[0]
+    seen = np.concatenate([[0.0], signal - start, [signal[-1] - start]])
+    moved = np.convolve(seen, weights[::-1], mode="valid")
+    followed = scipy.signal.lfilter([1.0], [1.0, -exp(-step)], moved)
+    return np.concatenate([[start], followed + start])
+
+
+@lru_cache(maxsize=256)
+def _compute_weights(step: float) -> Signal:
+    """Return the weights of four neighbours; a calibration needs those of few time constants."""
+    return np.array(_LAGRANGE @ _moments(step))
+
+
+def _moments(step: float) -> Signal:
+    """Return the integrals of ``step exp(-step (1 - s)) s^n`` over s from 0 to 1, n from 0 to 3."""
+    if step < _RECURSION_STEP:
+        return np.array(
+            [
+                step * exp(-step) * sum(step**m / (factorial(m) * (n + m + 1)) for m in range(_SERIES_TERMS))
+                for n in range(4)
+            ]
+        )
+    moments = [1.0 - exp(-step)]
+    for n in range(1, 4):
+        moments.append(1.0 - n / step * moments[-1])
+    return np.array(moments)
+
+
+#: Offsets of the neighbours that an interpolation uses. With four neighbours, the error for a signal of ten
+#: samples per period is as large as that of a delay of a hundredth of a sample.
+_NEIGHBOURS = (-2, -1, 0, 1, 2, 3)
+
+
+def interpolate_at(signal: Signal, at: Signal) -> Signal:
+    """Interpolate at positions in samples, through six neighbours (Lagrange); the end values are held."""
+    last = signal.size - 1
+    at = np.clip(at, 0.0, last)
+    first = np.minimum(at.astype(np.int64), max(last - 1, 0))
+    f = at - first
+    interpolated = np.zeros_like(at)
+    for here in _NEIGHBOURS:
+        weight = signal[np.clip(first + here, 0, last)]
+        for other in _NEIGHBOURS:
+            if other != here:
+                weight = weight * ((f - other) / (here - other))
+        interpolated += weight
+    return interpolated

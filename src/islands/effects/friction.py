@@ -1,0 +1,141 @@
+"""Friction: viscous, dry, one-sided, and quadratic drag."""
+
+from math import tanh
+from typing import Any
+
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, ForceLaw, Signal, SimulationContext, Site
+
+
+def _coulomb_friction_force(_x: float, rate: float, _z: float, numbers: Any) -> float:
+    # Smoothed around zero rate: calibration requires a derivative, and a step has none.
+    return numbers[0] * tanh(rate / numbers[1])
+
+
+def _coulomb_friction_constants(context: SimulationContext) -> tuple[float, ...]:
+    return (context.force_coordinate.friction_smoothing * context.force_coordinate.rate,)
+
+
+def _coulomb_friction_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    coordinate = context.force_coordinate
+    return (Parameter("F", coordinate.force_unit, 0.0, 0.005 * coordinate.force, coordinate.lower_bound),)
+
+
+def _coulomb_friction_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.01 * context.force_coordinate.force,),)
+
+
+COULOMB_FRICTION = Effect(
+    name="coulomb-friction",
+    summary="Dry friction: - F sign(x')",
+    family="memory",
+    site=Site.FORCE,
+    parameters=_coulomb_friction_parameters,
+    starting_points=_coulomb_friction_starting_points,
+    form=ForceLaw(
+        _coulomb_friction_force,
+        constants=_coulomb_friction_constants,
+        is_dissipative=True,
+        equation="n0*tanh(v/n1)",
+    ),
+    source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
+    similar_to="backlash, second-hysteresis",
+    distinguished_by="a step of the residual at rate zero",
+)
+
+
+def _viscous_force(_x: float, rate: float, _z: float, c: Any) -> float:
+    return c[0] * rate
+
+
+def _viscous_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    coordinate = context.force_coordinate
+    return (
+        Parameter(
+            "c",
+            f"{coordinate.force_unit} s/{coordinate.unit}",
+            0.0,
+            0.01 * coordinate.force / coordinate.rate,
+            coordinate.lower_bound,
+        ),
+    )
+
+
+def _viscous_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.force_coordinate.force / context.force_coordinate.rate,),)
+
+
+VISCOUS = Effect(
+    name="viscous",
+    summary="Viscous friction: - c x'",
+    family="timing",
+    site=Site.FORCE,
+    parameters=_viscous_parameters,
+    starting_points=_viscous_starting_points,
+    form=ForceLaw(_viscous_force, is_dissipative=True, equation="n0*v"),
+    source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
+    similar_to="delay, sensor-lag",
+    distinguished_by="the hysteretic part of the output is not delayed",
+)
+
+
+def _viscous_asymmetry_force(_x: float, rate: float, _z: float, c: Any) -> float:
+    return c[0] * abs(rate)
+
+
+def _viscous_asymmetry_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    coordinate = context.force_coordinate
+    return (
+        Parameter(
+            "c",
+            f"{coordinate.force_unit} s/{coordinate.unit}",
+            0.0,
+            0.01 * coordinate.force / coordinate.rate,
+        ),
+    )
+
+
+VISCOUS_ASYMMETRY = Effect(
+    name="viscous-asymmetry",
+    summary="Friction that differs between the directions: - c |x'|",
+    family="memory",
+    site=Site.FORCE,
+    parameters=_viscous_asymmetry_parameters,
+    starting_points=_viscous_starting_points,
+    form=ForceLaw(_viscous_asymmetry_force, is_dissipative=True, equation="n0*abs(v)"),
+    source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
+    similar_to="offset, loop-asymmetry",
+    distinguished_by="the slope over the rate differs with the sign of the rate",
+)
+
+
+def _quadratic_drag_force(_x: float, rate: float, _z: float, c: Any) -> float:
+    return c[0] * abs(rate) * rate
+
+
+def _quadratic_drag_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    coordinate = context.force_coordinate
+    unit = f"{coordinate.force_unit} s^2/{coordinate.unit}^2"
+    return (Parameter("c", unit, 0.0, 0.01 * coordinate.force / coordinate.rate**2, coordinate.lower_bound),)
+
+
+def _quadratic_drag_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.force_coordinate.force / context.force_coordinate.rate**2,),)
+
+
+QUADRATIC_DRAG = Effect(
+    name="quadratic-drag",
+    summary="Quadratic drag, as in turbulent flow: - c |x'| x'",
+    family="shape",
+    site=Site.FORCE,
+    parameters=_quadratic_drag_parameters,
+    starting_points=_quadratic_drag_starting_points,
+    form=ForceLaw(_quadratic_drag_force, is_dissipative=True, equation="n0*abs(v)*v"),
+    source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
+    similar_to="viscous; on a single sine also second-hysteresis",
+    distinguished_by="drag grows with the square of the frequency, hysteresis does not",
+)

@@ -1,0 +1,252 @@
+"""Effects with hysteresis: stiction, backlash, a second hysteresis, changes of the loop."""
+
+from typing import Any
+
+import numpy as np
+
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, ForceLaw, Signal, SimulationContext, Site
+from islands.effects.interface.map_equation import MapEquation
+from islands.kernels.memory_operators import play_from, slider
+
+
+def _stiction_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
+    if values[0] <= 0.0:
+        return u
+    moved = np.empty_like(u)
+    slider(u, values[0], moved)
+    return moved
+
+
+def _stiction_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "breakaway", context.input_unit, 0.0, 0.005 * context.input_peak, 0.0, 0.3 * context.input_peak
+        ),
+    )
+
+
+def _stiction_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    # The response to the breakaway distance is discontinuous, so that derivatives do not lead to the optimum:
+    # a fine grid replaces them.
+    return tuple((float(part) * context.input_peak,) for part in np.geomspace(0.005, 0.3, 24))
+
+
+STICTION = Effect(
+    name="stiction",
+    summary="Stick-slip of the input: it moves only after a breakaway distance",
+    family="memory",
+    site=Site.INPUT,
+    parameters=_stiction_parameters,
+    starting_points=_stiction_starting_points,
+    form=_stiction_form,
+    equation=lambda _: MapEquation("z0", (("slider", "n0"),)),
+    source="Choudhury, Thornhill and Shah, Modelling valve stiction, 2005",
+    linear_parameters=0,
+    similar_to="backlash, dead-zone, coulomb-friction",
+    distinguished_by="samples of one slip have the same error while the input is slow; noise can hide that",
+)
+
+
+def _backlash_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
+    return play_from(u, values[0]) if values[0] > 0.0 else u
+
+
+def _backlash_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter("b", context.input_unit, 0.0, 0.005 * context.input_peak, 0.0, 0.3 * context.input_peak),
+    )
+
+
+def _backlash_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((part * context.input_peak,) for part in (0.005, 0.0175, 0.05, 0.125))
+
+
+BACKLASH = Effect(
+    name="backlash",
+    summary="Backlash of the input: a play of half width b",
+    family="memory",
+    site=Site.INPUT,
+    parameters=_backlash_parameters,
+    starting_points=_backlash_starting_points,
+    form=_backlash_form,
+    equation=lambda _: MapEquation("z0", (("play", "n0"),)),
+    source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
+    confounded_with=(STICTION, 2.0),
+    similar_to="stiction, coulomb-friction, exponential-creep",
+    distinguished_by="lost motion of constant width after each reversal",
+)
+
+
+def _relaxation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("relaxation", "1/s", 0.0, 0.05, -0.05, 10.0),)
+
+
+def _relaxation_starting_points(
+    _context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.1,), (1.0,))
+
+
+RELAXATION = Effect(
+    name="relaxation",
+    summary="The hysteretic state decays: - h / tau in h'",
+    family="memory",
+    site=Site.CORE,
+    parameters=_relaxation_parameters,
+    starting_points=_relaxation_starting_points,
+    form=None,
+    source="Bouc-Wen models with relaxation; Ikhouane and Rodellar, Systems with Hysteresis, section 2",
+    similar_to="exponential-creep",
+    distinguished_by="hysteresis decays while the input is constant; slow loops are narrower",
+)
+
+
+def _rate_dependent_loop_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "rate-dependent-loop",
+            f"s/{context.input_unit}",
+            0.0,
+            0.05 / context.force_coordinate.rate,
+            -0.6 / context.force_coordinate.rate,
+            5.0 / context.force_coordinate.rate,
+        ),
+    )
+
+
+def _rate_dependent_loop_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.1 / context.force_coordinate.rate,),)
+
+
+RATE_DEPENDENT_LOOP = Effect(
+    name="rate-dependent-loop",
+    summary="The shape of the loop depends on the rate: beta and gamma times (1 + k |u'|)",
+    family="memory",
+    site=Site.CORE,
+    parameters=_rate_dependent_loop_parameters,
+    starting_points=_rate_dependent_loop_starting_points,
+    form=None,
+    source="Al Janaideh et al., generalized rate-dependent hysteresis models, 2009",
+    similar_to="viscous, delay",
+    distinguished_by="the width of the loop over the rate, at one amplitude",
+)
+
+
+def _loop_asymmetry_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "loop-asymmetry",
+            f"1/{context.input_unit}",
+            0.0,
+            0.02 / context.input_peak,
+            -0.35 / context.input_peak,
+            0.35 / context.input_peak,
+        ),
+    )
+
+
+def _loop_asymmetry_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.04 / context.input_peak,),)
+
+
+LOOP_ASYMMETRY = Effect(
+    name="loop-asymmetry",
+    summary="The loop is not symmetric: - delta |u'| |h| in h'",
+    family="memory",
+    site=Site.CORE,
+    parameters=_loop_asymmetry_parameters,
+    starting_points=_loop_asymmetry_starting_points,
+    form=None,
+    source="Wang and Wen, Parameter estimation of Bouc-Wen with asymmetry, 1998",
+    similar_to="jump, offset, viscous-asymmetry",
+    distinguished_by="the two branches of the loop are not mirror images",
+)
+
+#: Starting points of chi, times the peak of the coordinate.
+_SECOND_HYSTERESIS_CHI = (0.3, 1.0, 2.5, 8.0, 25.0)
+
+#: Starting points of g, relative to chi.
+_SECOND_HYSTERESIS_G = (0.0, 0.8, -1.2)
+
+#: Largest absolute value of g, relative to chi. With larger ones the element dissipates little, and draws the
+#: curve of a saturating or hardening spring.
+_MAX_RATIO = 1.5
+
+
+def _second_hysteresis_force(_x: float, _rate: float, z: float, numbers: Any) -> float:
+    return numbers[0] * z
+
+
+def _second_hysteresis_derivative(_x: float, rate: float, z: float, numbers: Any) -> float:
+    most = _MAX_RATIO * numbers[1]
+    return rate - numbers[1] * abs(rate) * z - min(max(numbers[2], -most), most) * rate * abs(z)
+
+
+def _project_second_hysteresis(values: Signal) -> Signal:
+    projected, most = values.copy(), _MAX_RATIO * values[1]
+    projected[2] = np.clip(values[2], -most, most)
+    return projected
+
+
+def _second_hysteresis_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    coordinate = context.force_coordinate
+    inverse_peak = 1.0 / coordinate.peak
+    return (
+        Parameter(
+            "k",
+            f"{coordinate.force_unit}/{coordinate.unit}",
+            0.0,
+            0.01 * coordinate.force * inverse_peak,
+            coordinate.lower_bound,
+        ),
+        Parameter("chi", f"1/{coordinate.unit}", inverse_peak, 0.3 * inverse_peak, 0.0, 100.0 * inverse_peak),
+        Parameter(
+            "g", f"1/{coordinate.unit}", 0.0, 0.3 * inverse_peak, -50.0 * inverse_peak, 50.0 * inverse_peak
+        ),
+        Parameter(
+            "z0",
+            coordinate.unit,
+            0.0,
+            0.05 * coordinate.peak,
+            -3.0 * coordinate.peak,
+            3.0 * coordinate.peak,
+            initial=True,
+        ),
+    )
+
+
+def _second_hysteresis_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    coordinate = context.force_coordinate
+    return tuple(
+        (0.03 * coordinate.force / coordinate.peak, chi / coordinate.peak, g * chi / coordinate.peak, 0.0)
+        for chi in _SECOND_HYSTERESIS_CHI
+        for g in _SECOND_HYSTERESIS_G
+    )
+
+
+SECOND_HYSTERESIS = Effect(
+    name="second-hysteresis",
+    summary=f"Another hysteretic element: + k z, z' = x' - chi |x'| z - g x' |z|, |g| <= {_MAX_RATIO} chi",
+    family="memory",
+    site=Site.FORCE,
+    parameters=_second_hysteresis_parameters,
+    starting_points=_second_hysteresis_starting_points,
+    form=ForceLaw(
+        _second_hysteresis_force,
+        _second_hysteresis_derivative,
+        initial_state_index=3,
+        equation="n0*z",
+        state_equation=f"v - n1*abs(v)*z - min(max(n2, -{_MAX_RATIO}*n1), {_MAX_RATIO}*n1)*v*abs(z)",
+    ),
+    source="Ikhouane and Rodellar, Systems with Hysteresis, section 2",
+    project=_project_second_hysteresis,
+    similar_to="exponential-creep, coulomb-friction, cubic-stiffness; on a single sine also quadratic-drag",
+    distinguished_by="memory that does not depend on the rate: repeat the record at another frequency",
+)

@@ -1,0 +1,1 @@
+"""Types of which effects are made. Read `effect` first."""

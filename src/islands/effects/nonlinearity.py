@@ -1,0 +1,295 @@
+"""Static nonlinearities of input, coordinate, state and output."""
+
+from typing import Any
+
+import numpy as np
+
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
+from islands.effects.interface.force import ForceLaw
+from islands.effects.interface.map_equation import MapEquation
+
+
+def _cubic_stiffness_force(x: float, _rate: float, _z: float, k: Any) -> float:
+    return k[0] * x * x * x
+
+
+def _cubic_stiffness_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    coordinate = context.force_coordinate
+    return (
+        Parameter(
+            "k",
+            f"{coordinate.force_unit}/{coordinate.unit}^3",
+            0.0,
+            0.01 * coordinate.force / coordinate.peak**3,
+        ),
+    )
+
+
+def _cubic_stiffness_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.force_coordinate.force / context.force_coordinate.peak**3,),)
+
+
+CUBIC_STIFFNESS = Effect(
+    name="cubic-stiffness",
+    summary="Odd term of the characteristic: + k x^3 in the restoring force or in the output",
+    family="shape",
+    site=Site.FORCE,
+    parameters=_cubic_stiffness_parameters,
+    starting_points=_cubic_stiffness_starting_points,
+    form=ForceLaw(_cubic_stiffness_force, equation="n0*x*x*x"),
+    source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
+    similar_to="input-saturation",
+    distinguished_by="an odd curve over the coordinate, at all rates",
+)
+
+
+def _even_nonlinearity_force(x: float, _rate: float, _z: float, k: Any) -> float:
+    return k[0] * x * x
+
+
+def _even_nonlinearity_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    coordinate = context.force_coordinate
+    return (
+        Parameter(
+            "k",
+            f"{coordinate.force_unit}/{coordinate.unit}^2",
+            0.0,
+            0.01 * coordinate.force / coordinate.peak**2,
+        ),
+    )
+
+
+def _even_nonlinearity_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.force_coordinate.force / context.force_coordinate.peak**2,),)
+
+
+EVEN_NONLINEARITY = Effect(
+    name="even-nonlinearity",
+    summary="Even term of the characteristic: + k x^2 in the restoring force or in the output",
+    family="shape",
+    site=Site.FORCE,
+    parameters=_even_nonlinearity_parameters,
+    starting_points=_even_nonlinearity_starting_points,
+    form=ForceLaw(_even_nonlinearity_force, equation="n0*x*x"),
+    source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
+    similar_to="absolute-value-sensor, offset",
+    distinguished_by="a parabola over the coordinate",
+)
+
+#: A dead zone is searched for only if the input comes closer to zero than this fraction of its peak.
+_DEAD_ZONE_NEAR = 0.05
+
+
+def _dead_zone_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
+    return np.sign(u) * np.maximum(np.abs(u) - values[0], 0.0)
+
+
+def _dead_zone_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "d",
+            context.input_unit,
+            0.0,
+            0.005 * context.input_peak,
+            -0.2 * context.input_peak,
+            0.3 * context.input_peak,
+        ),
+    )
+
+
+def _dead_zone_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return tuple((part * context.input_peak,) for part in (0.0075, 0.025, 0.075))
+
+
+def _approaches_zero(context: SimulationContext) -> bool:
+    # A dead zone cannot be distinguished from an offset if the input is never close to zero.
+    return float(np.min(np.abs(context.u))) < _DEAD_ZONE_NEAR * context.input_peak
+
+
+DEAD_ZONE = Effect(
+    name="dead-zone",
+    summary="Dead zone of the input: |u| is reduced by d, and u is zero if |u| < d",
+    family="shape",
+    site=Site.INPUT,
+    parameters=_dead_zone_parameters,
+    starting_points=_dead_zone_starting_points,
+    form=_dead_zone_form,
+    equation=lambda _: MapEquation("sign(x)*max(abs(x) - n0, 0)"),
+    is_applicable=_approaches_zero,
+    acts_between_samples=True,
+    source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
+    similar_to="backlash, input-saturation",
+    distinguished_by="flat around zero in both directions; a negative `d` is a step at zero",
+)
+
+
+#: Starting points of a saturation, as parts of the peak that it cuts off.
+_INPUT_CUTS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
+_OUTPUT_CUTS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
+
+
+def _write_limit(peak: float) -> str:
+    level = f"{peak}*(1 - max(n0, 0))"
+    return f"min(max(x, -({level})), {level})"
+
+
+def _input_saturation_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    level = context.input_peak * (1.0 - max(values[0], 0.0))
+    return np.clip(u, -level, level)
+
+
+def _saturation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("cut", "", 0.0, 0.02, 0.0, 0.8),)
+
+
+INPUT_SATURATION = Effect(
+    name="input-saturation",
+    summary="Saturation of the amplifier: u is limited to (1 - cut) times its peak",
+    family="shape",
+    site=Site.INPUT,
+    parameters=_saturation_parameters,
+    starting_points=lambda _context, _residual: tuple((cut,) for cut in _INPUT_CUTS),
+    form=_input_saturation_form,
+    equation=lambda context: MapEquation(_write_limit(context.input_peak)),
+    acts_between_samples=True,
+    source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
+    linear_parameters=0,
+    similar_to="cubic-stiffness, output-saturation",
+    distinguished_by="a plateau over the input",
+)
+
+
+def _output_saturation_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    level = context.output_peak * (1.0 - max(values[0], 0.0))
+    return np.clip(y, -level, level) if values[0] > 0.0 else y
+
+
+OUTPUT_SATURATION = Effect(
+    name="output-saturation",
+    summary="Saturation of the sensor: y is limited to (1 - cut) times its peak",
+    family="shape",
+    site=Site.OUTPUT,
+    parameters=_saturation_parameters,
+    starting_points=lambda _context, _residual: tuple((cut,) for cut in _OUTPUT_CUTS),
+    form=_output_saturation_form,
+    equation=lambda context: MapEquation(f"where(n0, {_write_limit(context.output_peak)}, x)"),
+    source="Doebelin, Measurement Systems, section 3",
+    linear_parameters=0,
+    similar_to="input-saturation, state-clip",
+    distinguished_by="a plateau over the output",
+)
+
+
+def _absolute_value_sensor_form(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
+    return y + values[0] * np.abs(y)
+
+
+def _absolute_value_sensor_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("k", "", 0.0, 0.01, -0.8, 0.8),)
+
+
+def _absolute_value_sensor_starting_points(
+    _context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02,),)
+
+
+ABSOLUTE_VALUE_SENSOR = Effect(
+    name="absolute-value-sensor",
+    summary="The sensor adds a fraction of the absolute value: y + k |y|",
+    family="shape",
+    site=Site.OUTPUT,
+    parameters=_absolute_value_sensor_parameters,
+    starting_points=_absolute_value_sensor_starting_points,
+    form=_absolute_value_sensor_form,
+    equation=lambda _: MapEquation("x + n0*abs(x)"),
+    source="Doebelin, Measurement Systems, section 3",
+    similar_to="even-nonlinearity",
+    distinguished_by="a kink at output zero",
+)
+
+
+def outflow_law(state: str) -> Effect:
+    """Return the linear outflow of one state as an effect; its value is in 1/s."""
+    label = f"{OUTFLOW_LAW.name}:{state}"
+
+    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+        return (Parameter(label, "1/s", 0.0, 1.0 / context.fit_end_time),)
+
+    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        return tuple((times / context.fit_end_time,) for times in (1.0, 5.0, 25.0))
+
+    return Effect(
+        name=label,
+        summary=OUTFLOW_LAW.summary,
+        family="shape",
+        site=Site.CORE,
+        parameters=parameters,
+        starting_points=starting_points,
+        form=None,
+        source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
+    )
+
+
+OUTFLOW_LAW = EffectTemplate(
+    "outflow-law",
+    "The outflow has a linear term in addition to Bernoulli's law: + l x in the flow out of one state",
+    similar_to="state-clip, input-offset, a nonlinear sensor",
+    distinguished_by="the outflow grows more steeply with the level than a square root",
+)
+
+
+#: Starting points of the level, relative to the peak of the output.
+_LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.5)
+
+#: Starting points of the fraction of the overflow that the next state receives.
+_CAUGHT = (0.0, 0.5)
+
+#: Nominal value and upper bound of the level, relative to the peak of the output; no state reaches it.
+_MAX_LEVEL = 4.0
+
+
+def state_clip(state: str, unit: str = "", size: float = 0.0, spills: bool = True) -> Effect:
+    """Return the limit on one state as an effect, with its unit and peak if they are not those of the output.
+
+    The overflow of the last state of a chain is lost. A state that does not spill is limited to +-level.
+    """
+    label = f"{STATE_CLIP.name}:{state}"
+
+    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+        peak, own = size or context.output_peak, unit or context.output_unit
+        level = Parameter(label, own, _MAX_LEVEL * peak, 0.01 * peak, 0.1 * peak, _MAX_LEVEL * peak)
+        return (level, Parameter(f"{label} caught", "", 0.0, 0.05, 0.0, 1.0)) if spills else (level,)
+
+    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        levels = [level * (size or context.output_peak) for level in _LEVELS]
+        return (
+            tuple((level, caught) for level in levels for caught in _CAUGHT) if spills else tuple(zip(levels))
+        )
+
+    return Effect(
+        name=label,
+        summary=STATE_CLIP.summary,
+        family="shape",
+        site=Site.CORE,
+        parameters=parameters,
+        starting_points=starting_points,
+        form=None,
+        source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
+        linear_parameters=0,
+    )
+
+
+STATE_CLIP = EffectTemplate(
+    "state-clip",
+    "A state is limited to a level, as in a tank that overflows; the next state may receive a fraction",
+    similar_to="output-saturation, input-offset, outflow-law",
+    distinguished_by="the output flattens later than the state: an unmeasured state is clipped",
+)

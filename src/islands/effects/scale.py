@@ -1,0 +1,95 @@
+"""Effects on scale: gain errors of input and output, and wrong parameters."""
+
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
+from islands.effects.interface.map_equation import MapEquation
+
+
+def _input_gain_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
+    return (1.0 + values[0]) * u
+
+
+def _input_gain_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("k", "", 0.0, 0.01, -0.5, 0.5),)
+
+
+def _input_gain_starting_points(
+    _context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02,),)
+
+
+INPUT_GAIN = Effect(
+    name="input-gain",
+    summary="Gain error of the amplifier: (1 + k) u",
+    family="scale",
+    site=Site.INPUT,
+    parameters=_input_gain_parameters,
+    starting_points=_input_gain_starting_points,
+    form=_input_gain_form,
+    equation=lambda _: MapEquation("(1 + n0)*x"),
+    source="Doebelin, Measurement Systems, section 3",
+    is_gain=True,
+    similar_to="sensor-gain, wrong-parameter",
+    distinguished_by="only tolerances of all parameters distinguish them",
+)
+
+
+def _sensor_gain_form(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
+    return (1.0 + values[0]) * y
+
+
+def _sensor_gain_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("k", "", 0.0, 0.01, -0.5, 0.5),)
+
+
+def _sensor_gain_starting_points(
+    _context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02,),)
+
+
+SENSOR_GAIN = Effect(
+    name="sensor-gain",
+    summary="Gain error of the sensor: (1 + k) y",
+    family="scale",
+    site=Site.OUTPUT,
+    parameters=_sensor_gain_parameters,
+    starting_points=_sensor_gain_starting_points,
+    form=_sensor_gain_form,
+    equation=lambda _: MapEquation("(1 + n0)*x"),
+    source="Doebelin, Measurement Systems, section 3",
+    is_gain=True,
+    similar_to="input-gain, wrong-parameter",
+    distinguished_by="only tolerances of all parameters distinguish them",
+)
+
+
+def wrong_parameter(parameter: Parameter) -> Effect:
+    """Return the effect of one wrong parameter: its true value is (1 + r) times the nominal one."""
+    label = f"{WRONG_PARAMETER.name}:{parameter.name}"
+
+    def parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
+        return (Parameter(label, "", 0.0, 0.02, -0.8, 4.0),)
+
+    def starting_points(_context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        return ((0.05,), (-0.05,))
+
+    return Effect(
+        name=label,
+        summary=WRONG_PARAMETER.summary,
+        family="scale",
+        site=Site.PARAMETER,
+        parameters=parameters,
+        starting_points=starting_points,
+        form=None,
+        source="Ljung, System Identification, 2nd ed., section 7",
+    )
+
+
+WRONG_PARAMETER = EffectTemplate(
+    "wrong-parameter",
+    "A parameter of the simulation differs from its nominal value by more than its tolerance",
+    similar_to="input-gain, sensor-gain, other parameters",
+    distinguished_by="only tolerances distinguish them; the name says which parameter",
+)

@@ -1,0 +1,107 @@
+"""Effects that change with time: a step of the gain, ageing."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import scipy
+
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.map_equation import MapEquation
+
+#: Names of the effects that change the gain.
+GAIN_EFFECTS = frozenset(("gain-step", "ageing"))
+
+#: Number of candidate instants of a change.
+INSTANTS = 27
+
+#: Margin at each end of the estimation part, relative to its duration. Changes are not searched for in it,
+#: since too few samples would show them.
+MARGIN = 0.06
+
+
+def candidate_instants(context: SimulationContext) -> tuple[float, ...]:
+    """Return the instants from which the search for a change starts, in seconds."""
+    first, last = instant_bounds(context)
+    return tuple(float(time) for time in np.linspace(first, last, INSTANTS))
+
+
+def instant_bounds(context: SimulationContext) -> tuple[float, float]:
+    """Return the first and the last possible instant of a change, in seconds."""
+    return MARGIN * context.fit_end_time, (1.0 - MARGIN) * context.fit_end_time
+
+
+def smooth_step(context: SimulationContext, instant: float) -> Signal:
+    """Return a step from 0 to 1 at an instant, smoothed over a few samples so that it has a derivative."""
+    out: Signal = scipy.special.expit((context.time - instant) / (2 * context.dt))
+    return out
+
+
+def write_step(context: SimulationContext, instant: str) -> str:
+    """Write `smooth_step` as an expression of the time, given that of the instant."""
+    return f"(1/(1 + exp(({instant} - t)/{2 * context.dt})))"
+
+
+def gain_over_time(effect_parameters: Mapping[str, float], context: SimulationContext) -> Signal | float:
+    """Return the gain factor of the effects ``gain-step`` and ``ageing``; 1 if neither is active."""
+    gain: Signal | float = 1.0
+    if "gain-step" in effect_parameters:
+        gain = gain * (
+            1.0
+            + effect_parameters["gain-step"] * smooth_step(context, effect_parameters["gain-step instant"])
+        )
+    if "ageing" in effect_parameters:
+        gain = gain * (1.0 + effect_parameters["ageing"] * context.time / context.duration)
+    return gain
+
+
+def _gain_step_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter("gain-step", "", 0.0, 0.01, -0.9, 2.0),
+        Parameter("gain-step instant", "s", 0.0, 0.3 * context.fit_end_time / 45, *instant_bounds(context)),
+    )
+
+
+def _gain_step_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return tuple((0.02, instant) for instant in candidate_instants(context))
+
+
+GAIN_STEP = Effect(
+    name="gain-step",
+    summary="Step of the gain at an instant: gain (1 + k) after it",
+    family="change",
+    site=Site.CORE,
+    parameters=_gain_step_parameters,
+    starting_points=_gain_step_starting_points,
+    form=None,
+    source="Basseville and Nikiforov, Detection of Abrupt Changes",
+    equation=lambda context: MapEquation(f"x*(1 + n0*{write_step(context, 'n1')})"),
+    extra_degrees_of_freedom=1,
+    similar_to="ageing",
+    distinguished_by="the slope of output over input changes at one instant",
+)
+
+
+def _ageing_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("ageing", "", 0.0, 0.01, -0.9, 2.0),)
+
+
+def _ageing_starting_points(_context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02,),)
+
+
+AGEING = Effect(
+    name="ageing",
+    summary="Drift of the gain: gain (1 + k t / T) over the record's duration T",
+    family="change",
+    site=Site.CORE,
+    parameters=_ageing_parameters,
+    starting_points=_ageing_starting_points,
+    form=None,
+    source="Doebelin, Measurement Systems, section 3",
+    equation=lambda context: MapEquation(f"x*(1 + n0*t/{context.duration})"),
+    similar_to="gain-step, linear-drift",
+    distinguished_by="a residual proportional to time and output",
+)

@@ -1,0 +1,204 @@
+"""Effects on time: delay, clock skew, rate limit, lag and resonance of the sensor."""
+
+import numpy as np
+import scipy
+
+from islands.effects.filters import interpolate_at, low_pass
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.input_spectrum import find_single_frequency
+from islands.effects.interface.map_equation import MapEquation
+from islands.kernels.memory_operators import limit_rate
+
+
+def _delay_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return interpolate_at(u, np.arange(u.size) - values[0] / context.dt)
+
+
+def _delay_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "tau", "s", 0.0, context.dt, -0.2 * context.dt, min(30 * context.dt, context.fit_end_time / 4)
+        ),
+    )
+
+
+def _delay_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.5 * context.dt,), (2 * context.dt,), (6 * context.dt,))
+
+
+DELAY = Effect(
+    name="delay",
+    summary="The input acts later than it is recorded: u(t - tau)",
+    family="timing",
+    site=Site.INPUT,
+    parameters=_delay_parameters,
+    starting_points=_delay_starting_points,
+    form=_delay_form,
+    equation=lambda _: MapEquation("z0", (("interpolate", "0", "n0"),)),
+    source="Ljung, System Identification, 2nd ed., section 16",
+    similar_to="sensor-lag, resonance, viscous",
+    distinguished_by="the phase grows with the frequency at constant amplitude; hysteresis is delayed too",
+)
+
+
+def _clock_skew_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
+    return interpolate_at(u, np.arange(u.size) * (1.0 + values[0]))
+
+
+def _clock_skew_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("e", "", 0.0, 0.01 * context.dt / context.fit_end_time, -0.02, 0.02),)
+
+
+def _clock_skew_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.5 * context.dt / context.fit_end_time,), (-0.5 * context.dt / context.fit_end_time,))
+
+
+CLOCK_SKEW = Effect(
+    name="clock-skew",
+    summary="The clocks of input and output differ in rate: u(t (1 + e))",
+    family="timing",
+    site=Site.INPUT,
+    parameters=_clock_skew_parameters,
+    starting_points=_clock_skew_starting_points,
+    form=_clock_skew_form,
+    equation=lambda _: MapEquation("z0", (("interpolate", "n0", "0"),)),
+    source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
+    similar_to="delay",
+    distinguished_by="a delay that grows along the record",
+)
+
+
+#: Number of rates that the calibration starts from.
+_STARTING_RATES = 16
+
+
+def _rate_limit_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    limited: Signal = limit_rate(u, context.dt / values[0]) if values[0] > 0.0 else u
+    return limited
+
+
+def _get_rate_range(context: SimulationContext) -> tuple[float, float]:
+    """Return the rate that crosses the range of the input once, and the peak rate, per second."""
+    steps = np.abs(context.take_differences(context.u))
+    return float(np.ptp(context.u)) / context.fit_end_time, float(np.max(steps)) / context.dt
+
+
+def _rate_limit_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    _, peak = _get_rate_range(context)
+    most = 10.0 * context.fit_end_time / (context.input_peak or 1.0)
+    return (
+        Parameter("inverse_rate", f"s/{context.input_unit}", 0.0, 0.1 / peak if peak else most, 0.0, most),
+    )
+
+
+def _rate_limit_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    least, peak = _get_rate_range(context)
+    rates = np.geomspace(0.9 * peak, 2.0 * least, _STARTING_RATES)
+    return tuple((1.0 / float(rate),) for rate in rates)
+
+
+def _has_rates_to_limit(context: SimulationContext) -> bool:
+    # With a sine of one amplitude, the limit is an odd distortion, as that of dry friction.
+    least, peak = _get_rate_range(context)
+    return peak > 4.0 * least and find_single_frequency(context) is None
+
+
+RATE_LIMIT = Effect(
+    name="rate-limit",
+    summary="Rate limit of the actuator (slew rate): |u'| is at most 1/inverse_rate",
+    family="timing",
+    site=Site.INPUT,
+    parameters=_rate_limit_parameters,
+    starting_points=_rate_limit_starting_points,
+    form=_rate_limit_form,
+    equation=lambda _: MapEquation("z0", (("limit-rate", "n0"),)),
+    is_applicable=_has_rates_to_limit,
+    source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
+    linear_parameters=0,
+    similar_to="sensor-lag, delay, input-saturation",
+    distinguished_by="the lag grows with the amplitude; slow inputs are followed without error",
+)
+
+
+def _sensor_lag_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return low_pass(y, values[0], context.dt) if values[0] > 0.0 else y
+
+
+def _sensor_lag_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("tau", "s", 0.0, context.dt, 0.0, context.fit_end_time / 4),)
+
+
+def _sensor_lag_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.3 * context.dt,), (2 * context.dt,), (6 * context.dt,))
+
+
+SENSOR_LAG = Effect(
+    name="sensor-lag",
+    summary="First-order lag of the sensor: tau y' + y = v",
+    family="timing",
+    site=Site.OUTPUT,
+    parameters=_sensor_lag_parameters,
+    starting_points=_sensor_lag_starting_points,
+    form=_sensor_lag_form,
+    equation=lambda _: MapEquation("z0", (("low-pass", "n0"),)),
+    source="Doebelin, Measurement Systems, section 3",
+    similar_to="delay, resonance, viscous",
+    distinguished_by="the amplitude falls with the frequency",
+)
+
+#: Largest natural frequency in radians per sample; a faster mode has no effect on the record.
+FASTEST = 2.6
+
+
+def _resonance_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    period, zeta = values
+    w = 2 * np.pi / period if period > 0.0 else np.inf
+    if w * context.dt > FASTEST:
+        return y
+    # Bilinear transform, prewarped at the resonance. A discretisation with finer steps, which interpolates
+    # the output between samples, would imitate a delay on coarsely sampled records (the gas furnace, the hair
+    # dryer).
+    k = w / np.tan(w * context.dt / 2)
+    scale = k * k + 2 * zeta * w * k + w * w
+    b = w * w / scale
+    a1, a2 = 2 * (w * w - k * k) / scale, (k * k - 2 * zeta * w * k + w * w) / scale
+    followed, _ = scipy.signal.lfilter([b, 2 * b, b], [1.0, a1, a2], y - y[0], zi=[0.0, 0.0])
+    out: Signal = followed + y[0]
+    return out
+
+
+def _resonance_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter("period", "s", 0.0, context.dt, 0.0, context.fit_end_time / 8),
+        Parameter("zeta", "", 0.1, 0.05, 0.003, 2.0),
+    )
+
+
+def _resonance_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return tuple(
+        (period * context.dt, zeta) for period in (2.9, 5.0, 9.0, 16.0, 30.0) for zeta in (0.03, 0.1, 0.3)
+    )
+
+
+RESONANCE = Effect(
+    name="resonance",
+    summary="Second-order mode in series with the output: y'' + 2 zeta w y' + w^2 y = w^2 v",
+    family="timing",
+    site=Site.OUTPUT,
+    parameters=_resonance_parameters,
+    starting_points=_resonance_starting_points,
+    form=_resonance_form,
+    equation=lambda _: MapEquation("z0", (("resonance", "n0", "n1"),)),
+    source="Ljung, System Identification, 2nd ed., section 4",
+    similar_to="delay, sensor-lag",
+    distinguished_by="ringing after fast changes",
+)

@@ -1,0 +1,314 @@
+"""Simulator with effects: input maps, simulation with forces, output maps."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, ForceLaw, Site, apply_map
+from islands.simulators.interface import (
+    Forces,
+    SimulationRun,
+    Simulator,
+    fits_states,
+    is_batch_simulator,
+    simulate_runs,
+    split_recordings,
+)
+from islands.simulators.mapped_input import MappedInput, map_input
+
+#: Cached outputs before the output maps: finite differences need the same one several times.
+_CACHE_SIZE = 4
+
+_NONE: Mapping[str, float] = MappingProxyType({})
+
+#: A simulation diverges if its output exceeds its nominal peak by this factor; squares would overflow later.
+_DIVERGENCE_FACTOR = 1e6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExtendedSimulator:
+    """Simulator with effects. One vector has the values of the simulator, then those of each effect.
+
+    Several recordings are simulated one by one, each from its own initial states. The values of the simulator
+    or of an effect are followed by the initial states of the second and all further recordings.
+
+    Attributes
+    ----------
+    simulator : Simulator
+    effects : tuple of Effect
+        In the order of the catalogue, in which maps act.
+    context : SimulationContext
+    parameters : tuple of Parameter
+        Parameters of the simulator, then those of each effect.
+    bounds : tuple of ndarray, each of shape (parameters,)
+        Lower and upper bounds of the values.
+    recordings : ndarray of int, shape (parameters,)
+        Index of the recording that an initial state belongs to; zero for all other parameters.
+    parts : tuple of ExtendedSimulator
+        Simulator of each recording; empty for a single one.
+    """
+
+    simulator: Simulator
+    effects: tuple[Effect, ...]
+    context: SimulationContext
+    parameters: tuple[Parameter, ...] = field(init=False)
+    bounds: tuple[Signal, Signal] = field(init=False)
+    recordings: NDArray[np.int64] = field(init=False)
+    parts: "tuple[ExtendedSimulator, ...]" = field(init=False)
+    _places: tuple[NDArray[np.int64], ...] = field(init=False)
+    _slices: tuple[slice, ...] = field(init=False)
+    _before_output: NDArray[np.bool_] = field(init=False)
+    _cache: dict[bytes, Signal] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        split = split_recordings(self.simulator, self.context)
+        parameters: list[Parameter] = []
+        recordings: list[int] = []
+        before_output: list[bool] = []
+        slices: list[slice] = []
+        places: list[list[int]] = [[] for _ in split]
+        for effect in (None, *self.effects):
+            own = self.simulator.parameters if effect is None else effect.parameters(self.context)
+            first = len(parameters)
+            parameters += own
+            recordings += [0] * len(own)
+            for part in places:
+                part.extend(range(first, first + len(own)))
+            for recording, (simulator, _) in enumerate(split[1:], start=1):
+                # The nominal initial state may depend on the recording.
+                theirs = simulator.parameters if effect is None else own
+                for index, parameter in enumerate(theirs):
+                    if parameter.initial:
+                        places[recording][index - len(own)] = len(parameters)
+                        name = f"{parameter.name} (recording {recording + 1})"
+                        parameters.append(replace(parameter, name=name))
+                        recordings.append(recording)
+            slices.append(slice(first, len(parameters)))
+            is_before = effect is None or effect.site != Site.OUTPUT
+            before_output += [is_before] * (len(parameters) - first)
+        parts = [
+            ExtendedSimulator(simulator, self.effects, context)
+            for simulator, context in (split if len(split) > 1 else ())
+        ]
+        for name, value in (
+            ("parameters", tuple(parameters)),
+            ("bounds", tuple(np.reshape([(each.lower, each.upper) for each in parameters], (-1, 2)).T)),
+            ("recordings", np.array(recordings, dtype=np.int64)),
+            ("parts", tuple(parts)),
+            ("_places", tuple(np.array(each, dtype=np.int64) for each in places)),
+            ("_slices", tuple(slices)),
+            ("_before_output", np.array(before_output, dtype=bool)),
+        ):
+            object.__setattr__(self, name, value)
+
+    @property
+    def nominal(self) -> Signal:
+        """Nominal values of the simulator and of the effects, at which effects vanish."""
+        return np.array([parameter.nominal for parameter in self.parameters])
+
+    def project(self, points: Signal) -> Signal:
+        """Return the nearest points within the bounds and the limits of the effects, (points, parameters)."""
+        projected = np.clip(points, *self.bounds)
+        for effect, part in zip(self.effects, self._slices[1:], strict=True):
+            if effect.project is not None:
+                projected[:, part] = [effect.project(values) for values in projected[:, part]]
+        return projected
+
+    @property
+    def scales(self) -> Signal:
+        """Typical changes of the values."""
+        return np.array([parameter.scale for parameter in self.parameters])
+
+    @property
+    def is_copy(self) -> NDArray[np.bool_]:
+        """Whether a parameter is an initial state of a recording after the first one, shape (parameters,)."""
+        return np.array(self.recordings > 0)
+
+    @property
+    def is_batch(self) -> bool:
+        """Whether several simulations of one call cost less than one by one."""
+        return is_batch_simulator(self.simulator)
+
+    @property
+    def fits_states(self) -> bool:
+        """Whether states are fitted to the record in each simulation."""
+        return fits_states(self.simulator)
+
+    @property
+    def simulator_slice(self) -> slice:
+        """Slice of the values that belongs to the simulator."""
+        return self._slices[0]
+
+    def get_slice(self, effect: Effect) -> slice:
+        """Return the slice of the values that belongs to an effect."""
+        return self._slices[1 + self.effects.index(effect)]
+
+    def expand(self, effect: Effect, point: Sequence[float]) -> Signal:
+        """Return the values of an effect, given one for each of its parameters.
+
+        Its initial states are the same in all recordings.
+        """
+        part = self.get_slice(effect)
+        values = np.empty(part.stop - part.start)
+        for places in self._places:
+            own = places[(places >= part.start) & (places < part.stop)] - part.start
+            values[own] = point
+        return values
+
+    def with_effects(self, effects: Sequence[Effect]) -> "ExtendedSimulator":
+        """Return the same simulator with other effects."""
+        return replace(self, effects=tuple(effects))
+
+    def simulate(
+        self, values: Signal, effect_parameters: Mapping[str, float] = _NONE, forces: Forces = ()
+    ) -> Signal:
+        """Simulate the whole record.
+
+        Parameters
+        ----------
+        values : ndarray, shape (parameters,)
+        effect_parameters, forces
+            Further arguments of `Simulator.simulate`, in addition to those of the effects.
+
+        Returns
+        -------
+        ndarray, shape (samples,)
+            NaN in every sample if the simulation diverges.
+        """
+        if self.parts:
+            joined = np.concatenate(
+                [
+                    part.simulate(values[places], effect_parameters, forces)
+                    for part, places in zip(self.parts, self._places, strict=True)
+                ]
+            )
+            return np.full_like(joined, np.nan) if np.isnan(joined).any() else joined
+        if effect_parameters or forces:
+            run = self._make_run(values, effect_parameters, forces, {})
+            with np.errstate(over="ignore", invalid="ignore"):
+                y = simulate_runs(self.simulator, [run], self.context)[0]
+            return self._apply_output_maps([y], values[None]).reshape(-1)
+        return self.simulate_batch(values[None])[0]
+
+    def simulate_batch(self, points: Signal, near: NDArray[np.int64] | None = None) -> Signal:
+        """Simulate the whole record for several vectors of values, at once if the simulator can.
+
+        Parameters
+        ----------
+        points : ndarray, shape (points, parameters)
+        near : ndarray of int64, shape (points,), optional
+            Index of the point that each one is a small change of, or its own; see `SimulationRun`.
+
+        Returns
+        -------
+        ndarray, shape (points, samples)
+            As of `simulate`.
+        """
+        if self.parts:
+            joined = np.concatenate(
+                [
+                    part.simulate_batch(points[:, places], near)
+                    for part, places in zip(self.parts, self._places, strict=True)
+                ],
+                axis=1,
+            )
+            joined[np.isnan(joined).any(axis=1)] = np.nan
+            return joined
+        keys = [values[self._before_output].tobytes() for values in points]
+        bases = self._link_to_bases(keys, near)
+        known = {key: self._cache[key] for key in keys if key in self._cache}
+        needed = {base for key, base in bases.items() if key not in known}
+        missing = {
+            key: values for key, values in zip(keys, points, strict=True) if key not in known or key in needed
+        }
+        if missing:
+            known |= self._simulate_points(missing, bases)
+            # Copies, since a row would keep the outputs of all points in memory.
+            self._cache.update({key: known[key].copy() for key in list(missing)[-_CACHE_SIZE:]})
+            while len(self._cache) > _CACHE_SIZE:
+                del self._cache[next(iter(self._cache))]
+        return self._apply_output_maps([known[key] for key in keys], points)
+
+    def _link_to_bases(self, keys: list[bytes], near: NDArray[np.int64] | None) -> dict[bytes, bytes]:
+        """Return the key of the base of each point that is a change of another one.
+
+        The keys of these points are extended by that of their base, in place: the states of a simulation that
+        fits them depend on it.
+        """
+        bases: dict[bytes, bytes] = {}
+        if near is not None and self.fits_states:
+            for index, base in enumerate(near):
+                if keys[index] != keys[base]:
+                    bases[keys[index] + keys[base]] = keys[base]
+                    keys[index] += keys[base]
+        return bases
+
+    def _simulate_points(
+        self, points: Mapping[bytes, Signal], bases: Mapping[bytes, bytes]
+    ) -> dict[bytes, Signal]:
+        """Simulate points by their keys in one call, without output maps."""
+        inputs: dict[bytes, MappedInput] = {}
+        places = {key: place for place, key in enumerate(points)}
+        runs = [
+            self._make_run(values, _NONE, (), inputs, places[bases[key]] if key in bases else None)
+            for key, values in points.items()
+        ]
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = np.ascontiguousarray(simulate_runs(self.simulator, runs, self.context))
+        return dict(zip(points, found, strict=True))
+
+    def _apply_output_maps(self, outputs: Sequence[Signal], points: Signal) -> Signal:
+        """Return the outputs of several points after the output maps; NaN if they diverge."""
+        mapped = np.stack(outputs)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for effect, part in zip(self.effects, self._slices[1:], strict=True):
+                if effect.site == Site.OUTPUT:
+                    for row, values in enumerate(points):
+                        mapped[row] = apply_map(effect, mapped[row], values[part], self.context)
+            mapped[~(np.abs(mapped).max(axis=1) < _DIVERGENCE_FACTOR * self.context.output_peak)] = np.nan
+        return mapped
+
+    def _make_run(
+        self,
+        values: Signal,
+        effect_parameters: Mapping[str, float],
+        further: Forces,
+        inputs: dict[bytes, MappedInput],
+        near: int | None = None,
+    ) -> SimulationRun:
+        """Return the run, without output maps. Runs with equal input maps share their input in ``inputs``."""
+        forces = list(further)
+        maps = [
+            (effect, values[part])
+            for effect, part in zip(self.effects, self._slices[1:], strict=True)
+            if effect.site == Site.INPUT
+        ]
+        key = b"".join(own.tobytes() for _, own in maps)
+        if key not in inputs:
+            inputs[key] = map_input(maps, self.context, self.simulator.is_continuous_time)
+        x, characteristic = inputs[key]
+        parameters = dict(effect_parameters)
+        simulator_values = values[self.simulator_slice].copy()
+        for effect, part in zip(self.effects, self._slices[1:], strict=True):
+            match effect.site:
+                case Site.CORE:
+                    parameters |= {
+                        parameter.name: float(value)
+                        for parameter, value in zip(self.parameters[part], values[part], strict=True)
+                    }
+                case Site.PARAMETER:
+                    simulator_values[self._get_parameter_index(effect)] *= 1.0 + values[part][0]
+                case Site.FORCE:
+                    assert isinstance(effect.form, ForceLaw)
+                    forces.append((effect.form, values[part]))
+        return SimulationRun(
+            simulator_values, x, parameters, forces, near=near, characteristic=characteristic
+        )
+
+    def _get_parameter_index(self, effect: Effect) -> int:
+        _, _, name = effect.name.partition(":")
+        return [parameter.name for parameter in self.simulator.parameters].index(name)

@@ -1,0 +1,152 @@
+"""Linear model of any order, and its estimation."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from islands.data.dataset import Dataset
+from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, Site
+from islands.effects.interface.force import add_output_forces
+from islands.errors import RecordError
+from islands.simulators.coordinates import input_coordinate
+from islands.simulators.interface import Forces
+
+#: Iterations of the method of Steiglitz and McBride.
+_ITERATIONS = 12
+
+#: Typical change of a coefficient: relative to the largest one in the numerator, absolute in the denominator.
+_SCALE = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearSimulator:
+    """``A(q) (y - level) = B(q) (u - reference input)``, with an input delay and an initial state.
+
+    There are as many poles as zeros.
+
+    Attributes
+    ----------
+    numerator, denominator : ndarray, shapes (order + 1,) and (order,)
+        Coefficients of u(k - delay), u(k - delay - 1), ... and of y(k-1), y(k-2), ..., both on the right-hand
+        side.
+    level : float
+        Output at rest, at the reference input.
+    reference_input : float
+    delay : int
+        Input delay in samples.
+    unit : str
+        Unit of the output.
+    """
+
+    numerator: Signal
+    denominator: Signal
+    level: float
+    reference_input: float
+    delay: int
+    unit: str
+    name: str = "linear"
+    sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
+    supported_effects: frozenset[str] = frozenset()
+    built_in_effects: frozenset[str] = frozenset(("offset",))
+    state_effects: tuple[Effect, ...] = ()
+    is_continuous_time: bool = False
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Coefficients, level, and state of the filter at the first sample."""
+        order = self.denominator.size
+        gain = _SCALE * float(np.max(np.abs(self.numerator))) or _SCALE
+        return (
+            *(Parameter(f"b{lag}", "", float(b), gain) for lag, b in enumerate(self.numerator)),
+            *(Parameter(f"a{lag + 1}", "", float(a), _SCALE) for lag, a in enumerate(self.denominator)),
+            Parameter("level", self.unit, self.level, _SCALE * abs(self.level) + gain),
+            *(Parameter(f"state {1 + place}", self.unit, 0.0, gain, initial=True) for place in range(order)),
+        )
+
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
+        """Return the input as the coordinate."""
+        return input_coordinate(context, output)
+
+    def simulate(
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        _effect_parameters: Mapping[str, float],
+        forces: Forces,
+    ) -> Signal:
+        """Simulate the output; see `Simulator.simulate`."""
+        order = self.denominator.size
+        numerator, denominator = values[: order + 1], values[order + 1 : 2 * order + 1]
+        delayed = np.concatenate([np.full(self.delay, x[0]), x[: x.size - self.delay]])
+        level, state = values[2 * order + 1], values[2 * order + 2 :]
+        # The input is constant before the first sample; the state is a deviation from that equilibrium.
+        state = state + (x[0] - self.reference_input) * self.state_at_rest
+        filtered, _ = scipy.signal.lfilter(
+            numerator, np.concatenate([[1.0], -denominator]), delayed - self.reference_input, zi=state
+        )
+        return level + filtered + add_output_forces(x, context, forces)
+
+    @property
+    def state_at_rest(self) -> Signal:
+        """State of the filter at rest at an input of one, shape (order,); zero without such an equilibrium.
+
+        It is that of the nominal coefficients, so that it remains finite while a pole passes through one.
+        """
+        remainder = 1.0 - float(self.denominator.sum())
+        gain = float(self.numerator.sum()) / remainder if remainder > 0.0 else 0.0
+        state: Signal = np.cumsum((self.numerator[1:] + gain * self.denominator)[::-1])[::-1]
+        return state if remainder > 0.0 else np.zeros_like(state)
+
+
+def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
+    """Estimate a linear model by the method of Steiglitz and McBride (1965).
+
+    The iteration with the least squared simulation error is returned; a static gain if no model is stable. Of
+    several recordings, the longest one is used.
+
+    Raises
+    ------
+    RecordError
+        The record has fewer than ten samples per estimated parameter, the delay not counted.
+    """
+    record = record.longest_segment
+    u, y = record.u[:, 0], record.y
+    if record.samples < 10 * (2 * order + 2) + delay:
+        raise RecordError(
+            f"{record.samples} samples are too few to estimate a linear model of order {order}: take a lower "
+            "order or a longer record"
+        )
+    delayed = np.concatenate([np.full(delay, u[0]), u[: u.size - delay]]) - u[0]
+    found, smallest = None, np.inf
+    denominator = np.zeros(order)
+    for _ in range(_ITERATIONS):
+        prefilter = np.concatenate([[1.0], -denominator])
+        numerator, denominator, level = _least_squares(delayed, y, order, prefilter)
+        if order and np.max(np.abs(np.roots(np.concatenate([[1.0], -denominator])))) >= 1.0:
+            break
+        simulated = level + scipy.signal.lfilter(numerator, np.concatenate([[1.0], -denominator]), delayed)
+        mean_square = float(np.mean((y - simulated)[order + delay :] ** 2))
+        if mean_square < smallest:
+            found, smallest = (numerator, denominator, level), mean_square
+    if found is None:  # no iteration gave a stable model: use a static gain
+        found = (np.append(np.ptp(y) / (np.ptp(u) or 1.0), np.zeros(order)), np.zeros(order), float(y.mean()))
+    return LinearSimulator(*found, float(u[0]), delay, record.output_unit or "1")
+
+
+def _least_squares(u: Signal, y: Signal, order: int, prefilter: Signal) -> tuple[Signal, Signal, float]:
+    """Fit the coefficients and the level to prefiltered signals."""
+    filtered_u = scipy.signal.lfilter([1.0], prefilter, u)
+    filtered_y = scipy.signal.lfilter([1.0], prefilter, y - y[0])
+    constant = scipy.signal.lfilter([1.0], prefilter, np.ones(y.size))
+    rows = y.size - order
+    columns = [filtered_u[order - lag : order - lag + rows] for lag in range(order + 1)]
+    columns += [filtered_y[order - lag : order - lag + rows] for lag in range(1, order + 1)]
+    columns.append(constant[order:])
+    weights = np.linalg.lstsq(np.column_stack(columns), filtered_y[order:], rcond=None)[0]
+    numerator, denominator = weights[: order + 1], weights[order + 1 : 2 * order + 1]
+    at_rest = float(weights[-1]) / (1.0 - float(denominator.sum()) or 1.0)
+    return numerator, denominator, float(y[0]) + at_rest

@@ -1,0 +1,284 @@
+"""Simulator of a system of ordinary differential equations that a user has written."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import isinf
+
+import numpy as np
+
+from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, Site
+from islands.effects.interface.force import ForceLaw, pack_force_laws, sum_output_forces
+from islands.effects.time_variation import GAIN_EFFECTS, gain_over_time
+from islands.expressions.tree import Expression, Symbol
+from islands.simulators.coordinates import input_coordinate, output_coordinate, peak_amplitude
+from islands.simulators.interface import BatchSimulation, SimulationRun
+from islands.simulators.ode.effects import (
+    extend_system,
+    find_effects,
+    find_limits,
+    is_term,
+    list_terms,
+    list_values,
+    number_symbols,
+)
+from islands.simulators.ode.equation_parser import TIME
+from islands.simulators.ode.lane_simulation import simulate_lanes
+from islands.simulators.ode.lane_values import LaneInput
+from islands.simulators.ode.program import OdeProgram, generate_program
+from islands.simulators.ode.record_channels import refine_input, sample_channels
+from islands.simulators.ode.sampled_signal import SampledSignal, interpolate_linearly, make_time
+from islands.simulators.ode.shooting import Shots
+from islands.simulators.ode.system import OdeSystem
+from islands.simulators.ode.system_parts import OdeEffect, OdeParameter
+
+#: Name of the factor of the parameter that is the gain; no name in equations has brackets.
+_GAIN = "gain(t)"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OdeSimulator(BatchSimulation):
+    """``dx/dt = f(x, u, parameters, t)`` by RK4.
+
+    Attributes
+    ----------
+    system : OdeSystem
+    initial : mapping
+        Nominal states at the first sample by name.
+    sizes : mapping
+        Largest absolute values of the states and of their derivatives (``dx/dt``) in a nominal simulation.
+    channels : mapping
+        Channels of the record by their names in the equations.
+    shots : Shots or None
+        Shooting intervals; None for a free run.
+    parameters : tuple of Parameter
+        Parameters that are not fixed, then the initial states that are not.
+    is_continuous_time : bool
+        Whether the input between samples matters; otherwise it is held.
+    """
+
+    system: OdeSystem
+    initial: Mapping[str, float]
+    sizes: Mapping[str, float]
+    channels: Mapping[str, str]
+    shots: Shots | None = None
+    parameters: tuple[Parameter, ...] = field(init=False)
+    state_effects: tuple[Effect, ...] = field(init=False)
+    supported_effects: frozenset[str] = field(init=False)
+    is_continuous_time: bool = True
+    _programs: dict[tuple[object, ...], OdeProgram] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        system = self.system
+        free = (make_parameter(each) for each in system.parameters if not each.fixed)
+        supported, of_states = find_effects(system, self.sizes)
+        object.__setattr__(self, "parameters", (*free, *self._list_initial_states()))
+        object.__setattr__(self, "state_effects", of_states)
+        object.__setattr__(self, "supported_effects", supported)
+
+    @property
+    def name(self) -> str:
+        """Name of the system."""
+        return self.system.name
+
+    @property
+    def sites(self) -> frozenset[Site]:
+        """All sites, but that of forces only if the system tells where they act."""
+        return frozenset(Site) if self.system.force else frozenset(Site) - {Site.FORCE}
+
+    @property
+    def built_in_effects(self) -> frozenset[str]:
+        """Names of the effects that the equations contain."""
+        return frozenset(self.system.contains)
+
+    @property
+    def tolerances(self) -> Mapping[str, float]:
+        """Tolerances of the parameters that have one."""
+        free = (each for each in self.system.parameters if not each.fixed)
+        return {each.name: each.tolerance for each in free if each.tolerance is not None}
+
+    def _list_initial_states(self) -> tuple[Parameter, ...]:
+        return tuple(
+            self._make_initial(each.name, each.unit, each.lower, each.upper)
+            for each in self.system.states
+            if not (each.fixed or self.shots)
+        )
+
+    def _make_initial(self, name: str, unit: str, lower: float, upper: float) -> Parameter:
+        scale = 0.02 * self.sizes[name]
+        return Parameter(f"initial {name}", unit, self.initial[name], scale, lower, upper, initial=True)
+
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
+        """Return the coordinate of the table ``[force]``; the input if there is none, or if it says so."""
+        force = self.system.force
+        if force is None or not force.rate:
+            return input_coordinate(context, output)
+        expressions = Symbol(force.coordinate), force.drive
+        parts = [
+            self.for_samples(*ends).simulate_nominal(part, expressions)
+            for ends, part in zip(context.bounds, context.split(), strict=True)
+        ]
+        coordinate, drive = np.concatenate(parts, axis=1)
+        units = {each.name: each.unit for each in self.system.states}
+        return replace(
+            output_coordinate(context, coordinate),
+            unit=units.get(force.coordinate) or "1",
+            force_unit=force.unit or context.input_unit,
+            force=peak_amplitude(drive),
+            is_output=self.system.output == Symbol(force.coordinate),
+        )
+
+    def simulate_batch(
+        self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
+    ) -> Signal:
+        """Simulate runs with the same effects and force laws; see `BatchSimulator.simulate_batch`."""
+        active = tuple(
+            each for each in list_terms(self.system) if each.name in runs[0].effect_parameters and each.term
+        )
+        has_factor = bool(self.system.gain) and not GAIN_EFFECTS.isdisjoint(runs[0].effect_parameters)
+        laws = runs[0].forces if self._has_force_equation else ()
+        program = self._get_program(active, has_factor, tuple(law for law, _ in laws))
+        if self.shots is None:
+            lanes = self._make_lanes(program, active, runs, context)
+            outputs = self._integrate(program, lanes, context, every)[:, 0]
+        else:
+            outputs = self._fit_shots(self.shots, program, active, runs, context)[:, ::every]
+        if not self._has_force_equation and runs[0].forces:
+            inputs = {run.input_key: run.apply_characteristic(run.x) for run in runs}
+            coordinates = [inputs[run.input_key] for run in runs]
+            further = sum_output_forces(coordinates, context, [run.forces for run in runs])
+            outputs = outputs + further[:, ::every]
+        return outputs
+
+    @property
+    def _steps(self) -> int:
+        return max(self.system.steps, 1)
+
+    @property
+    def _has_force_equation(self) -> bool:
+        """Whether forces act in an equation, and not on the output."""
+        return self.system.force is not None and bool(self.system.force.rate)
+
+    def simulate_nominal(self, context: SimulationContext, outputs: tuple[Expression, ...]) -> Signal:
+        """Simulate expressions of the system at its nominal values, shape (expressions, samples)."""
+        nominal = np.array([each.nominal for each in self.parameters])
+        program = generate_program(self.system, outputs)
+        lanes = self._make_lanes(program, (), [SimulationRun(nominal, context.u, {}, ())], context)
+        if self.shots is None:
+            return self._integrate(program, lanes, context)[0]
+        dt = context.dt / self._steps
+        return self.shots.make_simulation(program, dt, lanes, self.initial, self._steps).simulate_starts()[0]
+
+    def _fit_shots(
+        self,
+        shots: Shots,
+        program: OdeProgram,
+        active: tuple[OdeEffect, ...],
+        runs: Sequence[SimulationRun],
+        context: SimulationContext,
+    ) -> Signal:
+        """Simulate runs with fitted states at each shooting interval; between samples outputs are held."""
+        oversampling = runs[0].x.size // shots.measured.size
+        lanes = self._make_lanes(program, active, runs, context)
+        sizes = {each.name: self.sizes[each.name] for each in self.system.states if not each.fixed}
+        dt, every = context.dt / self._steps, oversampling * self._steps
+        simulation = shots.make_simulation(program, dt, lanes, self.initial, every)
+        fitted = simulation.fit_states(sizes, [run.near for run in runs])
+        return np.repeat(fitted, oversampling, axis=1)
+
+    def for_samples(self, first: int, last: int) -> "OdeSimulator":
+        """Return the simulator of one recording."""
+        return replace(self, shots=self.shots.for_samples(first, last)) if self.shots else self
+
+    def _get_program(
+        self, active: tuple[OdeEffect, ...], has_factor: bool, laws: tuple[ForceLaw, ...]
+    ) -> OdeProgram:
+        key = active, has_factor, laws
+        if key not in self._programs:
+            terms = [(number_symbols(number), law) for number, law in enumerate(laws) if is_term(law)]
+            calls = len(laws) - len(terms)
+            factor = _GAIN if has_factor else ""
+            system = extend_system(self.system, active, factor, terms, has_others=calls > 0)
+            self._programs[key] = generate_program(system, laws=calls)
+        return self._programs[key]
+
+    def _integrate(
+        self, program: OdeProgram, lanes: Sequence[LaneInput], context: SimulationContext, every: int = 1
+    ) -> Signal:
+        dt, every = context.dt / self._steps, every * self._steps
+        return self._simulate_lanes(program, context.start_time, dt, lanes, every)
+
+    def _simulate_lanes(
+        self,
+        program: OdeProgram,
+        _start_time: float,
+        dt: float,
+        lanes: Sequence[LaneInput],
+        every: int,
+    ) -> Signal:
+        """Simulate the outputs of a program, shape (lanes, outputs, samples)."""
+        return simulate_lanes(program, dt, lanes, every)
+
+    def _make_lanes(
+        self,
+        program: OdeProgram,
+        active: tuple[OdeEffect, ...],
+        runs: Sequence[SimulationRun],
+        context: SimulationContext,
+    ) -> list[LaneInput]:
+        steps, samples = self._steps, runs[0].x.size
+        common = make_time(context.start_time, samples, context.dt) if Symbol(TIME) in program.signals else {}
+        common |= sample_channels(context, self.channels, samples, is_held=not self.is_continuous_time)
+        common = {name: signal.refine(steps) for name, signal in common.items()}
+        made: dict[tuple[int, int], SampledSignal] = {}
+        names = [each.name for each in self.parameters]
+        fixed = {each.name: each.value for each in self.system.parameters}
+        lanes = []
+        for run in runs:
+            effects = run.effect_parameters
+            gain = gain_over_time(effects, context)
+            signals = dict(common)
+            if run.input_key not in made:
+                refined = refine_input(run.x, self._get_between(run, context), steps)
+                made[run.input_key] = SampledSignal(run.apply_characteristic(refined.moments))
+            driving = made[run.input_key]
+            if not isinstance(gain, float):
+                if self.system.gain:
+                    signals[_GAIN] = interpolate_linearly(gain).refine(steps)
+                else:
+                    driving = driving.scale(np.repeat(gain, steps))
+            signals[self.system.input] = driving
+            given = dict(zip(names, run.values.tolist(), strict=True))
+            laws = list(enumerate(run.forces)) if self._has_force_equation else []
+            calls = [law for _, law in laws if not is_term(law[0])]
+            numbers, states = list_values([each for each in laws if is_term(each[1][0])], context)
+            lanes.append(
+                LaneInput(
+                    {**fixed, **given, **{each.name: effects[each.name] for each in active}, **numbers},
+                    {
+                        **{name: given.get(f"initial {name}", value) for name, value in self.initial.items()},
+                        **states,
+                    },
+                    signals,
+                    pack_force_laws(calls, context, balance=True) if calls else None,
+                    *find_limits(self.system, effects),
+                )
+            )
+        return lanes
+
+    def _get_between(self, run: SimulationRun, context: SimulationContext) -> Signal:
+        """Return the values of the input between the samples, shape (2, samples)."""
+        if not self.is_continuous_time:
+            return np.stack([run.x, run.x])
+        if run.intersample_values is None:
+            return context.get_intersample_values(run.x)
+        return run.intersample_values
+
+
+def make_parameter(given: OdeParameter) -> Parameter:
+    """Return a parameter of equations as that of a simulator, with its bounds and its typical change."""
+    ends = (0.05 * given.value, 20.0 * given.value)
+    lower = min(ends) if given.lower is None else given.lower
+    upper = max(ends) if given.upper is None else given.upper
+    scale = 0.01 * (abs(given.value) or (1.0 if isinf(upper - lower) else upper - lower))
+    return Parameter(given.name, given.unit, given.value, scale, lower, upper, is_positive=given.positive)

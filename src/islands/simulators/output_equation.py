@@ -1,0 +1,91 @@
+"""Equation of the output around a simulation that has no equations, to which terms can be added."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.expressions.evaluation import evaluate
+from islands.simulators.interface import (
+    BatchSimulation,
+    SimulationRun,
+    Simulator,
+    simulate_runs,
+    take_recording,
+)
+from islands.simulators.intersample import SimulatorWrapper
+from islands.simulators.ode.equation_parser import TIME
+from islands.simulators.ode.output_system import INPUT, SIMULATED, make_output_system
+from islands.simulators.ode.simulator import make_parameter
+from islands.simulators.ode.system import OdeSystem
+
+#: Rate of the input in the equation, by central differences.
+RATE = f"rate({INPUT})"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OutputEquation(BatchSimulation, SimulatorWrapper):
+    """Simulation whose output is an expression of that of another one, of its input, and of the time.
+
+    Attributes
+    ----------
+    simulator : Simulator
+        The simulation that computes ``y_sim``.
+    system : OdeSystem
+        System without states. Its parameters follow those of the simulation.
+    sizes : mapping
+        Largest absolute value of ``y_sim`` in a nominal simulation.
+    """
+
+    simulator: Simulator
+    system: OdeSystem
+    sizes: Mapping[str, float]
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the simulation, then those of the equation."""
+        return (*self.simulator.parameters, *map(make_parameter, self.system.parameters))
+
+    def with_values(self, values: Signal) -> "OutputEquation":
+        """Return the equation with other nominal values of its parameters, the last of ``values``."""
+        names = [each.name for each in self.system.parameters]
+        own = dict(zip(names, values[values.size - len(names) :].tolist(), strict=True))
+        return replace(self, system=self.system.with_values(own))
+
+    def for_samples(self, first: int, last: int) -> "OutputEquation":
+        """Return the equation around the simulation of one recording."""
+        return replace(self, simulator=take_recording(self.simulator, first, last))
+
+    def simulate_batch(
+        self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
+    ) -> Signal:
+        """Simulate several runs; those that differ only in the equation share a run of the simulation."""
+        count = len(self.simulator.parameters)
+        distinct: dict[tuple[object, ...], SimulationRun] = {}
+        keys = []
+        for run in runs:
+            forces = tuple((id(law), own.tobytes()) for law, own in run.forces)
+            key = (run.values[:count].tobytes(), run.input_key, tuple(run.effect_parameters.items()), forces)
+            distinct.setdefault(key, replace(run, values=run.values[:count]))
+            keys.append(key)
+        outputs = simulate_runs(self.simulator, list(distinct.values()), context)
+        simulated = dict(zip(distinct, outputs, strict=True))
+        if not self.system.parameters:
+            return np.stack([simulated[key] for key in keys])[:, ::every]
+        names = [each.name for each in self.system.parameters]
+        signals: dict[tuple[int, int], dict[str, Signal]] = {}
+        found = []
+        for run, key in zip(runs, keys, strict=True):
+            if run.input_key not in signals:
+                u = run.apply_characteristic(run.x)
+                signals[run.input_key] = {INPUT: u, RATE: np.gradient(u) / context.dt, TIME: context.time}
+            own = dict(zip(names, run.values[count:].tolist(), strict=True))
+            known = {**signals[run.input_key], SIMULATED: simulated[key], **own}
+            found.append(evaluate(self.system.output, known))
+        return np.stack(found)[:, ::every]
+
+
+def add_output_equation(simulator: Simulator, context: SimulationContext) -> OutputEquation:
+    """Return a simulation with the equation ``output = y_sim`` and the scales of a record."""
+    return OutputEquation(simulator, make_output_system(simulator.name), {SIMULATED: context.output_peak})

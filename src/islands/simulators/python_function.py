@@ -1,0 +1,116 @@
+"""User-defined simulator: a Python function of the input and the sampling time."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+
+import numpy as np
+
+from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, Site
+from islands.effects.interface.force import add_output_forces
+from islands.errors import RecordError, SettingsError, suggest
+from islands.simulators.coordinates import input_coordinate
+from islands.simulators.interface import Forces
+
+#: Typical change of a parameter, relative to its value.
+_SCALE = 0.01
+
+#: Largest change of a parameter, relative to its value.
+_MAX_CHANGE = 10.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PythonFunctionSimulator:
+    """``function(u, dt, **parameters) -> y``; arguments with a numeric default are parameters.
+
+    Attributes
+    ----------
+    function : callable
+    source : str
+        ``FILE.py:FUNCTION``, or the name of the function.
+    given : mapping
+        Nominal values of parameters by name; the default of the function for the others.
+    """
+
+    function: Callable[..., Signal]
+    source: str
+    given: Mapping[str, float] = field(default_factory=dict)
+    sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.PARAMETER, Site.OUTPUT))
+    supported_effects: frozenset[str] = frozenset()
+    built_in_effects: frozenset[str] = frozenset()
+    state_effects: tuple[Effect, ...] = ()
+    is_continuous_time: bool = False
+
+    def __post_init__(self) -> None:
+        try:
+            arguments = list(inspect.signature(self.function).parameters.values())
+        except ValueError as error:  # a built-in function without a signature
+            raise SettingsError(
+                f"the arguments of {self.name} are unknown: wrap it in a Python function"
+            ) from error
+        defaults = {each.name: each.default for each in arguments[2:]}
+        if unknown := sorted(self.given.keys() - defaults.keys()):
+            raise SettingsError(
+                f"{self.name} has no parameter {', '.join(unknown)}: it has {', '.join(defaults) or 'none'}"
+                f"{suggest(unknown[0], defaults)}"
+            )
+        for name, value in defaults.items():
+            if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+                raise SettingsError(
+                    f"{self.name}: the parameter {name} needs a number for its default, like {name}=1.0"
+                )
+        if len(arguments) < 2:
+            raise SettingsError(f"{self.name} must take (u, dt), then parameters with numeric defaults")
+        object.__setattr__(
+            self, "given", {name: float(value) for name, value in {**defaults, **self.given}.items()}
+        )
+
+    @property
+    def name(self) -> str:
+        """Source without the folder."""
+        return self.source.replace("\\", "/").rpartition("/")[2]
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Arguments with numeric defaults."""
+        return tuple(
+            Parameter(
+                name,
+                "",
+                value,
+                _SCALE * abs(value) or _SCALE,
+                *((value - _MAX_CHANGE * abs(value), value + _MAX_CHANGE * abs(value)) if value else ()),
+            )
+            for name, value in self.given.items()
+        )
+
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
+        """Return the input as the coordinate."""
+        return input_coordinate(context, output)
+
+    def simulate(
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        _effect_parameters: Mapping[str, float],
+        forces: Forces,
+    ) -> Signal:
+        """Simulate the output; see `Simulator.simulate`."""
+        keywords = {name: float(value) for name, value in zip(self.given, values, strict=True)}
+        # A copy, since the function could write into its argument.
+        try:
+            y = np.asarray(self.function(x.copy(), context.dt, **keywords))
+            if np.iscomplexobj(y):
+                raise TypeError("its output is complex")
+            y = np.asarray(y, dtype=np.float64)
+        except (Exception, SystemExit) as error:
+            raise RecordError(f"{self.name} fails: {type(error).__name__}: {error}") from error
+        if y.shape != x.shape:
+            raise RecordError(
+                f"{self.name} gave an output of shape {y.shape} for an input of {x.shape}: it has to return "
+                "one value per sample"
+            )
+        return y + add_output_forces(x, context, forces)

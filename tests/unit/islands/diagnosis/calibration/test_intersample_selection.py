@@ -1,0 +1,164 @@
+"""Intersample selection: the behaviour and the step that generated a record are found."""
+
+import numpy as np
+import pytest
+import scipy
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.intersample_selection import get_discretisation, select_intersample
+from islands.diagnosis.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    calibrate,
+    evaluate_fit,
+)
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context
+from islands.diagnosis.calibration.target import Target
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.interface import Simulator
+from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.ode.preparation import make_ode_simulator
+from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.ode.system_document import make_system
+from islands.simulators.recorded_output import RecordedOutput
+from support.built_in_simulators import make_oscillator, make_piezo
+from support.simulated_records import recorded
+
+Array = NDArray[np.float64]
+
+SAMPLES, DT, FINE = 800, 0.01, 20
+
+
+def oscillator(m: float = 0.5, c: float = 2.0, k: float = 500.0) -> OdeSimulator:
+    return make_oscillator(m, c, k)
+
+
+def simulate_finely(u: Array, m: float = 0.5, c: float = 2.0, k: float = 500.0, linear: bool = True) -> Array:
+    """Return every ``FINE``-th sample of the motion; the input is linear or constant between fine samples."""
+    t = DT / FINE * np.arange(u.size)
+    return np.asarray(scipy.signal.lsim(([1.0], [m, c, k]), u, t, interp=linear)[1])[::FINE]
+
+
+def make_inputs(intersample: InterSample) -> tuple[Array, Array]:
+    """Return a sampled input, and the same input on the fine grid."""
+    t = DT / FINE * np.arange(SAMPLES * FINE)
+    rng = np.random.default_rng(5)
+    if intersample == InterSample.BAND_LIMITED:
+        lines = rng.uniform(0.3, 38.0, 40), rng.uniform(0, 2 * np.pi, 40)
+        u = sum(np.sin(2 * np.pi * f * t + p) for f, p in zip(*lines, strict=True))
+        return u[::FINE], u
+    u = rng.standard_normal(SAMPLES)
+    if intersample == InterSample.ZOH:
+        return u, np.repeat(u, FINE)
+    return u, np.interp(np.arange(t.size) / FINE, np.arange(SAMPLES), u)
+
+
+def calibrate_to(record: Dataset, core: Simulator) -> tuple[CalibrationResult, Target]:
+    samples = count_fitted_samples(record)
+    simulation = ExtendedSimulator(core, (), make_context(record, core, samples))
+    target = Target(record.y, np.arange(record.samples) < samples, None, {}, fitted=samples)
+    return calibrate(simulation, target, simulation.nominal), target
+
+
+def add_noise(y: Array, level: float = 0.01, seed: int = 8) -> Array:
+    return y + level * y.std() * np.random.default_rng(seed).standard_normal(y.size)
+
+
+def get_intersample(core: Simulator) -> InterSample:
+    return core.intersample if isinstance(core, ResampledSimulator) else InterSample.FOH
+
+
+@pytest.mark.parametrize("intersample", InterSample)
+def test_intersample_behaviour_of_the_record_is_selected(intersample: InterSample) -> None:
+    u, fine_u = make_inputs(intersample)
+    fit, target = calibrate_to(
+        recorded(
+            u, add_noise(simulate_finely(fine_u, linear=intersample != InterSample.ZOH)), DT, ("N", "m")
+        ),
+        oscillator(),
+    )
+    assert get_intersample(select_intersample(fit, target)) == intersample
+    refitted = fit
+    for _ in range(2):  # with the right behaviour the residual is smaller, so that steps have to be finer
+        core = select_intersample(refitted, target)
+        refitted = calibrate(ExtendedSimulator(core, (), fit.simulation.context), target, refitted.values)
+    assert refitted.mean_square == pytest.approx((0.01 * target.y.std()) ** 2, rel=0.2)
+    assert refitted.values[:3] == pytest.approx((0.5, 2.0, 500.0), rel=0.02)
+    # A second selection does not change the result.
+    assert get_intersample(select_intersample(refitted, target)) == intersample
+
+
+@pytest.mark.parametrize("intersample", [InterSample.ZOH, InterSample.BAND_LIMITED])
+def test_wrong_intersample_behaviour_leaves_more_than_the_noise(intersample: InterSample) -> None:
+    u, fine_u = make_inputs(intersample)
+    fit, target = calibrate_to(
+        recorded(
+            u,
+            add_noise(simulate_finely(fine_u, linear=intersample != InterSample.ZOH), 0.003),
+            DT,
+            ("N", "m"),
+        ),
+        oscillator(),
+    )
+    assert fit.mean_square > 4 * (0.003 * target.y.std()) ** 2
+
+
+def test_steps_are_halved_until_the_output_converges() -> None:
+    """At six samples per period, one step per sample is far too coarse."""
+    stiff = (0.5, 2.0, 5500.0)
+    u, fine_u = make_inputs(InterSample.FOH)
+    y = add_noise(simulate_finely(fine_u, *stiff), 0.002)
+    fit, target = calibrate_to(recorded(u, y, DT, ("N", "m")), oscillator(*stiff))
+    core = select_intersample(fit, target)
+    assert isinstance(core, ResampledSimulator)
+    assert core.intersample == InterSample.FOH
+    assert core.oversampling >= 2
+    refitted = calibrate(ExtendedSimulator(core, (), fit.simulation.context), target, fit.values)
+    assert refitted.values[:3] == pytest.approx(stiff, rel=0.01)
+    assert refitted.mean_square < 0.3 * fit.mean_square
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_slow_record_does_not_change_the_discretisation(seed: int) -> None:
+    """If the input hardly changes between samples, no behaviour fits better by more than chance."""
+    t = DT / FINE * np.arange(SAMPLES * FINE)
+    u = np.sin(2 * np.pi * 0.6 * t) + 0.5 * np.sin(2 * np.pi * 1.1 * t)
+    core = oscillator(k=50.0)
+    fit, target = calibrate_to(
+        recorded(u[::FINE], add_noise(simulate_finely(u, k=50.0), seed=seed), DT, ("N", "m")), core
+    )
+    assert select_intersample(fit, target) is core
+
+
+def test_simulator_without_integration_is_returned_unchanged() -> None:
+    u, _ = make_inputs(InterSample.ZOH)
+    core = RecordedOutput("theirs", u)
+    fit, target = calibrate_to(recorded(u, add_noise(u)), core)
+    assert select_intersample(fit, target) is core
+
+
+def test_discretisation_is_behaviour_and_step() -> None:
+    core = make_piezo()
+    assert get_discretisation(core) == (InterSample.FOH, 1)
+    assert get_discretisation(ResampledSimulator(core, InterSample.ZOH, 4)) == (InterSample.ZOH, 4)
+
+
+def test_a_simulation_that_smaller_steps_do_not_improve_keeps_its_step() -> None:
+    """The error of a chaotic simulation after a long time does not depend on the step."""
+    lorenz = {
+        "name": "lorenz",
+        "input": "u",
+        "equations": "dx/dt = s*(y - x) + u\ndy/dt = x*(28 - z) - y\ndz/dt = x*y - 8/3*z",
+        "output": "x",
+        "parameters": {"s": 10.0},
+        "states": {"x": {"initial": 1.0}, "y": {"initial": 1.0}, "z": {"initial": 20.0}},
+    }
+    record = recorded(
+        np.zeros(4000) + 1e-3 * np.sin(np.arange(4000)), np.random.default_rng(1).standard_normal(4000)
+    )
+    simulator = make_ode_simulator(make_system(lorenz), record)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, 3000))
+    target = Target(record.y, np.arange(4000) < 3000, None, {}, fitted=3000)
+    selected = select_intersample(evaluate_fit(simulation, target, simulation.nominal), target)
+    steps = selected.oversampling if isinstance(selected, ResampledSimulator) else 1
+    assert steps == 1

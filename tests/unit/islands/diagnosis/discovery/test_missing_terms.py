@@ -1,0 +1,257 @@
+"""Discovery: terms that equations lack are found, and named effects and noise are not replaced by terms."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.levenberg_marquardt import calibrate
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, make_target
+from islands.diagnosis.discovery.candidate_terms import (
+    MAX_MULTIPLIED_SIGNALS,
+    find_free_numbers,
+    list_candidate_terms,
+)
+from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.result import Diagnosis
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.catalogue import CATALOGUE
+from islands.export.fmu.compiler import find_compiler
+from islands.io.diagnosis_json import diagnosis_document
+from islands.io.result_text.diagnosis_text import summarise_diagnosis
+from islands.io.simulator_spec.document import extended_json
+from islands.io.simulator_spec.factory import make_simulator, simulate_spec
+from islands.io.simulator_spec.ode_spec import OdeSpec
+from islands.io.simulator_spec.specification import LocalExtendedSpec
+from islands.reports.diagnosis import diagnosis_report
+from islands.simulators.extended import ExtendedSimulator
+from support.equation_programs import run_c
+
+DT = 0.01
+
+#: Integration steps per sample; the simulation of the analysis uses fewer.
+STEPS = 10
+
+DOCUMENT = {
+    "name": "oscillator",
+    "input": "F",
+    "output": "x",
+    "equations": "dx/dt = v\ndv/dt = (F - c*v - k*x - force)/m\n",
+    "parameters": {"m": {"value": 1.05}, "c": {"value": 1.8}, "k": {"value": 105.0}},
+    "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}},
+    "force": {"coordinate": "x", "rate": "v"},
+}
+
+Law = Callable[[float, float, float], float]
+
+#: Forces that resist the motion, and the terms of dv/dt with their coefficients; m is 1.
+LAWS: dict[str, tuple[Law, str, float]] = {
+    "van der Pol": (lambda x, v, _u: 40.0 * x * x * v, "x**2*v", -40.0),
+    "product": (lambda x, v, _u: 6.0 * x * v, "x*v", -6.0),
+    "bilinear": (lambda x, _v, u: 0.5 * x * u, "x*F", -0.5),
+    "fifth power": (lambda x, _v, _u: 2000.0 * x**5, "x**5", -2000.0),
+}
+
+
+def simulate(law: Law, samples: int = 1200, seed: int = 1) -> Dataset:
+    """Simulate an oscillator with an additional force by the midpoint rule, with noise of one per cent."""
+    rng = np.random.default_rng(seed)
+    time = DT * np.arange(samples)
+    frequencies = rng.uniform(0.2, 3.0, 12)
+    u = 12.0 * np.sin(2 * np.pi * np.outer(time, frequencies) + rng.uniform(0, 6.3, 12)).sum(axis=1)
+    u *= np.minimum(1.0, time)
+    # The force at the middle of each step; it is linear between samples.
+    fine = np.interp(DT / STEPS * (0.5 + np.arange(samples * STEPS)), time, u)
+    x = v = 0.0
+    y = np.empty(samples * STEPS)
+    h = DT / STEPS
+    for k, force in enumerate(fine):
+        y[k] = x
+        middle_x = x + h / 2 * v
+        middle_v = v + h / 2 * (force - 2.0 * v - 100.0 * x - law(x, v, force))
+        x, v = (
+            x + h * middle_v,
+            v + h * (force - 2.0 * middle_v - 100.0 * middle_x - law(middle_x, middle_v, force)),
+        )
+    y = y[::STEPS]
+    noise = 0.01 * np.std(y) * rng.standard_normal(samples)
+    return Dataset(u, y + noise, DT, ("F_N",), output_name="x_m", input_units=("N",), output_unit="m")
+
+
+def search(law: Law) -> TermSearchResult | None:
+    record = simulate(law)
+    simulator = make_simulator(OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), record)
+    fitted = count_fitted_samples(record)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
+    target = make_target(record, fitted, {})
+    return search_terms(calibrate(simulation, target, simulation.nominal), target, DiagnosisRun())
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", LAWS)
+def test_missing_term_is_found_with_its_coefficient(name: str) -> None:
+    law, text, coefficient = LAWS[name]
+    found = search(law)
+    assert found is not None
+    assert [(each.term.target, each.term.text) for each in found.terms] == [("v", text)]
+    values = {
+        parameter.name: value
+        for parameter, value in zip(found.fit.simulation.parameters, found.fit.values, strict=True)
+    }
+    assert values[found.terms[0].parameters[0]] == pytest.approx(coefficient, rel=0.05)
+    assert text in found.describe()
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("text", "expected", "law"),
+    [
+        ("tanh(x/{scale})", 0.1, lambda x, _v, _u: 20.0 * np.tanh(x / 0.1)),
+        pytest.param(
+            "sign(v)*exp(-(v/{scale})**2)",
+            1.0,
+            lambda _x, v, _u: 6.0 * np.tanh(v / 0.01) * np.exp(-(v**2)),
+            marks=pytest.mark.nightly,
+        ),
+    ],
+)
+def test_saturation_and_stribeck_curve_are_found_with_their_scale(
+    text: str, expected: float, law: Law
+) -> None:
+    found = search(law)
+    assert found is not None
+    assert [each.term.text for each in found.terms] == [text]
+    scale = dict(zip((each.name for each in found.fit.simulation.parameters), found.fit.values, strict=True))
+    assert scale["s1"] == pytest.approx(expected, rel=0.1)
+
+
+def test_no_term_is_added_to_right_equations() -> None:
+    assert search(lambda _x, _v, _u: 0.0) is None
+
+
+def test_names_of_new_parameters_avoid_those_of_the_equations() -> None:
+    document = {
+        **DOCUMENT,
+        "equations": "dx/dt = v\ndv/dt = (F - c*v - a1*x - force)/s2\n",
+        "parameters": {"s2": {"value": 1.05}, "c": {"value": 1.8}, "a1": {"value": 105.0}},
+    }
+    simulator = make_simulator(
+        OdeSpec.model_validate({"kind": "ode", **document}), simulate(LAWS["product"][0])
+    )
+    assert find_free_numbers(simulator.system.find_names().keys(), 3) == [3, 4, 5]  # type: ignore[attr-defined]
+
+
+def test_definition_of_a_rate_gets_no_terms() -> None:
+    simulator = make_simulator(
+        OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), simulate(LAWS["product"][0])
+    )
+    sizes = {"x": 1.0, "v": 2.0, "F": 3.0, "rate(F)": 4.0}
+    terms = list_candidate_terms(simulator.system, sizes, 10.0, {})  # type: ignore[attr-defined]
+    assert {each.target for each in terms} == {"v", "output"}
+    assert len({(each.target, each.text) for each in terms}) == len(terms)
+    assert {each.size for each in terms if each.text == "x**2*v"} == {2.0}
+    # Where the input is the coordinate, its rate has the products that v has here.
+    assert {each.size for each in terms if each.text == "rate(F)*F**2"} == {36.0}
+
+
+def test_many_signals_have_no_products() -> None:
+    names = [f"x{index}" for index in range(MAX_MULTIPLIED_SIGNALS)]
+    equations = "".join(f"d{name}/dt = F - c*{name}\n" for name in names)
+    document = {**DOCUMENT, "equations": equations, "parameters": {"c": 1.0}, "states": {}, "output": "x0"}
+    system = OdeSpec.model_validate({"kind": "ode", **document, "force": None}).make_system()
+    sizes = {**dict.fromkeys([*names, "F"], 1.0), "rate(F)": 1.0}
+    texts = {each.text for each in list_candidate_terms(system, sizes, 10.0, {})}
+    assert {"x0**2", "t*x7", "rate(F)*x3"} < texts
+    assert not any("x0*x1" in text for text in texts)
+
+
+@cache
+def diagnose(name: str) -> Diagnosis:
+    law = LAWS[name][0] if name in LAWS else lambda _x, v, _u: 1.5 * np.sign(v)
+    return islands.diagnose(simulate(law), OdeSpec.model_validate({"kind": "ode", **DOCUMENT}))
+
+
+@pytest.mark.ci
+def test_discovered_equations_are_the_diagnosis_if_no_effect_explains_as_much() -> None:
+    found = diagnose("bilinear")
+    assert found.verdict == Verdict.DISCOVERED
+    assert found.discovery is not None
+    assert found.discovery.worse_by > 9.0
+    assert found.gain is not None
+    assert found.gain.ci95[0] > 0.0
+    (value,) = found.effects[0].parameters.values()
+    assert value.ci95 is not None
+    assert value.ci95[0] < -0.5 < value.ci95[1]
+    document = diagnosis_document(found)
+    assert document["discovered"]["equations"].startswith("dv/dt = ")
+    assert found.discovery.equations in summarise_diagnosis(found)
+    assert b"x*F" in diagnosis_report("record", found)
+
+
+@pytest.mark.ci
+def test_extended_equations_simulate_another_record() -> None:
+    found = diagnose("bilinear")
+    other = simulate(LAWS["bilinear"][0], seed=2)
+    simulated = simulate_spec(json.loads(extended_json(found.best, found.record)), other)
+    assert np.std(other.y - simulated) < 0.02 * np.std(other.y)
+
+
+@pytest.mark.ci
+def test_named_effect_wins_over_terms_that_explain_as_much() -> None:
+    found = diagnose("dry friction")
+    assert [each.name for each in found.effects][:1] == ["coulomb-friction"]
+    assert found.discovery is None
+
+
+def add_jump(record: Dataset, size: float) -> Dataset:
+    """Add a jump of the output at two fifths of the record, in standard deviations of the output."""
+    jump = size * np.std(record.y) * (np.arange(record.samples) > 0.4 * record.samples)
+    return replace(record, y=record.y + jump)
+
+
+@cache
+def diagnose_with_jump(name: str) -> Diagnosis:
+    spec = OdeSpec.model_validate({"kind": "ode", **DOCUMENT})
+    return islands.diagnose(add_jump(simulate(LAWS[name][0]), 0.05), spec)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", ["bilinear", pytest.param("fifth power", marks=pytest.mark.nightly)])
+def test_effect_and_missing_term_are_found_together(name: str) -> None:
+    found = diagnose_with_jump(name)
+    assert found.verdict == Verdict.DISCOVERED
+    assert sorted(each.name for each in found.effects) == ["jump", "missing-term"]
+    assert found.discovery is not None
+    assert LAWS[name][1] in found.discovery.equations
+    assert "jump" not in found.discovery.nearest
+    values = {each.name: next(iter(each.parameters.values())) for each in found.effects}
+    assert values["missing-term"].value == pytest.approx(LAWS[name][2], rel=0.05)
+    assert values["jump"].value == pytest.approx(0.05 * np.std(simulate(LAWS[name][0]).y), rel=0.1)
+    assert np.sqrt(found.best.mean_square) < 1.05 * found.noise_floor
+
+
+@pytest.mark.ci
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
+def test_extension_by_a_term_and_an_effect_is_simulated_and_exported(tmp_path: Path) -> None:
+    found = diagnose_with_jump("bilinear")
+    document = json.loads(extended_json(found.best, found.record))
+    other = add_jump(simulate(LAWS["bilinear"][0], seed=2), 0.05)
+    assert np.std(other.y - simulate_spec(document, other)) < 0.02 * np.std(other.y)
+    program = run_c(LocalExtendedSpec.model_validate(document), found.record, tmp_path)
+    np.testing.assert_allclose(program, found.best.output, atol=1e-9)
+
+
+@pytest.mark.ci
+def test_two_named_effects_are_not_replaced_by_terms() -> None:
+    record = add_jump(simulate(lambda x, _v, _u: 300.0 * x**3), 0.05)
+    own = [CATALOGUE[name] for name in ("cubic-stiffness", "coulomb-friction", "jump", "offset")]
+    found = islands.diagnose(record, OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), effects=own)
+    assert found.verdict == Verdict.NAMED
+    assert sorted(each.name for each in found.effects) == ["cubic-stiffness", "jump"]

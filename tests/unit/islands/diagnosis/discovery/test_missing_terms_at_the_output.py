@@ -1,0 +1,126 @@
+"""Missing terms of simulations without equations: a recorded output, a function, and an identified model."""
+
+import json
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+import scipy
+
+import islands
+from islands.data.dataset import Dataset
+from islands.diagnosis.procedure import diagnose
+from islands.diagnosis.result import Diagnosis
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.effect import Signal
+from islands.export.extension import export_extended
+from islands.io.result_text.diagnosis_text import summarise_diagnosis
+from islands.io.simulator_spec.document import extended_json
+from islands.io.simulator_spec.factory import simulate_spec
+from islands.io.simulator_spec.specification import LocalExtendedSpec
+from islands.simulators.interface import Simulator
+from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.recorded_output import RecordedOutput
+
+DT = 0.01
+
+#: Errors of the sensor of a positioner, by the input, its rate and the output.
+LAWS: dict[str, Callable[[Signal, Signal, Signal], Signal]] = {
+    "rate(u)*u**2": lambda u, rate, _y: 2e-5 * rate * u**2,
+    "u**5": lambda u, _rate, _y: 4e-7 * u**5,
+    "y_sim*u": lambda u, _rate, y: 0.01 * y * u,
+}
+
+
+def follow(u: Signal, dt: float, gain: float = 2.0, tau: float = 0.08) -> Signal:
+    """Simulate a positioner of first order."""
+    output: Signal = scipy.signal.lfilter([0.0, gain * dt / tau], [1.0, dt / tau - 1.0], u)
+    return output
+
+
+def make_record(law: Callable[[Signal, Signal, Signal], Signal] | None, seed: int = 4) -> Dataset:
+    rng = np.random.default_rng(seed)
+    time = DT * np.arange(1500)
+    frequencies = rng.uniform(0.1, 2.0, 10)
+    u = 4.0 * np.sin(2 * np.pi * np.outer(time, frequencies) + rng.uniform(0, 6.3, 10)).sum(axis=1)
+    y = follow(u, DT)
+    if law is not None:
+        y = y + law(u, np.gradient(u, DT), y)
+    y = y + 0.1 * rng.standard_normal(u.size)
+    return Dataset(u, y, DT, ("u_V",), output_name="y_um", input_units=("V",), output_unit="um")
+
+
+def make_column(record: Dataset) -> Simulator:
+    return RecordedOutput("y_model", follow(record.u[:, 0], DT))
+
+
+@cache
+def find(law: str) -> tuple[Dataset, Diagnosis]:
+    """Diagnose a recorded output that lacks a law."""
+    record = make_record(LAWS[law])
+    return record, diagnose(record, make_column(record))
+
+
+@pytest.mark.parametrize(
+    "law", [pytest.param(law, marks=() if law == "u**5" else pytest.mark.nightly) for law in LAWS]
+)
+def test_missing_term_of_a_recorded_output_is_found(law: str) -> None:
+    _, found = find(law)
+    assert found.verdict == "discovered"
+    assert found.discovery is not None
+    assert law in found.discovery.equations
+    assert "y_sim is the simulated output" in found.discovery.equations
+    assert [each.name for each in found.causes] == ["missing-term"]
+    assert found.gain is not None
+    assert found.gain.after.rmse == pytest.approx(0.1, rel=0.1)
+
+
+@pytest.mark.ci
+def test_missing_term_is_found_next_to_calibrated_parameters() -> None:
+    record = make_record(LAWS["rate(u)*u**2"])
+    own = [CATALOGUE[name] for name in ("offset", "linear-drift", "cubic-stiffness", "delay", "sensor-lag")]
+    found = diagnose(record, PythonFunctionSimulator(follow, "follow", {"gain": 1.9}), catalogue=own)
+    assert found.verdict == "discovered"
+    assert found.discovery is not None
+    assert "rate(u)*u**2" in found.discovery.equations
+    values = {
+        each.name: value
+        for each, value in zip(found.best.simulation.parameters, found.best.values, strict=True)
+    }
+    assert values["a1"] == pytest.approx(2e-5, rel=0.05)
+    assert values["gain"] == pytest.approx(2.0, rel=0.01)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_right_simulation_gets_no_terms(seed: int) -> None:
+    record = make_record(None, seed)
+    found = diagnose(record, make_column(record))
+    assert found.verdict == "nothing"
+    assert found.discovery is None
+
+
+def test_effect_of_the_catalogue_keeps_its_name() -> None:
+    record = make_record(lambda u, _rate, _y: 2e-4 * u**3)
+    found = diagnose(record, make_column(record))
+    assert found.verdict == "named"
+    assert [each.name for each in found.effects] == ["cubic-stiffness"]
+
+
+def test_document_and_text_contain_the_terms() -> None:
+    record, found = find("u**5")
+    columns = {"y_model": follow(record.u[:, 0], DT)}
+    document = json.loads(extended_json(found.best, record))
+    spec = LocalExtendedSpec.model_validate(document)
+    np.testing.assert_allclose(simulate_spec(spec, record, columns), found.best.output, rtol=1e-9)
+    assert "u**5" in export_extended(spec, "plain")
+    assert json.loads(export_extended(spec, "json")) == document
+    assert "pow(in->u, 5.0)" in export_extended(spec, "c")
+    assert "u**5" in summarise_diagnosis(found)
+
+
+def test_extended_simulation_is_right_in_a_second_diagnosis() -> None:
+    record, found = find("u**5")
+    spec = LocalExtendedSpec.model_validate_json(extended_json(found.best, record))
+    again = islands.diagnose(record, spec, columns={"y_model": follow(record.u[:, 0], DT)})
+    assert again.verdict == "nothing"

@@ -1,0 +1,84 @@
+"""Period detection, and the noise variance from repeated periods."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from islands.diagnosis.inference.noise_floor import MIN_PERIOD, detect_period, noise_variance_from_periods
+
+Array = NDArray[np.float64]
+
+
+def periodic(period: int, samples: int, seed: int = 0) -> Array:
+    """Return a periodic signal with random values and no shorter period."""
+    values = np.random.default_rng(seed).standard_normal(period)
+    return np.resize(values, samples)
+
+
+@given(st.integers(MIN_PERIOD, 120), st.floats(2.0, 9.0), st.integers(0, 99), st.floats(-50, 50))
+def test_period_is_exact_to_the_sample(period: int, times: float, seed: int, offset: float) -> None:
+    samples = int(np.ceil(period * times)) + 1
+    assert detect_period(offset + periodic(period, samples, seed)) == period
+
+
+@given(st.floats(0.01, 100.0), st.integers(0, 20))
+def test_period_detection_ignores_the_unit_and_small_deviations(size: float, seed: int) -> None:
+    u = periodic(64, 500, seed)
+    deviation = 2e-4 * np.random.default_rng(seed).standard_normal(u.size)
+    assert detect_period(size * (u + deviation)) == 64
+
+
+def test_period_of_a_smooth_signal_is_the_shortest_one() -> None:
+    t = np.arange(2000)
+    assert detect_period(np.sin(2 * np.pi * t / 100) + np.sin(2 * np.pi * t / 40 + 1)) == 200
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_aperiodic_signal_has_no_period(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal(3000)
+    walk = np.cumsum(noise)
+    assert detect_period(noise) is None
+    assert detect_period(walk) is None
+    assert noise_variance_from_periods(noise, noise) is None
+
+
+def test_signal_without_two_equal_periods_has_no_period() -> None:
+    assert detect_period(periodic(64, 120)) is None
+    t = np.arange(3000)
+    swept = np.sin(1e-5 * t**2)
+    assert detect_period(swept) is None
+
+
+def test_signal_with_varying_periods_has_no_period() -> None:
+    u = periodic(64, 640)
+    rng = np.random.default_rng(1)
+    assert detect_period(u + 0.01 * rng.standard_normal(u.size)) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("sigma", [1e-4, 0.3, 20.0])
+def test_noise_variance_is_within_its_sampling_error(sigma: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    u = periodic(80, 2000)
+    y = 5 * np.tanh(u) + np.roll(u, 3) + sigma * rng.standard_normal(u.size)
+    y[:80] += 100.0 * np.exp(-np.arange(80) / 9.0)  # transient
+    found = noise_variance_from_periods(u, y)
+    # 23 differences of 80 samples; successive differences share a period, and each loses its mean.
+    expected, chance = sigma**2 * (1 - 1 / 80), 4 * (3 / (23 * 80)) ** 0.5
+    assert found == pytest.approx(expected, rel=chance)
+
+
+def test_drifting_level_does_not_count_as_noise() -> None:
+    u = periodic(80, 2000)
+    steps = np.repeat(np.arange(25.0), 80)
+    assert noise_variance_from_periods(u, u + steps) == pytest.approx(0.0, abs=1e-20)
+
+
+def test_noise_variance_needs_three_periods() -> None:
+    u = periodic(64, 190)
+    assert detect_period(u) == 64
+    assert noise_variance_from_periods(u, u) is None
+    assert noise_variance_from_periods(periodic(64, 192), periodic(64, 192)) == 0.0

@@ -1,0 +1,79 @@
+"""Surrogates of a residual: kept and randomised properties."""
+
+import numpy as np
+import pytest
+
+from islands.diagnosis.inference.noise_surrogates import (
+    Randomisation,
+    draw_surrogates,
+    list_noise_models,
+)
+
+COUNT = 40
+
+
+def draw(residual: np.ndarray, randomisation: Randomisation, segments: tuple[int, ...] = ()) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    noise = list_noise_models(residual, segments)[0]
+    return np.array(list(draw_surrogates(residual, noise, segments, randomisation, COUNT, rng)))
+
+
+def test_random_signs_keep_the_size_of_every_sample_of_white_noise() -> None:
+    residual = np.random.default_rng(7).standard_normal(400) * np.linspace(0.5, 2.0, 400)
+    drawn = draw(residual, Randomisation.SIGNS)
+    assert np.abs(drawn) == pytest.approx(np.tile(np.abs(residual - residual.mean()), (COUNT, 1)))
+    assert np.abs(np.mean(np.sign(drawn), axis=0)).max() < 0.8
+
+
+def test_random_phases_keep_the_spectrum() -> None:
+    time = np.arange(1024)
+    residual = np.random.default_rng(2).standard_normal(1024) + 0.4 * np.sin(2 * np.pi * time / 64)
+    drawn = draw(residual, Randomisation.PHASES)
+    power = np.mean(np.abs(np.fft.rfft(drawn)) ** 2, axis=0)
+    assert power[16] > 10 * np.median(power)
+    assert np.mean(drawn**2) == pytest.approx(np.mean(residual**2), rel=0.1)
+
+
+@pytest.mark.parametrize("randomisation", Randomisation)
+def test_random_walk_begins_at_its_level_and_spreads(randomisation: Randomisation) -> None:
+    walks = [np.cumsum(np.random.default_rng(seed).standard_normal(500)) + 50.0 for seed in (3, 4)]
+    drawn = draw(np.concatenate(walks), randomisation, (500, 500))
+    for first, walk in ((0, walks[0]), (500, walks[1])):
+        assert drawn[:, first] == pytest.approx(walk[0], abs=1.0)
+        spread = np.std(drawn[:, first : first + 500] - walk[0], axis=0)
+        assert 2.0 < spread[50] < 12.0
+        assert spread[450] > 1.5 * spread[50]
+
+
+@pytest.mark.parametrize("randomisation", Randomisation)
+def test_thresholds_hold_for_a_random_walk_whose_slow_part_is_absorbed(randomisation: Randomisation) -> None:
+    """A calibration absorbs slow functions. What is left rarely exceeds the threshold of surrogates."""
+    samples, count = 4500, 24
+    absorbed = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, samples), 4))[0]
+    jumps = remove(absorbed, np.arange(samples)[:, None] >= np.arange(150, samples - 150, 150))
+    jumps /= np.linalg.norm(jumps, axis=0)
+
+    def find_best_jump(signals: np.ndarray) -> np.ndarray:
+        rest = remove(absorbed, signals)
+        return np.max((jumps.T @ rest) ** 2, axis=0) / np.sum(rest**2, axis=0)
+
+    alarms = 0
+    for seed in range(count):
+        walk = np.cumsum(np.random.default_rng(seed).standard_normal(samples + 5))
+        residual = remove(absorbed, np.convolve(walk, np.ones(6) / 6, "valid"))
+        threshold = np.quantile(find_best_jump(draw(residual, randomisation).T), 0.95)
+        alarms += find_best_jump(residual[:, None])[0] > threshold
+    assert alarms <= 4  # 5 % are 1.2 of 24; more than 4 have a probability of 0.7 %
+
+
+def remove(absorbed: np.ndarray, signals: np.ndarray) -> np.ndarray:
+    return signals - absorbed @ (absorbed.T @ signals)
+
+
+def test_only_long_records_exclude_a_random_walk() -> None:
+    """Calibration absorbs slow functions, and an autoregression fits the rest of a random walk better."""
+    walk = np.cumsum(np.random.default_rng(1).standard_normal(500))
+    left = walk - np.polynomial.Polynomial.fit(np.arange(500), walk, 4)(np.arange(500))
+    assert 1.0 in [model.difference_order for model in list_noise_models(left, ())]
+    white = np.random.default_rng(1).standard_normal(500)
+    assert [model.order for model in list_noise_models(white, ())] == [0]

@@ -1,0 +1,256 @@
+"""Screening and stepwise search: results, and independence of the order of evaluation."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    calibrate,
+    evaluate_fit,
+    whiten_target,
+)
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.hypothesis import Hypothesis, without_effect
+from islands.diagnosis.inference.screening import SCORE_TIE, screen_effects
+from islands.diagnosis.inference.stepwise_search import MIN_GAIN, refine_by_swaps, stepwise_search
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.effect import Effect
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.interface import Simulator
+from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.recorded_output import RecordedOutput
+from support.built_in_simulators import make_piezo
+from support.simulated_records import DT, made, recorded, wave
+
+Array = NDArray[np.float64]
+
+
+def backwards(function: Callable, arguments: Iterable) -> Iterator:
+    """Evaluate the last argument first, and return the results in the order of the arguments."""
+    results = [function(each) for each in reversed(list(arguments))]
+    return iter(reversed(results))
+
+
+#: Effects of several families, for tests that do not depend on the number of effects.
+SOME = (
+    "delay",
+    "offset",
+    "jump",
+    "thermal-drift",
+    "exponential-creep",
+    "even-nonlinearity",
+    "cubic-stiffness",
+)
+
+
+def select_some(effects: Iterable[Effect]) -> list[Effect]:
+    return [effect for effect in effects if effect.name in SOME]
+
+
+def calibrate_to(
+    record: Dataset, core: Simulator, effective: float | None = None
+) -> tuple[CalibrationResult, Target]:
+    samples = count_fitted_samples(record)
+    simulation = ExtendedSimulator(core, (), make_context(record, core, samples))
+    target = Target(record.y, np.arange(record.samples) < samples, None, {}, effective, fitted=samples)
+    return calibrate(simulation, target, simulation.nominal), target
+
+
+@pytest.mark.ci
+def test_screening_does_not_depend_on_the_order_of_evaluation() -> None:
+    u = wave(300)
+    core = make_piezo()
+    nominal, _ = calibrate_to(recorded(u, u), core)
+    y = nominal.output + 1e-4 * u**2 + 0.05 * np.random.default_rng(2).standard_normal(u.size)
+    base, target = calibrate_to(recorded(u, y), core)
+    effects = select_some(select_effects(core, base.simulation.context, {}))
+    runs = [DiagnosisRun(effects, parallel_map=parallel_map) for parallel_map in (map, backwards)]
+    forward, backward = (screen_effects(base, target, run) for run in runs)
+    assert [each.effect.name for each in forward] == [each.effect.name for each in backward]
+    for one, other in zip(forward, backward, strict=True):
+        assert np.array_equal(one.fit.values, other.fit.values)
+        assert one.score_gain(base) == other.score_gain(base)
+    gains = [each.score_gain(base) for each in forward]
+    assert all(after < before + SCORE_TIE for before, after in pairwise(gains))
+    assert forward[0].effect.name == "even-nonlinearity"
+    selected = [stepwise_search(base, forward, target, run)[0].effects for run in runs]
+    assert [[each.name for each in found] for found in selected] == [["even-nonlinearity"]] * 2
+
+
+@pytest.fixture
+def masked() -> tuple[CalibrationResult, Target, DiagnosisRun]:
+    """An offset and a drift that mask each other.
+
+    The offset alone explains nothing, since the sum of both is orthogonal to it. The drift alone explains a
+    quarter, which is not enough. Both together are found.
+    """
+    u = wave()
+    samples = 3 * u.size // 4
+    time = DT * np.arange(u.size)
+    both = np.column_stack([np.ones(u.size), time])[:samples]
+    # a + b t with zero mean: its projection on the offset is zero.
+    sum_ = time - time[:samples].mean()
+    noise = np.random.default_rng(7).standard_normal(u.size)
+    noise[:samples] -= both @ np.linalg.lstsq(both, noise[:samples], rcond=None)[0]
+    gain = 3.5 * np.log(samples)
+    power = float(np.sum(sum_[:samples] ** 2))
+    size = np.sqrt(np.expm1(gain / samples) * float(noise[:samples] @ noise[:samples]) / power)
+    record = recorded(u, u + noise + size * sum_)
+    base, target = calibrate_to(record, RecordedOutput("theirs", u))
+    return base, target, DiagnosisRun([CATALOGUE["offset"], CATALOGUE["linear-drift"]])
+
+
+def test_effects_that_mask_each_other_are_only_found_as_a_pair(masked) -> None:
+    base, target, run = masked
+    screened = screen_effects(base, target, run)
+    assert all(each.score_gain(base) < MIN_GAIN for each in screened)
+    assert stepwise_search(base, screened, target, run)[0].effects == ()
+    found, _ = stepwise_search(base, screened, target, run, pairs=True)
+    assert {each.name for each in found.effects} == {"offset", "linear-drift"}
+    assert found.cost < base.score - MIN_GAIN
+
+
+def test_hypothesis_without_one_effect_is_refitted(masked) -> None:
+    base, target, run = masked
+    found, _ = stepwise_search(base, screen_effects(base, target, run), target, run, pairs=True)
+    for effect in run.effects:
+        without = without_effect(found, effect, target)
+        assert effect not in without.effects
+        assert len(without.effects) == 1
+        assert without.cost > found.cost
+        assert without.fit.mean_square > found.fit.mean_square
+
+
+def test_pure_noise_yields_no_pair() -> None:
+    u = wave()
+    noise = np.random.default_rng(9).standard_normal(u.size)
+    core = RecordedOutput("theirs", u)
+    base, target = calibrate_to(recorded(u, u + noise), core)
+    effects = select_effects(core, base.simulation.context, {})
+    run = DiagnosisRun(effects)
+    found, _ = stepwise_search(base, screen_effects(base, target, run), target, run, pairs=True)
+    assert found.effects == ()
+    assert found.fit is base
+
+
+@pytest.mark.ci
+def test_noise_model_is_white_once_both_causes_are_found() -> None:
+    """The search begins with the coloured residual of the first cause and ends with white noise."""
+    u = wave(3000)
+    time = DT * np.arange(u.size)
+    noise = 0.05 * np.random.default_rng(3).standard_normal(u.size)
+    core = RecordedOutput("theirs", u)
+    base, target = calibrate_to(recorded(u, u + 0.02 * u**2 + 0.3 * (time > 8.0) + noise), core)
+    effects = select_some(select_effects(core, base.simulation.context, {}))
+    run = DiagnosisRun(effects)
+    screened = screen_effects(base, target, run)
+    target = whiten_target(target, screened[0].fit)
+    assert target.noise is not None
+    assert target.noise.order > 0
+    base = calibrate(base.simulation, target, base.values)
+    found, target = stepwise_search(base, screen_effects(base, target, run), target, run)
+    assert {each.name for each in found.effects} == {"even-nonlinearity", "jump"}
+    assert target.noise is not None
+    assert target.noise.order == 0
+    best = calibrate(found.fit.simulation, replace(target, noise=None), found.fit.values)
+    assert found.fit.score == pytest.approx(best.score, abs=SCORE_TIE)
+
+
+def test_deviation_from_the_prior_is_part_of_the_residual() -> None:
+    """Parameters absorb a sensor gain at a cost in the prior; the gain is screened next to another effect."""
+    u = wave(3000)
+    core = make_piezo()
+    simulation = ExtendedSimulator(core, (), make_context(recorded(u, u), core, u.size))
+    y = 1.1 * simulation.simulate(simulation.nominal) + 2.0
+    y = y + 0.05 * np.random.default_rng(4).standard_normal(u.size)
+    prior_std = {parameter.name: 0.01 for parameter in core.parameters}
+    base, target = calibrate_to(recorded(u, y), core)
+    target = replace(target, prior_std=prior_std)
+    effects = select_effects(core, base.simulation.context, prior_std)
+    offset = next(each for each in effects if each.name == "offset")
+    base = calibrate(base.simulation, target, base.values)
+    with_offset = screen_effects(base, target, DiagnosisRun([offset]))[0].fit
+    screened = screen_effects(with_offset, target, DiagnosisRun(effects))
+    gains = [each for each in screened if each.effect.is_gain]
+    assert gains
+    assert gains[0].score_gain(with_offset) > MIN_GAIN
+
+
+@pytest.mark.ci
+def test_refinement_replaces_a_wrong_effect_by_a_better_one() -> None:
+    u = wave(3000)
+    core = RecordedOutput("theirs", u)
+    noise = 0.05 * np.random.default_rng(5).standard_normal(u.size)
+    base, target = calibrate_to(recorded(u, u + 0.02 * u**2 + 0.01 * u**3 + noise), core)
+    effects = select_effects(core, base.simulation.context, {})
+    wrong = [next(each for each in effects if each.name == name) for name in ("cubic-stiffness", "jump")]
+    fit = base
+    for effect in wrong:
+        fit = screen_effects(fit, target, DiagnosisRun([effect]))[0].fit
+    initial = Hypothesis(fit, fit.score, tuple(wrong))
+    found, _ = refine_by_swaps(initial, target, DiagnosisRun(effects))
+    assert {each.name for each in found.effects} == {"cubic-stiffness", "even-nonlinearity"}
+    assert found.cost < initial.cost
+    assert [each.without.effects for each in found.alternatives] == [(found.effects[1],), (found.effects[0],)]
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2, 3))])
+def test_equivalent_effects_keep_the_catalogue_order(seed: int) -> None:
+    """Rounding does not decide: a sensor offset and a constant force are not distinguishable."""
+    oscillator = made()["second-order"]
+    record, core = oscillator.record, oscillator.simulator
+    noise = 1e-3 * np.random.default_rng(seed).standard_normal(record.samples)
+    base, target = calibrate_to(replace(record, y=record.y + 0.01 + noise), core)
+    effects = select_effects(core, base.simulation.context, {})
+    one, other = screen_effects(base, target, DiagnosisRun(effects))[:2]
+    assert (one.effect.cause, other.effect.cause) == ("offset", "input-offset")
+    assert one.score_gain(base) == pytest.approx(other.score_gain(base), abs=SCORE_TIE)
+    found, _ = stepwise_search(base, (one, other), target, DiagnosisRun(effects))
+    assert [each.name for each in found.effects] == ["offset"]
+
+
+def test_divergence_without_an_effect_restarts_at_nominal_values() -> None:
+    """A value that diverges without the effect is not a starting point for the remaining simulation."""
+    u = wave(3000)
+
+    def diverging(u: Array, _dt: float, gain: float = 1.0) -> Array:
+        return gain * u if gain * np.ptp(u) < 1.5 * np.ptp(wave(3000)) else np.full(u.size, np.nan)
+
+    core = PythonFunctionSimulator(diverging, "theirs.py:diverging")
+    base, target = calibrate_to(
+        recorded(u, u + 0.01 * np.random.default_rng(5).standard_normal(u.size)), core
+    )
+    effect = CATALOGUE["input-gain"]
+    simulation = base.simulation.with_effects((effect,))
+    found = Hypothesis(evaluate_fit(simulation, target, np.array([2.0, -0.5])), 0.0, (effect,))
+    without = without_effect(found, effect, target)
+    assert without.fit.values == pytest.approx([1.0], rel=1e-2)
+    assert np.isfinite(without.cost)
+
+
+def test_effect_that_the_refitted_simulation_does_not_need_is_removed() -> None:
+    """The earlier fit was in another minimum, or whitened by a preliminary noise model."""
+    u = wave(3000)
+
+    def scaled(u: Array, _dt: float, gain: float = 1.0) -> Array:
+        return gain * u
+
+    noise = 0.01 * np.random.default_rng(5).standard_normal(u.size)
+    base, target = calibrate_to(
+        recorded(u, 1.3 * u + noise), PythonFunctionSimulator(scaled, "theirs.py:scaled")
+    )
+    effects = [CATALOGUE["input-gain"], CATALOGUE["jump"]]
+    fit = evaluate_fit(base.simulation.with_effects(effects[:1]), target, np.array([1.0, 0.3]))
+    initial = Hypothesis(fit, fit.score, tuple(effects[:1]))
+    found, _ = refine_by_swaps(initial, target, DiagnosisRun(effects))
+    assert found.effects == ()
+    assert found.fit.values == pytest.approx([1.3], rel=1e-3)

@@ -1,0 +1,105 @@
+"""`InterimFindings`: a diagnosis that is stopped at any step has a result, which names the steps left out."""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from islands.diagnosis.inference import noise_floor
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.interim_findings import (
+    ALTERNATIVES,
+    COMBINATIONS,
+    EVIDENCE,
+    FREE_FORMS,
+    GROSS_ERRORS,
+    MISSING_TERMS,
+    SCREENING,
+    STEPS,
+    InterimFindings,
+)
+from islands.diagnosis.procedure import diagnose
+from islands.diagnosis.result import Diagnosis
+from islands.effects.catalogue import CATALOGUE
+from islands.io.diagnosis_json import as_json, diagnosis_document
+from islands.io.result_text.diagnosis_text import summarise_diagnosis
+from islands.simulators.recorded_output import RecordedOutput
+from support.simulated_records import recorded, wave
+
+pytestmark = pytest.mark.ci
+
+U = wave(400)
+RECORD = recorded(U, 1.0 + U + 0.5 * np.random.default_rng(1).standard_normal(U.size))
+EFFECTS = [CATALOGUE[name] for name in ("offset", "linear-drift", "even-nonlinearity")]
+
+
+def make_interim_results() -> list[Diagnosis | None]:
+    """Return what a diagnosis that is stopped before each of its calls has found, and the complete one."""
+    results, interim = list[Diagnosis | None](), InterimFindings()
+
+    def keep(_message: str, _fraction: float | None = None, /) -> None:
+        results.append(interim.make_diagnosis())
+
+    def keep_and_map(function: Callable[[Any], Any], arguments: Iterable[Any], /) -> Iterator[Any]:
+        for argument in arguments:
+            keep("")
+            yield function(argument)
+
+    complete = diagnose(
+        RECORD, RecordedOutput("theirs", U), None, 0, keep, keep_and_map, EFFECTS, interim=interim
+    )
+    assert interim.make_diagnosis() is complete
+    return [*results, complete]
+
+
+@pytest.fixture(scope="module")
+def stopped() -> Iterator[list[Diagnosis]]:
+    """The results of a diagnosis that is stopped after the calibration of the simulation."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(noise_floor, "RANDOM_FEATURES", 20)
+        first, *others = make_interim_results()
+        assert first is None
+        yield [each for each in others if each is not None]
+
+
+def test_steps_left_out_are_those_from_the_current_one_on(stopped: list[Diagnosis]) -> None:
+    counts = [len(each.left_out) for each in stopped]
+    assert counts == sorted(counts, reverse=True)
+    first = [each.left_out[0].partition(" (")[0] for each in stopped[:-1]]
+    assert list(dict.fromkeys(first)) == [
+        step
+        for step in STEPS
+        if step in {GROSS_ERRORS, SCREENING, EVIDENCE, FREE_FORMS, MISSING_TERMS, *first}
+    ]
+    assert stopped[-1].left_out == ()
+
+
+def test_effects_screened_so_far_are_candidates(stopped: list[Diagnosis]) -> None:
+    during = [each for each in stopped if each.left_out and each.left_out[0].startswith(SCREENING)]
+    assert {len(each.candidates) for each in during} == {0, 1, 2, 3}
+    assert all(f"({len(each.candidates)} are screened)" in each.left_out[0] for each in during[1:])
+    for each in during:
+        scores = [candidate.score for candidate in each.candidates]
+        assert scores == sorted(scores, reverse=True)
+
+
+def test_verdict_is_that_of_the_tested_evidence(stopped: list[Diagnosis]) -> None:
+    complete = stopped[-1]
+    assert [each.name for each in complete.causes] == ["offset"]
+    for each in stopped[:-1]:
+        is_tested = not {EVIDENCE, COMBINATIONS} & {*each.left_out}
+        assert each.verdict == (complete.verdict if is_tested else Verdict.STOPPED)
+        assert [cause.name for cause in each.causes] == (["offset"] if is_tested else [])
+        assert (each.gain is not None) == is_tested
+        assert each.nominal_rmse == complete.nominal_rmse
+        assert ALTERNATIVES not in each.left_out or not is_tested
+
+
+def test_document_and_summary_state_what_was_left_out(stopped: list[Diagnosis]) -> None:
+    for each in stopped:
+        assert as_json(diagnosis_document(each))
+        assert diagnosis_document(each)["left_out"] == list(each.left_out)
+        words = summarise_diagnosis(each)
+        assert all(step in words for step in each.left_out)
+        assert ("was stopped, without" in words) == bool(each.left_out)

@@ -1,0 +1,190 @@
+"""Diagnosis: findings, rejected input, hold-out part and reproducibility."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.diagnosis import assembly as diagnosis_assembly
+from islands.diagnosis import procedure as diagnosis
+from islands.diagnosis.calibration.intersample_selection import get_discretisation
+from islands.diagnosis.calibration.preparation import HOLDOUT_FRACTION, MIN_SAMPLES
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.procedure import diagnose
+from islands.diagnosis.result import Diagnosis
+from islands.effects.catalogue import CATALOGUE
+from islands.errors import RecordError, SettingsError
+from islands.io.diagnosis_json import as_json, diagnosis_document
+from islands.performance.trials.injection.measurement import inject
+from islands.performance.trials.trial import TOLERANCE
+from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.recorded_output import RecordedOutput
+from support.built_in_simulators import make_piezo
+
+
+@pytest.fixture(scope="module")
+def record() -> Dataset:
+    return inject(["quadratic-drag"], np.random.default_rng(8), seconds=6.0, band=(1.0, 4.0)).record
+
+
+@pytest.fixture(scope="module")
+def found(record: Dataset) -> Diagnosis:
+    return diagnose(record, make_piezo(), TOLERANCE)
+
+
+def with_input(record: Dataset, column: int, values: object) -> Dataset:
+    u = np.array(record.u)
+    u[:, column] = values
+    return replace(record, u=u)
+
+
+@pytest.mark.ci
+def test_injected_drag_is_named_with_its_strength_and_gain(found: Diagnosis) -> None:
+    assert found.verdict == Verdict.NAMED
+    (finding,) = found.effects
+    assert (finding.name, finding.family) == ("quadratic-drag", "shape")
+    value = finding.parameters["c"]
+    assert value.unit == "um s^2/V^2"
+    assert value.ci95 is not None
+    assert value.ci95[0] < value.value < value.ci95[1]
+    assert finding.confidence > 0.9
+    assert finding.explained_fraction is not None
+    assert finding.explained_fraction > 0.95
+    assert found.gain is not None
+    assert found.gain.after.rmse == pytest.approx(0.135, rel=0.1)
+    assert found.gain.ci95[0] < found.gain.reduction_percent < found.gain.ci95[1]
+    assert found.gain.ci95[0] > 0.0
+    assert found.gain.noise_floor.rmse == pytest.approx(0.135, rel=0.1)
+    assert found.candidates[0].name == "quadratic-drag"
+
+
+@pytest.mark.ci
+def test_diagnosis_is_reproducible(record: Dataset, found: Diagnosis) -> None:
+    again = diagnose(record, make_piezo(), TOLERANCE)
+    assert as_json(diagnosis_document(again)) == as_json(diagnosis_document(found))
+
+
+@pytest.mark.ci
+def test_holdout_part_only_changes_the_gain(record: Dataset, found: Diagnosis) -> None:
+    y = np.array(record.y)
+    fitted = int((1 - HOLDOUT_FRACTION) * record.samples)
+    y[fitted:] += 1.0
+    other = diagnose(replace(record, y=y), make_piezo(), TOLERANCE)
+    assert (other.effects, other.candidates, other.verdict) == (
+        found.effects,
+        found.candidates,
+        found.verdict,
+    )
+    assert other.gain is not None
+    assert found.gain is not None
+    assert other.gain.after.rmse > 5 * found.gain.after.rmse
+
+
+@pytest.fixture(scope="module")
+def clean() -> Dataset:
+    return inject([], np.random.default_rng(9), seconds=6.0).record
+
+
+#: A simulator with two parameters far from those of the records.
+DETUNED = make_piezo(dp=1.3, A=0.7)
+
+
+@pytest.mark.ci
+def test_parameter_without_a_tolerance_is_calibrated(clean: Dataset) -> None:
+    assert diagnose(clean, DETUNED).verdict == Verdict.NOTHING
+
+
+@pytest.mark.ci
+def test_parameter_beyond_its_tolerance_is_a_discrepancy(clean: Dataset) -> None:
+    found = diagnose(clean, DETUNED, TOLERANCE)
+    assert {each.name for each in found.effects} <= {"wrong-parameter", "sensor-gain", "input-gain"}
+    assert found.effects
+
+
+def test_recorded_output_can_be_diagnosed(record: Dataset) -> None:
+    simulated = np.array(make_piezo().simulate(*_nominal(record)))
+    drifted = replace(
+        record, y=simulated + 0.5 * record.time / record.time[-1] + 0.01 * np.sin(37.0 * record.time**2)
+    )
+    found = diagnose(drifted, RecordedOutput("theirs", simulated))
+    assert [each.name for each in found.causes] == ["linear-drift"]
+    assert found.effects[0].parameters["c"].value == pytest.approx(0.5, rel=0.05)
+
+
+def test_cause_of_little_confidence_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(diagnosis_assembly, "MIN_CONFIDENCE", 1.01)
+    u = np.sin(np.arange(400.0))
+    record = Dataset(u[:, None], 0.03 + u + 0.05 * np.random.default_rng(1).standard_normal(400), 1.0)
+    found = diagnose(record, RecordedOutput("theirs", u), catalogue=[CATALOGUE["offset"]])
+    assert (found.verdict, found.effects, found.gain) == (Verdict.UNKNOWN, (), None)
+    assert found.candidates[0].name == "offset"
+    assert found.best is found.base
+
+
+def _nominal(record: Dataset) -> tuple:
+    from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context
+
+    core = make_piezo()
+    context = make_context(record, core, count_fitted_samples(record))
+    return np.array([each.nominal for each in core.parameters]), context.u, context, {}, ()
+
+
+UNUSABLE = {
+    "too short": (lambda record: record[: MIN_SAMPLES - 1], f"a diagnosis needs at least {MIN_SAMPLES}"),
+    "constant output": (lambda record: replace(record, y=0.0 * record.y), "column y_um is constant"),
+    "gaps": (
+        lambda record: replace(record, y=np.where(record.time > 4.4, record.y, np.nan)),
+        "the output has 159 values in 600 samples",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", UNUSABLE)
+def test_unusable_record_is_rejected(record: Dataset, case: str) -> None:
+    spoil, message = UNUSABLE[case]
+    with pytest.raises(RecordError, match=message):
+        diagnose(spoil(record), make_piezo())
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "message"),
+    [
+        ({"mass": 0.1}, "has no parameter 'mass': it has A, beta, gamma, dp"),
+        ({"dp": 0.0}, "a fraction of its value, such as 0.02; got 0"),
+        ({"dp": 2.0}, "a fraction of its value"),
+    ],
+)
+def test_invalid_tolerance_is_rejected(record: Dataset, tolerance: dict, message: str) -> None:
+    with pytest.raises(SettingsError, match=message):
+        diagnose(record, make_piezo(), tolerance)
+
+
+def test_tolerance_of_a_parameter_that_is_zero_is_rejected(record: Dataset) -> None:
+    def function(u: np.ndarray, dt: float, offset: float = 0.0) -> np.ndarray:
+        return u + offset * dt
+
+    with pytest.raises(SettingsError, match="offset is a fraction of its value, which is 0"):
+        diagnose(record, PythonFunctionSimulator(function, "function"), {"offset": 0.1})
+
+
+def test_diverging_simulation_is_rejected(record: Dataset) -> None:
+    with pytest.raises(RecordError, match="diverges on this input"), np.errstate(all="ignore"):
+        diagnose(record, make_piezo(gamma=-5.0))
+
+
+@pytest.mark.ci
+def test_intersample_behaviour_that_is_rejected_ends_the_search(
+    record: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The search before counts: it is not repeated."""
+    held, effects = ResampledSimulator(make_piezo(), InterSample.ZOH, 1), [CATALOGUE["quadratic-drag"]]
+    once = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
+    # Before the search, after the screening, after the search, and after the screening of the held input.
+    selected = iter([make_piezo(), make_piezo(), held, make_piezo()])
+    monkeypatch.setattr(diagnosis, "select_intersample", lambda *_: next(selected))
+    found = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
+    assert next(selected, None) is None
+    assert get_discretisation(found.best.simulation.simulator) == (InterSample.FOH, 1)
+    assert np.array_equal(found.best.values, once.best.values)

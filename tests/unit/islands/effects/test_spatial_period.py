@@ -1,0 +1,118 @@
+"""Forces and errors of the sensor that are periodic in the measured position."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import islands
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.context import ForceCoordinate, SimulationContext
+from islands.effects.interface.effect import Effect
+from islands.effects.spatial_period import COGGING, CYCLIC_ERROR
+
+#: Sampling time in seconds, integration steps per sample, and range of a slow motion in metres.
+DT, STEPS, RANGE = 0.01, 5, 2.0
+
+TIME = DT * np.arange(3000)
+
+EFFECTS = (COGGING, CYCLIC_ERROR)
+
+
+def make_axis_context(x: np.ndarray | None) -> SimulationContext:
+    """Return the context of an axis whose measured position is ``x``."""
+    coordinate = ForceCoordinate("m", RANGE / 2, 1.0, "N", 10.0, is_output=True)
+    return SimulationContext(
+        *(np.sin(TIME), DT, {}, {}, 10.0, 1.0, "N", "m", DT * TIME.size),
+        force_coordinate=coordinate,
+        measured=x,
+    )
+
+
+def find_frequencies(effect: Effect, x: np.ndarray, residual: np.ndarray) -> list[float]:
+    return [point[2] for point in effect.starting_points(make_axis_context(x), residual)]
+
+
+def move_back_and_forth() -> np.ndarray:
+    """Return a motion whose speed changes, so that a spatial frequency has many temporal ones."""
+    return RANGE / 2 * np.sin(0.9 * TIME) * np.cos(0.13 * TIME)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+@pytest.mark.parametrize("pitch", [0.02, 0.1, 0.15])
+def test_starting_points_have_the_period_over_the_position(effect: Effect, pitch: float) -> None:
+    x = move_back_and_forth()
+    noise = 0.5 * np.random.default_rng(1).standard_normal(x.size)
+    found = find_frequencies(effect, x, np.sin(2 * np.pi * x / pitch + 0.7) + noise)
+    assert found[0] == pytest.approx(1.0 / pitch, abs=0.25 / RANGE)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_starting_points_ignore_the_level_and_trends_over_the_position(effect: Effect) -> None:
+    x = move_back_and_forth()
+    found = find_frequencies(effect, x, 7.0 + 0.3 * x + 0.2 * x**2 + 0.1 * np.sin(2 * np.pi * x / 0.1))
+    assert found[0] == pytest.approx(10.0, abs=0.25 / RANGE)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_a_measured_position_that_changes_is_needed(effect: Effect) -> None:
+    assert effect.is_applicable(make_axis_context(move_back_and_forth()))
+    assert not effect.is_applicable(make_axis_context(np.ones(TIME.size)))
+    assert not effect.is_applicable(make_axis_context(None))
+
+
+def test_cogging_needs_a_position_that_is_the_output() -> None:
+    context = make_axis_context(move_back_and_forth())
+    driven = replace(context, force_coordinate=replace(context.force_coordinate, is_output=False))
+    assert not COGGING.is_applicable(driven)
+    assert CYCLIC_ERROR.is_applicable(driven)
+
+
+def simulate_axis(cogging: float, pitch: float, samples: int, rng: np.random.Generator) -> islands.Dataset:
+    """Simulate ``2 x'' + 6 x' + 4 tanh(x'/0.05) + cogging sin(2 pi x/pitch) = u`` with noise of 0.2 %."""
+    time, h = DT * np.arange(samples), DT / STEPS
+    frequencies, phases = rng.uniform(0.2, 2.0, 12), rng.uniform(0.0, 6.3, 12)
+    u = 10.0 * np.sin(2 * np.pi * np.outer(time, frequencies) + phases).sum(axis=1) * np.minimum(1.0, time)
+    pushed = np.interp(h * (0.5 + np.arange(samples * STEPS)), time, u).tolist()
+
+    def accelerate(x: float, v: float, u: float) -> float:
+        friction = 6.0 * v + 4.0 * np.tanh(v / 0.05)
+        return float(u - friction - cogging * np.sin(2 * np.pi * x / pitch)) / 2.0
+
+    x = v = 0.0
+    y = np.empty(samples)
+    for step, force in enumerate(pushed):
+        if step % STEPS == 0:
+            y[step // STEPS] = x
+        middle_x, middle_v = x + h / 2 * v, v + h / 2 * accelerate(x, v, force)
+        x, v = x + h * middle_v, v + h * accelerate(middle_x, middle_v, force)
+    y += 0.002 * np.std(y) * rng.standard_normal(samples)
+    return islands.Dataset(*(u, y, DT, ("u_N",)), output_name="x_m", input_units=("N",), output_unit="m")
+
+
+@pytest.mark.ci
+def test_cogging_of_an_axis_is_named_with_its_pitch() -> None:
+    others = ("coulomb-friction", "periodic-disturbance", "offset", "damping-curve", "backlash")
+    effects = [*EFFECTS, *(CATALOGUE[name] for name in others)]
+    record = simulate_axis(1.0, 0.24, 1500, np.random.default_rng(3))
+    found = islands.diagnose(record, "rigid-axis", effects=effects)
+    assert [each.name for each in found.effects] == ["cogging"]
+    values = {name: each.value for name, each in found.effects[0].parameters.items()}
+    assert values["frequency"] == pytest.approx(1.0 / 0.24, rel=0.01)
+    assert np.hypot(values["cosine"], values["sine"]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_cyclic_error_of_an_encoder_is_named_with_its_period() -> None:
+    """The simulation is a gain; the error is three tenths of the noise."""
+    rng = np.random.default_rng(5)
+    u = np.cumsum(rng.standard_normal(2000)) * np.hanning(2000)
+    y = 0.8 * u
+    noise = 0.01 * float(np.std(y))
+    pitch = 0.07 * float(np.ptp(y))
+    y = y + 0.45 * noise * np.sin(2 * np.pi * y / pitch + 1.0) + noise * rng.standard_normal(u.size)
+    record = islands.Dataset(*(u, y, 0.001, ("u_V",)), output_name="y_um")
+    found = islands.diagnose(record, "linear:0")
+    assert [each.name for each in found.effects] == ["cyclic-error"]
+    values = {name: each.value for name, each in found.effects[0].parameters.items()}
+    assert values["frequency"] * pitch == pytest.approx(1.0, rel=0.01)
+    assert np.hypot(values["cosine"], values["sine"]) / noise == pytest.approx(0.45, abs=0.1)

@@ -1,0 +1,197 @@
+"""Simulators that are FMUs: agreement with equations and models, records that do not fit, hidden effects."""
+
+import json
+import pickle
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import islands
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.preparation import make_context
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.procedure import diagnose
+from islands.errors import RecordError
+from islands.export import write_export
+from islands.export.fmu.compiler import find_compiler
+from islands.io.models import model_from_json
+from islands.io.simulator_spec.code_spec import FmuSpec
+from islands.io.simulator_spec.document import extended_document
+from islands.io.simulator_spec.factory import make_simulator, simulate_spec
+from islands.models.narx import Model
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.fmu.simulator import FmuSimulator
+from islands.simulators.interface import Simulator, get_tolerances
+from support.oscillator_fmus import write_oscillator
+from support.simulated_records import DT, EQUATIONS, FMUS, MODEL, recorded, simulate_oscillator, wave
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
+
+Array = NDArray[np.float64]
+
+INTERFACES = ("model-exchange", "co-simulation")
+
+
+@cache
+def oscillator(**options: object) -> str:
+    name = "-".join(f"{key}{value}" for key, value in options.items())
+    return str(write_oscillator(Path(FMUS.name) / f"mass{name}.fmu", **options))  # type: ignore[arg-type]
+
+
+def oscillation(samples: int = 600, noise: float = 0.0, start: float = 0.0) -> Dataset:
+    u = wave(samples)
+    y = simulate_oscillator(u, 0.5, 4.0, 200.0)
+    # The free decay of a mass that is released at `start`.
+    rate, frequency = 4.0, np.sqrt(400.0 - 16.0)
+    t = DT * np.arange(samples)
+    y += start * np.exp(-rate * t) * (np.cos(frequency * t) + rate / frequency * np.sin(frequency * t))
+    return recorded(u, y + noise * np.random.default_rng(3).standard_normal(samples), units=("N", "m"))
+
+
+def simulate(simulator: Simulator, record: Dataset, **values: float) -> Array:
+    context = make_context(record, simulator, record.samples)
+    alone = ExtendedSimulator(simulator, (), context)
+    given = alone.nominal
+    for place, parameter in enumerate(alone.parameters):
+        given[place] = values.get(parameter.name, given[place])
+    return alone.simulate(given)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_model_exchange_agrees_with_the_equations(version: int) -> None:
+    record = oscillation(start=0.1)
+    fmu = make_simulator(f"fmu:{oscillator(version=version)}", record)
+    ode = make_simulator(f"ode:{EQUATIONS / 'second-order.toml'}", record)
+    known = {"m": 0.5, "c": 4.0, "k": 200.0, "initial x": 0.1, "initial v": 0.2}
+    assert {each.name for each in fmu.parameters} == known.keys()
+    found = simulate(fmu, record, **known)
+    np.testing.assert_allclose(found, simulate(ode, record, **known), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("interface", INTERFACES)
+def test_initial_states_are_fitted_to_a_record(interface: str) -> None:
+    record = oscillation(start=0.1)
+    found = simulate_spec(FmuSpec(kind="fmu", file=oscillator(), interface=interface), record)  # type: ignore[arg-type]
+    assert np.abs(found - record.y).max() < 2e-3 * np.abs(record.y).max()
+
+
+@pytest.mark.parametrize("kind", ["fmu", "fmu2"])
+@pytest.mark.parametrize("dt", [DT, 4 * DT])
+def test_an_exported_model_gives_its_free_run(kind: str, dt: float, tmp_path: Path) -> None:
+    """With the past samples before the record as initial values; a longer step repeats the input."""
+    model: Model = replace(model_from_json(json.dumps(MODEL), "m"), dt=DT)
+    write_export(model, kind, tmp_path / "model.fmu")
+    record = recorded(wave(300, dt), np.zeros(300), dt)
+    simulator = make_simulator(f"fmu:{tmp_path / 'model.fmu'}", record)
+    assert [each.name for each in simulator.parameters] == [
+        "initial start.y_um[1]",
+        "initial start.u_V[1]",
+        "initial start.u_V[2]",
+    ]
+    u = [7.0, 3.0, *np.repeat(record.u[:, 0], round(dt / DT))]
+    y = [2.0]
+    for k in range(2, len(u)):
+        y.append(0.8 * y[-1] + 0.15 * u[k - 1] + 0.002 * u[k - 2] ** 2)
+    past = dict(zip([each.name for each in simulator.parameters], (2.0, 3.0, 7.0), strict=True))
+    found = simulate(simulator, record, **past)
+    np.testing.assert_allclose(found, y[1 :: round(dt / DT)], rtol=1e-12)
+
+
+def test_a_channel_drives_a_further_input() -> None:
+    record = oscillation()
+    u = np.column_stack([record.u[:, 0] - wave()[::-1], wave()[::-1]])
+    part = replace(record, u=u, input_names=("u_N", "w_N"), input_units=("N", "N"))
+    simulator = make_simulator(f"fmu:{oscillator(disturbance=True)}?input=u&channels=w", part)
+    error = simulate(simulator, part) - simulate(make_simulator(f"fmu:{oscillator()}", record), record)
+    assert np.abs(error).max() < 1e-9
+    with pytest.raises(RecordError, match=r"reads the channel w, and the channels of the record are none"):
+        make_simulator(f"fmu:{oscillator(disturbance=True)}?input=u&channels=w", record)
+
+
+@pytest.mark.ci
+def test_values_of_a_channel_and_the_output_in_each_others_column_are_found() -> None:
+    record, w = oscillation(noise=1e-3), 100.0 + 20.0 * wave()[::-1]
+    y = record.y + simulate_oscillator(w, 0.5, 4.0, 200.0)
+    part = replace(
+        record,
+        u=np.column_stack([record.u[:, 0], y]),
+        y=w,
+        input_names=("u_N", "w_N"),
+        input_units=("N", "N"),
+    )
+    simulator = make_simulator(f"fmu:{oscillator(disturbance=True)}?input=u&channels=w", part)
+    found = diagnose(part, simulator, dict.fromkeys("mck", 0.02), catalogue=())
+    assert found.verdict == Verdict.GROSS_ERROR
+    assert {each.name for each in found.effects} == {"swapped-channels"}
+
+
+def test_a_simulator_is_sent_to_another_process_by_its_path() -> None:
+    record = oscillation()
+    simulator = make_simulator(f"fmu:{oscillator()}", record)
+    content = pickle.dumps(simulator)
+    assert len(content) < 10_000
+    assert np.array_equal(simulate(pickle.loads(content), record), simulate(simulator, record))
+
+
+def test_steps_are_refined_until_a_simulation_does_not_diverge() -> None:
+    """At 10 steps per period of sampling, a stiff spring needs more than one step of the integrator."""
+    record = oscillation()
+    found = make_simulator(f"fmu:{oscillator()}?parameters=k=1e6", record)
+    assert isinstance(found, FmuSimulator)
+    assert found.system.steps > 1
+    with pytest.raises(RecordError, match=r"ends the simulation after .*check its parameters and units"):
+        make_simulator(f"fmu:{oscillator()}?parameters=k=1e6&steps=1", record)
+
+
+@pytest.mark.parametrize(
+    ("change", "query", "message"),
+    [
+        ({"dt": 0.004}, "", "fixed step of 0.005 s, of which the sampling time 0.004 s is not a multiple"),
+        (
+            {"input_units": ("kN",)},
+            "",
+            "the input u of .* is in N, that of the record in kN: convert the column",
+        ),
+        ({"output_unit": "V"}, "", "the output x of .* is in m, that of the record in V: convert the column"),
+        (
+            {},
+            "?parameters=m=-1",
+            r"\(fmi3EnterInitializationMode failed .*: m is out of range\): check its par",
+        ),
+    ],
+)
+def test_a_record_that_does_not_fit_is_refused(change: dict[str, object], query: str, message: str) -> None:
+    path = oscillator(interfaces="CoSimulation", fixed_step=0.005)
+    with pytest.raises(RecordError, match=message):
+        make_simulator(f"fmu:{path}{query}", replace(oscillation(), **change))  # type: ignore[arg-type]
+
+
+def test_a_fixed_step_leaves_no_choice_between_samples() -> None:
+    path = oscillator(interfaces="CoSimulation", fixed_step=0.005)
+    simulator = make_simulator(f"fmu:{path}", oscillation())
+    assert not simulator.is_continuous_time
+    assert make_simulator(f"fmu:{oscillator()}", oscillation()).is_continuous_time
+
+
+@pytest.mark.ci
+def test_a_hidden_effect_is_named_and_a_clean_record_has_none(tmp_path: Path) -> None:
+    """The output of the FMU is cut off at 0.15 m; the result is saved, and simulated and diagnosed again."""
+    clean = oscillation(250, 0.001)
+    path = tmp_path / "axis.toml"
+    tolerances = "\n".join(f"{name} = {{ tolerance = 0.05 }}" for name in ("m", "c", "k"))
+    path.write_text(f'file = "{oscillator()}"\n[parameters]\n{tolerances}\n')
+    simulator = make_simulator(f"fmu:{path}", clean)
+    assert get_tolerances(simulator) == {"m": 0.05, "c": 0.05, "k": 0.05}
+    assert islands.diagnose(clean, simulator).verdict == Verdict.NOTHING
+    limited = replace(clean, y=np.clip(oscillation(250).y, -0.15, 0.15) + clean.y - oscillation(250).y)
+    found = islands.diagnose(limited, f"fmu:{path}")
+    assert found.verdict == Verdict.NAMED
+    assert [each.name for each in found.effects] == ["output-saturation"]
+    document = extended_document(found.best, limited)
+    assert document["core"]["parameters"]["m"]["tolerance"] == 0.05
+    again = islands.simulate(document, limited)
+    np.testing.assert_allclose(again.y, found.best.output, rtol=0, atol=2e-4)

@@ -1,0 +1,50 @@
+"""Signals at three moments of each step: delays, rates, and divided steps."""
+
+import numpy as np
+import pytest
+
+from islands.simulators.ode.sampled_signal import SampledSignal, interpolate_linearly
+
+DT = 0.01
+SAMPLES = 200
+TIME = DT * np.arange(SAMPLES)
+FORCE = 3.0 * np.sin(7.0 * TIME) + 2.0 * np.cos(3.1 * TIME)
+
+
+def test_a_delay_of_a_linear_signal_is_exact_between_samples() -> None:
+    signal, steps = interpolate_linearly(FORCE), np.arange(SAMPLES)
+    delayed = signal.delay(0.237 * DT, DT)
+    for part, ahead in ((delayed.start, 0.0), (delayed.middle, 0.5), (delayed.end, 1.0)):
+        assert part == pytest.approx(np.interp(steps + ahead - 0.237, steps, FORCE), abs=1e-13)
+
+
+def test_the_delay_of_a_held_signal_keeps_its_mean() -> None:
+    held = SampledSignal.join(FORCE, FORCE, FORCE)
+    delayed = held.delay(0.3 * DT, DT)
+    assert delayed.start[1:] == pytest.approx(0.7 * FORCE[1:] + 0.3 * FORCE[:-1], abs=1e-13)
+    assert delayed.start[0] == FORCE[0]
+
+
+def test_the_rate_of_a_held_signal_is_that_of_a_ramp_to_the_next_value() -> None:
+    rate = SampledSignal.join(FORCE, FORCE, FORCE).differentiate(DT)
+    assert rate.middle[:-1] == pytest.approx(np.diff(FORCE) / DT)
+    assert rate.end[-1] == 0.0
+
+
+def test_the_rate_of_a_parabola_is_exact() -> None:
+    time = np.array([0.0, 0.1, 0.2])
+    parabola = SampledSignal.join(*((time + ahead) ** 2 for ahead in (0.0, 0.05, 0.1)))
+    rate = parabola.differentiate(0.1)
+    for part, ahead in ((rate.start, 0.0), (rate.middle, 0.05), (rate.end, 0.1)):
+        assert part == pytest.approx(2 * (time + ahead), abs=1e-12)
+
+
+def test_a_divided_step_keeps_lines_parabolas_and_held_values() -> None:
+    line, held = interpolate_linearly(FORCE).refine(3), SampledSignal.join(FORCE, FORCE, FORCE).refine(4)
+    steps = np.arange(3 * SAMPLES) / 3
+    assert line.middle == pytest.approx(np.interp(steps + 1 / 6, np.arange(SAMPLES), FORCE), abs=1e-13)
+    assert line.end[:-1] == pytest.approx(line.start[1:], abs=1e-13)
+    for part in (held.start, held.middle, held.end):
+        assert np.array_equal(part, np.repeat(FORCE, 4))
+    parabola = SampledSignal.join(*((np.array([0.0, 0.1]) + ahead) ** 2 for ahead in (0.0, 0.05, 0.1)))
+    assert parabola.refine(2).end == pytest.approx(np.array([0.05, 0.1, 0.15, 0.2]) ** 2, abs=1e-15)

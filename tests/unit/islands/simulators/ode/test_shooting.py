@@ -1,0 +1,138 @@
+"""Multiple shooting: fitted states, and derivatives of outputs with fitted states."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.preparation import make_context
+from islands.effects.catalogue import CATALOGUE
+from islands.io.simulator_spec.factory import make_simulator
+from islands.io.simulator_spec.specification import PhysicalSpec
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.ode.simulator import OdeSimulator
+from support.simulated_records import made, recorded, simulate_oscillator, wave
+
+EFFECTS = {
+    "without effects": [],
+    "a force": ["cubic-stiffness"],
+    "a state that is kept": ["second-hysteresis"],
+}
+
+
+@pytest.fixture(params=EFFECTS)
+def axis(request: pytest.FixtureRequest) -> tuple[ExtendedSimulator, np.ndarray]:
+    """Return an axis with effects, and values at which the effects do not vanish."""
+    case = made()["rigid-axis"]
+    effects = [CATALOGUE[name] for name in EFFECTS[request.param]]
+    simulation = ExtendedSimulator(
+        case.simulator, effects, make_context(case.record, case.simulator, case.record.samples)
+    )
+    values = simulation.nominal
+    for effect in effects:
+        starts = effect.starting_points(simulation.context, case.record.y)
+        values[simulation.get_slice(effect)] = starts[-1]
+    return simulation, values
+
+
+def test_change_of_fitted_states_is_their_first_order(axis: tuple[ExtendedSimulator, np.ndarray]) -> None:
+    """The output near another one is that of fitted states, without another fit."""
+    simulation, values = axis
+    points = np.vstack([values + 1e-2 * np.diag(simulation.scales), values])
+    near = np.full(len(points), len(points) - 1)
+    *found, base = simulation.simulate_batch(points, near)
+    assert np.array_equal(base, simulation.simulate_batch(values[None])[0])
+    for parameter, point, output in zip(simulation.parameters, points, found, strict=False):
+        expected, change = simulation.simulate_batch(point[None])[0] - base, output - base
+        assert np.std(change - expected) < 0.05 * np.std(expected) + 1e-11, parameter.name
+
+
+def test_derivatives_change_no_other_output(axis: tuple[ExtendedSimulator, np.ndarray]) -> None:
+    """Neither the order of the calls nor their number changes an output."""
+    simulation, values = axis
+    points = np.vstack([values + simulation.scales, values])
+    alone = simulation.simulate_batch(points)
+    first = simulation.simulate_batch(points, np.array([1, 1]))
+    assert np.array_equal(first[1], alone[1])
+    others = np.vstack([values - simulation.scales, points])
+    again = simulation.simulate_batch(others, np.array([0, 2, 2]))
+    assert np.array_equal(again[1:], first)
+    assert np.array_equal(simulation.simulate_batch(points), alone)
+
+
+def test_shooting_fits_the_states_of_every_interval() -> None:
+    """The equations are right, so that only the fitted positions and rates determine the output."""
+    case = made()["rigid-axis"]
+    position = simulate_oscillator(wave(), 2.0, 6.0, 0.0)
+    noisy = position + 1e-3 * np.random.default_rng(2).standard_normal(position.size)
+    record = recorded(wave(), noisy, units=("N", "m"))
+    spec = PhysicalSpec(kind="rigid-axis", parameters={"m": 2.0, "c": 6.0, "F": 0.0, "vs": 1.0})
+    simulator = make_simulator(spec, record)
+    assert [each.name for each in simulator.parameters] == ["m", "c", "F", "vs"]
+    assert simulator.built_in_effects == made()["rigid-axis"].simulator.built_in_effects
+    assert isinstance(case.simulator, OdeSimulator)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
+    found = simulation.simulate(simulation.nominal)
+    # Two states in 50 samples have a fifth of the noise; the smoothed guesses alone have more.
+    assert np.std(found - position) < 0.25e-3
+    jumps = np.abs(np.diff(found) - np.diff(position))
+    assert set(np.flatnonzero(jumps > 1e-4) % 50) <= {49}
+
+
+def make_sticking_axis(seed: int, samples: int = 1500) -> tuple[Dataset, float]:
+    """Return a record of an axis that sticks at times, with 2 % of noise, and the noise."""
+    rng = np.random.default_rng(seed)
+    time = 0.01 * np.arange(samples)
+    phases = np.outer(time, rng.uniform(1.3, 12.6, 12)) + rng.uniform(0, 6.3, 12)
+    u = 10.0 * np.sin(phases).sum(axis=1) * np.minimum(1.0, time)
+    x, v, h, position = 0.0, 0.0, 5e-4, []
+    for k, force in enumerate(np.interp(h * np.arange(20 * samples), time, u).tolist()):
+        if k % 20 == 0:
+            position.append(x)
+        v += h * (force - 6.0 * v - 4.0 * math.tanh(v / 0.01)) / 2.0
+        x += h * v
+    sigma = 0.02 * float(np.std(position))
+    return recorded(u, np.array(position) + sigma * rng.standard_normal(samples), units=("N", "m")), sigma
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_shots_of_an_axis_that_sticks_have_the_error_of_the_noise(seed: int) -> None:
+    """A full Gauss-Newton step increases the error where the axis sticks, and shorter steps decrease it."""
+    record, sigma = make_sticking_axis(seed)
+    truth = {"m": 2.0, "c": 6.0, "F": 4.0, "vs": 0.01}
+    simulator = make_simulator(PhysicalSpec(kind="rigid-axis", parameters=truth), record)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
+    assert np.std(record.y - simulation.simulate(simulation.nominal)) < 1.02 * sigma
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_hardly_changes_the_estimate_of_an_axis(seed: int) -> None:
+    record, _ = make_sticking_axis(seed)
+    simulator = make_simulator("rigid-axis", record)
+    found = {each.name: each.nominal for each in simulator.parameters}
+    assert found["m"] == pytest.approx(2.0, rel=0.2)
+    assert found["c"] == pytest.approx(6.0, rel=0.2)
+
+
+def test_recordings_begin_with_a_shooting_interval() -> None:
+    record = made()["rigid-axis"].record
+    both = islands.join((record[:330], record[330:]))
+    spec = made()["rigid-axis"].spec
+    simulator = make_simulator(spec, both)
+    joined = ExtendedSimulator(simulator, (), make_context(both, simulator, both.samples))
+    output = joined.simulate(joined.nominal)
+    part = make_simulator(spec, both).for_samples(330, 600)  # type: ignore[attr-defined]
+    alone = ExtendedSimulator(part, (), make_context(record[330:], part, 270))
+    assert np.array_equal(output[330:], alone.simulate(alone.nominal))
+
+
+def test_interval_is_no_longer_than_the_record() -> None:
+    """With samples of a nanosecond half a second has more of them than fit into memory."""
+    record = replace(made()["rigid-axis"].record, dt=1e-9)
+    simulator = make_simulator(made()["rigid-axis"].spec, record)
+    assert isinstance(simulator, OdeSimulator)
+    assert simulator.shots is not None
+    assert simulator.shots.interval == record.samples

@@ -1,0 +1,224 @@
+"""Built-in simulators: their outputs, the places of effects, and documents of earlier versions."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.preparation import make_context
+from islands.errors import ModelError
+from islands.expressions.tree import Symbol
+from islands.io.simulator_spec.document import describe_extension
+from islands.io.simulator_spec.factory import make_simulator, simulate_spec
+from islands.io.simulator_spec.specification import SIMULATORS, LocalExtendedSpec, PhysicalSpec
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.ode.preparation import make_ode_simulator
+from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.ode.system_parts import OdeEffect
+from islands.systems.bouc_wen import BoucWenPiezo
+from islands.systems.bouc_wen import simulate as simulate_piezo
+from support.built_in_simulators import make_oscillator, make_piezo, make_tanks
+from support.simulated_records import made, recorded, simulate_oscillator, wave
+
+Array = NDArray[np.float64]
+
+#: Constants and initial levels of the tanks.
+TANKS = {"k1": 0.5, "k2": 0.4, "k3": 0.3}
+LEVELS = (4.0, 5.0)
+
+
+def extend(simulator: OdeSimulator, u: Array, dt: float = 0.01, steps: int = 1) -> ExtendedSimulator:
+    record = Dataset(u, u, dt, ("u_V",), output_name="y_V", input_units=("V",), output_unit="V")
+    resampled = ResampledSimulator(simulator, InterSample.FOH, steps)
+    return ExtendedSimulator(resampled, (), make_context(record, simulator, record.samples))
+
+
+def simulate_tanks(u: Array, dt: float, rim: float = np.inf, caught: float = 0.0) -> Array:
+    """Return the lower level by the midpoint rule with small steps; the upper tank overflows at ``rim``."""
+    steps = 50
+    pumped = np.interp((np.arange(u.size * steps) + 0.5) / steps, np.arange(u.size), u)
+    k1, k2, k3 = TANKS.values()
+    upper, lower = LEVELS
+    levels = []
+    for k, inflow in enumerate((k3 * pumped).tolist()):
+        if k % steps == 0:
+            levels.append(lower)
+        h = dt / steps
+        q1, q2 = k1 * upper**0.5, k2 * lower**0.5
+        middle = upper + h / 2 * (inflow - q1), lower + h / 2 * (q1 - q2)
+        q1, q2 = k1 * middle[0] ** 0.5, k2 * middle[1] ** 0.5
+        upper, lower = upper + h * (inflow - q1), lower + h * (q1 - q2)
+        lower += caught * max(upper - rim, 0.0)
+        upper = min(upper, rim)
+    return np.array(levels)
+
+
+def test_an_oscillator_has_the_exact_motion_within_the_integration_error() -> None:
+    u = wave()
+    simulation = extend(make_oscillator(0.5, 4.0, 200.0), u, steps=8)
+    exact = simulate_oscillator(u, 0.5, 4.0, 200.0)
+    assert simulation.simulate(simulation.nominal) == pytest.approx(exact, abs=1e-6 * np.ptp(exact))
+
+
+def test_tanks_have_the_levels_of_a_fine_integration() -> None:
+    u = 3.0 + wave() / 25
+    simulation = extend(make_tanks(**TANKS, levels=LEVELS), u, 0.5)
+    expected = simulate_tanks(u, 0.5)
+    assert simulation.simulate(simulation.nominal) == pytest.approx(expected, abs=1e-4 * np.ptp(expected))
+
+
+def test_a_piezo_has_the_output_of_equation_11() -> None:
+    u = wave()
+    simulation = extend(make_piezo(), u)
+    expected = simulate_piezo(BoucWenPiezo(), u, 0.01)
+    assert simulation.simulate(simulation.nominal) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_part_of_the_overflow_enters_the_lower_tank() -> None:
+    u = 3.0 + wave() / 25
+    simulation = extend(make_tanks(**TANKS, levels=LEVELS), u, 0.5, steps=16)
+    for caught in (0.0, 0.6):
+        clip = {"state-clip:upper": 4.2, "state-clip:upper caught": caught}
+        expected = simulate_tanks(u, 0.5, 4.2, caught)
+        assert simulation.simulate(simulation.nominal, clip) == pytest.approx(expected, abs=0.02)
+        assert np.max(np.abs(expected - simulate_tanks(u, 0.5))) > 0.2
+
+
+def test_a_gain_of_the_piezo_does_not_change_its_hysteresis() -> None:
+    u = wave()
+    simulation = extend(make_piezo(), u)
+    change = simulation.simulate(simulation.nominal, {"ageing": 0.1}) - simulation.simulate(
+        simulation.nominal
+    )
+    assert change == pytest.approx(1.6 * u * 0.1 * np.arange(u.size) / u.size, abs=1e-9)
+
+
+def test_a_held_voltage_gives_the_same_hysteresis_as_a_ramp() -> None:
+    """Hysteresis does not depend on the rate, so that only the values at the samples matter."""
+    u, piezo = wave(), make_piezo()
+    simulation = extend(piezo, u)
+    held = ExtendedSimulator(ResampledSimulator(piezo, InterSample.ZOH, 4), (), simulation.context)
+    expected = simulation.simulate(simulation.nominal)
+    assert held.simulate(held.nominal) == pytest.approx(expected, abs=1e-4)
+
+
+def test_every_effect_on_a_piezo_matches_the_reference_solution() -> None:
+    dt = 0.01
+    t = dt * np.arange(600)
+    u = 20 * np.sin(3 * t) + 5 * np.cos(7.3 * t)
+    A, beta, gamma, leak, rate, asymmetry = 0.8, 0.04, -0.01, 0.5, 2e-3, 0.01
+    h, known = 0.0, []
+    for k in range(t.size):
+        known.append(h)
+        if k + 1 < t.size:
+            v = (u[k + 1] - u[k]) / dt
+            faster = 1.0 + rate * abs(v)
+
+            def slope(_s, h, v=v, faster=faster):
+                return (
+                    A * v
+                    - beta * faster * abs(v) * h
+                    - gamma * faster * v * np.abs(h)
+                    - leak * h
+                    - asymmetry * abs(v) * np.abs(h)
+                )
+
+            h = float(scipy.integrate.solve_ivp(slope, (0, dt), [h], rtol=1e-9, atol=1e-11).y[0, -1])
+    simulation = extend(make_piezo(A=A, beta=beta, gamma=gamma, dp=1.0), u)
+    effects = {"relaxation": leak, "rate-dependent-loop": rate, "loop-asymmetry": asymmetry}
+    found = u - simulation.simulate(simulation.nominal, effects)
+    # The equation has a kink within a step in which h changes sign.
+    assert found == pytest.approx(np.array(known), abs=5e-4)
+    assert np.max(np.abs(found)) > 5.0
+
+
+#: Effects of extended simulations of earlier versions.
+OLD_EFFECTS: dict[str, dict[str, dict[str, float]]] = {
+    "second-order": {"input-offset:force": {"input-offset:force": 3.0}},
+    "bouc-wen-piezo": {"relaxation": {"relaxation": 0.2}, "viscous": {"c": 0.01}},
+    "cascaded-tanks": {
+        "state-clip:lower": {"state-clip:lower": 5.2, "state-clip:lower caught": 0.0},
+        "input-offset:upper": {"input-offset:upper": 0.3},
+        "outflow-law:lower": {"outflow-law:lower": 0.1},
+    },
+}
+
+
+@pytest.mark.parametrize("name", OLD_EFFECTS)
+def test_an_extended_simulation_of_an_earlier_version_is_read(name: str) -> None:
+    case = made()[name]
+    assert isinstance(case.spec, PhysicalSpec)
+    frame = {"unit": "m", "peak": 1.0, "rate": 1.0, "force_unit": "N", "force": 1.0}
+    document: dict[str, Any] = {
+        "schema": "islands.extended/1",
+        "inputs": list(case.record.input_names),
+        "output": case.record.output_name,
+        "core": {"kind": name, "parameters": dict(case.spec.parameters)},
+        "effects": [
+            {"name": effect, "parameters": {key: {"value": value} for key, value in values.items()}}
+            for effect, values in OLD_EFFECTS[name].items()
+        ],
+        "scales": {
+            "dt": case.record.dt,
+            "input_peak": 40.0,
+            "output_peak": 40.0,
+            "fitted_s": 4.5,
+            "duration_s": 6.0,
+            "frame": {**frame, "sense": -1.0, "dissipates": False, "sharp": 0.02},
+        },
+    }
+    spec = LocalExtendedSpec.model_validate(json.loads(json.dumps(document)))
+    simulator = make_simulator(spec, case.record)
+    assert simulator.name == " + ".join([name, *OLD_EFFECTS[name]])
+    alone = simulate_spec(spec.core, case.record)
+    assert np.max(np.abs(simulate_spec(spec, case.record) - alone)) > 1e-3
+
+
+def test_only_unchanged_equations_are_described_by_their_name() -> None:
+    oscillator = make_oscillator(0.5, 4.0, 200.0)
+    values = np.array([each.nominal for each in oscillator.parameters])
+    spec = describe_extension(oscillator, values, ("u_N",), "y_m")
+    values_by_name = {"m": 0.5, "c": 4.0, "k": 200.0}
+    assert spec == PhysicalSpec(kind="second-order", parameters=values_by_name, steps=1)
+    changed = oscillator.system.with_term("v", "-3*x**2*v")
+    record = recorded(wave(), wave(), units=("N", "m"))
+    extended = make_ode_simulator(changed, record, {"x": 0.0, "v": 0.0})
+    spec = describe_extension(extended, values, ("u_N",), "y_m")
+    again = make_simulator(spec, made()["second-order"].record)
+    assert isinstance(again, OdeSimulator)
+    assert again.system.derivatives == changed.derivatives
+    assert [each.name for each in again.state_effects] == ["input-offset:force"]
+    assert again.built_in_effects == {"viscous"}
+
+
+def test_an_effect_that_does_not_exist_is_refused() -> None:
+    effect = OdeEffect("leakage", "v", Symbol("value"))
+    system = replace(make_oscillator(0.5, 4.0, 200.0).system, effects=(effect,))
+    with pytest.raises(ModelError, match="leakage: there is no such effect: take input-offset"):
+        make_ode_simulator(system, recorded(wave(), wave(), units=("N", "m")), {"x": 0.0, "v": 0.0})
+
+
+def test_parameters_that_can_be_given_are_those_of_the_equations() -> None:
+    for name in OLD_EFFECTS:
+        simulator = made()[name].simulator
+        names = {each.name for each in simulator.parameters if not each.initial}
+        assert names == SIMULATORS[name].parameters.keys()
+
+
+def test_extended_tanks_start_from_estimated_levels_on_other_records() -> None:
+    """From an empty upper tank, whose outflow has no derivative there, its level would not be found."""
+    u = 3.0 + wave() / 25
+    levels = simulate_tanks(u, 0.5)
+    record = Dataset(u, levels, 0.5, ("u_V",), output_name="y_V", input_units=("V",), output_unit="V")
+    tanks = make_simulator(PhysicalSpec(kind="cascaded-tanks", parameters=TANKS), record)
+    assert isinstance(tanks, OdeSimulator)
+    extended = make_ode_simulator(tanks.system.with_term("lower", "0*u"), record)
+    values = np.array([each.nominal for each in extended.parameters])
+    spec = describe_extension(extended, values, ("u_V",), "y_V")
+    assert simulate_spec(spec, record) == pytest.approx(levels, abs=1e-3)

@@ -1,0 +1,101 @@
+"""Maps of the input: static ones act on the values between samples as well."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.preparation import make_context
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.effect import Effect, Site
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.interface import Simulator
+from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.mapped_input import map_input
+from support.built_in_simulators import make_oscillator
+from support.simulated_records import DT, recorded, wave
+
+Array = NDArray[np.float64]
+
+STATIC = sorted(name for name, effect in CATALOGUE.items() if effect.acts_between_samples)
+
+OSCILLATOR = make_oscillator(0.5, 4.0, 200.0)
+
+#: Samples of a finer record for each sample.
+TIMES = 32
+
+
+def record_of(u: Array, dt: float = DT) -> Dataset:
+    return recorded(u, u, dt)
+
+
+def simulate(simulator: Simulator, record: Dataset, effects: tuple[Effect, ...]) -> Array:
+    context = make_context(record, simulator, record.samples)
+    simulation = ExtendedSimulator(simulator, effects, context)
+    return simulation.simulate(set_values(simulation))
+
+
+def set_values(simulation: ExtendedSimulator) -> Array:
+    """Return values with every effect at a strong starting point."""
+    values = simulation.nominal
+    for effect in simulation.effects:
+        points = effect.starting_points(simulation.context, np.zeros_like(simulation.context.u))
+        values[simulation.get_slice(effect)] = points[len(points) // 2]
+    return values
+
+
+@pytest.mark.parametrize("name", STATIC)
+def test_a_static_map_acts_on_each_value_alone(name: str) -> None:
+    """It is the same for values in any order."""
+    effect, record = CATALOGUE[name], record_of(wave())
+    assert effect.site == Site.INPUT
+    context = make_context(record, OSCILLATOR, record.samples)
+    values = np.array(effect.starting_points(context, context.u)[1])
+    order = np.random.default_rng(4).permutation(record.samples)
+    _, mapped = map_input([(effect, values)], context, is_continuous_time=True)
+    assert mapped is not None
+    assert np.array_equal(mapped(context.u[order]), mapped(context.u)[order])
+
+
+@pytest.mark.parametrize("name", STATIC)
+def test_a_static_map_of_a_linear_input_is_that_of_a_denser_record(name: str) -> None:
+    u = wave(400)
+    times = np.arange(TIMES * (u.size - 1) + 1) / TIMES
+    dense = record_of(np.interp(times, np.arange(u.size), u), DT / TIMES)
+    effects = (CATALOGUE[name],)
+    exact = simulate(OSCILLATOR, dense, effects)[::TIMES]
+    found = simulate(ResampledSimulator(OSCILLATOR, oversampling=8), record_of(u), effects)
+    context = make_context(record_of(u), OSCILLATOR, u.size)
+    simulation = ExtendedSimulator(OSCILLATOR, effects, context)
+    values = set_values(simulation)[simulation.get_slice(effects[0])]
+    sampled, _ = map_input([(effects[0], values)], context, is_continuous_time=False)
+    of_samples = simulate(ResampledSimulator(OSCILLATOR, oversampling=8), record_of(sampled), ())
+    error, coarse = (float(np.sqrt(np.mean((each - exact) ** 2))) for each in (found, of_samples))
+    assert error < 0.1 * coarse
+
+
+@pytest.mark.parametrize("name", STATIC)
+def test_a_static_map_of_a_held_input_is_that_of_its_samples(name: str) -> None:
+    record = record_of(wave())
+    held = ResampledSimulator(OSCILLATOR, InterSample.ZOH, 4)
+    simulation = ExtendedSimulator(held, (CATALOGUE[name],), make_context(record, held, record.samples))
+    values = set_values(simulation)[simulation.get_slice(CATALOGUE[name])]
+    sampled, _ = map_input([(CATALOGUE[name], values)], simulation.context, is_continuous_time=False)
+    expected = simulate(held, record_of(sampled), ())
+    assert simulation.simulate(set_values(simulation)) == pytest.approx(
+        expected, abs=1e-12 * np.ptp(expected)
+    )
+
+
+def test_a_static_map_before_another_map_acts_on_the_samples() -> None:
+    """A rate limit needs samples, and the order of the maps is kept."""
+    record = record_of(wave())
+    context = make_context(record, OSCILLATOR, record.samples)
+    zone, limit = CATALOGUE["dead-zone"], CATALOGUE["rate-limit"]
+    maps = [(each, np.array(each.starting_points(context, context.u)[0])) for each in (zone, limit)]
+    x, characteristic = map_input(maps, context, is_continuous_time=True)
+    assert characteristic is None
+    assert np.array_equal(x, map_input(maps, context, is_continuous_time=False).x)
+    x, characteristic = map_input(maps[::-1], context, is_continuous_time=True)
+    assert characteristic is not None
+    assert np.array_equal(x, map_input(maps[1:], context, is_continuous_time=True).x)

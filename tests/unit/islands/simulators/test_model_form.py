@@ -1,0 +1,120 @@
+"""Missing terms of an identified model: names, response, and the model that contains them."""
+
+import json
+
+import numpy as np
+import pytest
+
+from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
+from islands.diagnosis.calibration.preparation import make_context
+from islands.diagnosis.calibration.target import Target
+from islands.effects.model_form import CORE_SHAPE
+from islands.expressions.parsing import parse
+from islands.io.models import model_from_json
+from islands.io.simulator_spec.document import extended_document
+from islands.io.simulator_spec.factory import simulate_spec
+from islands.models.narx import Model, make_model
+from islands.performance.trials.cases import CASES
+from islands.performance.trials.injection.measurement import FaultyRecord, inject
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.model_form import SLOPE
+from islands.simulators.narx import NarxSimulator
+
+
+@pytest.fixture(scope="module")
+def faulty() -> FaultyRecord:
+    return inject([], np.random.default_rng(804), 20.0)
+
+
+@pytest.fixture(scope="module")
+def extended(faulty: FaultyRecord) -> ExtendedSimulator:
+    """Return an identified model with its missing terms as an effect."""
+    simulator = CASES["narx"].make(faulty)
+    context = make_context(faulty.record, simulator, 1500)
+    return ExtendedSimulator(simulator, simulator.state_effects, context)
+
+
+def get_starting_values(extended: ExtendedSimulator, faulty: FaultyRecord) -> np.ndarray:
+    """Return the first starting point of the calibration of the terms."""
+    (effect,) = extended.effects
+    values = extended.nominal
+    at_rest = extended.with_effects(()).simulate(values[: extended.get_slice(effect).start])
+    values[extended.get_slice(effect)] = effect.starting_points(extended.context, faulty.record.y - at_rest)[
+        0
+    ]
+    return values
+
+
+def model(**terms: str) -> Model:
+    split = (term.split(" * ", 1) for term in terms.values())
+    return make_model([(parse(text), float(parameter)) for parameter, text in split])
+
+
+def test_missing_terms_with_zero_coefficients_have_no_response(extended: ExtendedSimulator) -> None:
+    alone = extended.with_effects(())
+    with_slope = extended.simulate(extended.nominal)
+    assert with_slope == pytest.approx(alone.simulate(alone.nominal), abs=1e-9)
+
+
+def test_missing_terms_have_unique_names_and_are_not_in_the_model(extended: ExtendedSimulator) -> None:
+    assert isinstance(extended.simulator, NarxSimulator)
+    names = [parameter.name for parameter in extended.parameters]
+    assert len(set(names)) == len(names)
+    own = {item.text for item in extended.simulator.model.regressors}
+    assert not own & {name.removeprefix(f"{CORE_SHAPE} ").replace("u(", "u1(") for name in names}
+    assert names[-1] == SLOPE
+
+
+def test_calibrated_missing_terms_reduce_the_error_to_the_noise(
+    extended: ExtendedSimulator, faulty: FaultyRecord
+) -> None:
+    alone = extended.with_effects(())
+    target = Target(faulty.record.y, np.arange(2000) < 1500, None, {}, fitted=1500)
+    before = calibrate(alone, target, alone.nominal)
+    after = calibrate(extended, target, get_starting_values(extended, faulty))
+    assert before.mean_square > 1.2 * faulty.sigma**2
+    assert after.mean_square < 1.05 * faulty.sigma**2
+
+
+def test_starting_points_do_not_depend_on_hold_out_samples(extended: ExtendedSimulator) -> None:
+    (effect,) = extended.effects
+    residual = np.random.default_rng(1).standard_normal(2000)
+    changed = np.where(np.arange(2000) < 1500, residual, 9.0)
+    assert effect.starting_points(extended.context, residual) == effect.starting_points(
+        extended.context, changed
+    )
+
+
+def test_missing_terms_keep_the_output_constant_at_a_constant_input(
+    extended: ExtendedSimulator, faulty: FaultyRecord
+) -> None:
+    values = get_starting_values(extended, faulty)
+    resting = np.where(np.arange(2000) < 1000, extended.context.u, extended.context.u[999])
+    own = {each.name: value for each, value in zip(extended.parameters[8:], values[8:], strict=True)}
+    y = extended.simulator.simulate(values[:8], resting, extended.context, own, ())
+    assert np.ptp(y[1010:]) == 0.0
+
+
+def test_an_extended_model_contains_the_missing_terms(
+    extended: ExtendedSimulator, faulty: FaultyRecord
+) -> None:
+    record, values = faulty.record, get_starting_values(extended, faulty)
+    target = Target(record.y, np.arange(record.samples) < 1500, None, {}, fitted=1500)
+    fit = evaluate_fit(extended, target, values)
+    document = extended_document(fit, record)
+    assert document["effects"] == []
+    written = model_from_json(json.dumps(document["core"]["model"]), "extended")
+    assert isinstance(extended.simulator, NarxSimulator)
+    assert written.size == extended.simulator.model.size + len(extended.parameters) - 8 - 1
+    # The maximum lag is one larger: the free run starts one sample later, from the measured output.
+    again = simulate_spec(document, record)
+    assert np.std((again - fit.output)[200:]) < 0.3 * faulty.sigma
+
+
+def test_small_models_have_missing_terms_only_if_they_read_the_input() -> None:
+    start = np.zeros(3)
+    of_levels = NarxSimulator(model(a="0.5 * y(k-1)", b="0.4 * u(k-1)"), "levels", start)
+    (effect,) = of_levels.state_effects
+    assert effect.family == "shape"
+    output_alone = NarxSimulator(model(a="0.5 * y(k-1)", b="0.1 * y(k-2)"), "output alone", start)
+    assert output_alone.state_effects == ()
