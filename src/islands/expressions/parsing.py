@@ -117,6 +117,34 @@ def parse(text: str, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Expres
         raise ModelError(f"cannot read {text[:80]!r}: write it like u(k-1)*sign(u(k-1) - u(k-2))") from error
 
 
+def parse_signals(text: str, signals: Sequence[str]) -> Expression:
+    """Parse an expression of lagged signals and parameters by their names: ``pole*x1(k-1) + gain*u(k-1)``.
+
+    Parameters
+    ----------
+    text : str
+        As of `parse`; every name without a lag is a parameter.
+    signals : sequence of str
+        Names of the signals in the order of the channels.
+
+    Raises
+    ------
+    ModelError
+        The text is not an expression.
+    """
+
+    def call(parser: _Parser, name: str, arguments: Sequence[ast.expr], depth: int) -> Expression:
+        if name in signals and len(arguments) == 1:
+            return Lagged(signals.index(name), _lag(arguments[0]))
+        return _call_in_model(parser, name, arguments, depth)
+
+    try:
+        tree = ast.parse(text.strip().replace("^", "**"), mode="eval")
+        return _Parser(replace(MODEL_SYNTAX, call=call, has_names=True)).read(tree.body, -1)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ModelError(f"cannot read {text[:80]!r}: write it like pole*x1(k-1) + gain*u(k-1)") from error
+
+
 def parse_expression(text: str, place: str = "") -> Expression:
     """Parse an expression of names, as in an equation.
 

@@ -343,6 +343,41 @@ class _MathmlPrinter(_ModelPrinter):
         return f"<mrow><mi>{safe}</mi>{_APPLY}{self.brackets.format('<mo>,</mo>'.join(arguments))}</mrow>"
 
 
+class SignalNames:
+    """Names of the signals of a block, and the numbers of its parameters, for printers of equations.
+
+    Parameters
+    ----------
+    signals : sequence of str
+        Names by channel: ``y``, ``x1``, ``u2``.
+    symbols : mapping
+        Texts of parameters by name; other names are written as they are.
+    """
+
+    def __init__(self, signals: Sequence[str], symbols: Mapping[str, str]) -> None:
+        self._signals, self._symbols = signals, symbols
+
+    def name(self, channel: int) -> str:
+        """Return the name of a signal."""
+        return self._signals[channel]
+
+    def symbol(self, name: str) -> str:
+        """Write a parameter."""
+        return self._symbols.get(name, name)
+
+
+class PlainSignals(SignalNames, _PlainPrinter):
+    """Printer of a block as plain text."""
+
+
+class LatexSignals(SignalNames, _LatexPrinter):
+    """Printer of a block as LaTeX."""
+
+
+class MathmlSignals(SignalNames, _MathmlPrinter):
+    """Printer of a block as presentation MathML."""
+
+
 _EQUATION = Printer()
 
 

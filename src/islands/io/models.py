@@ -1,13 +1,12 @@
 """Files of models: JSON with a tag of the class, and the table of classes. Equal models give equal files."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from islands.data.dataset import Dataset
 from islands.errors import ModelError, lookup
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
@@ -23,33 +22,11 @@ from islands.io.result_models import read_preprocessing
 from islands.models.coupled_narx import CoupledModel
 from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, require_narx
+from islands.models.parametric import ParametricModel
 
-
-@dataclass(frozen=True, slots=True)
-class ModelClass:
-    """Class of models that `fit` estimates by the error of the free run.
-
-    Attributes
-    ----------
-    kind : str
-        Tag of its documents.
-    summary : str
-        Description in one sentence.
-    read : callable
-        ``read(document, name)`` returns the model of JSON values; it raises `ModelError` for others, with the
-        name of the file.
-    start : callable
-        ``start(record)`` returns models with parameters from which the estimation starts, of increasing size.
-    """
-
-    kind: str
-    summary: str
-    read: Callable[[Mapping[str, Any], str], DynamicModel]
-    start: Callable[[Dataset], Iterable[DynamicModel]]
-
-
-#: Classes of models by tag, in addition to NARX models, which are selected from a library or evolved.
-MODEL_CLASSES: Mapping[str, ModelClass] = MappingProxyType({})
+#: Classes of models by tag that `fit` estimates by the error of the free run; NARX models are selected from a
+#: library or evolved.
+MODEL_CLASSES: Mapping[str, type[ParametricModel]] = MappingProxyType({})
 
 
 def model_json(model: DynamicModel | CoupledModel) -> str:

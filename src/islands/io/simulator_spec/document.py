@@ -31,6 +31,7 @@ from islands.simulators.linear import LinearSimulator
 from islands.simulators.narx import NarxSimulator
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.output_equation import OutputEquation
+from islands.simulators.parametric import ParametricSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.saved_extension import SavedExtension
@@ -116,6 +117,9 @@ def describe_extension(
         case NarxSimulator():
             model = simulator.with_shape(values, shape) if shape else simulator.with_values(values)
             return ModelSpec(kind="model", model=json.loads(model_json(model)), name=simulator.name)
+        case ParametricSimulator():
+            document = json.loads(model_json(simulator.with_values(values)))
+            return ModelSpec(kind="model", model=document, name=simulator.name)
         case FmuSimulator():
             return FmuSpec.from_system(simulator.model, simulator.system.with_values(named))
         case OdeSimulator(system=system):

@@ -5,7 +5,7 @@ import runpy
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pkgutil import resolve_name
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from islands.diagnosis.calibration.preparation import estimation_part, make_cont
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
 from islands.errors import ModelError, RecordError, SettingsError, lookup, suggest
-from islands.io.models import narx_from_json
+from islands.io.models import model_from_json
 from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
 from islands.io.simulator_spec.document import read_scales
 from islands.io.simulator_spec.ode_spec import OdeSpec, read_built_in
@@ -37,7 +37,9 @@ from islands.io.simulator_spec.specification import (
     SimulationSpec,
     parse_spec,
 )
+from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, measured_model
+from islands.models.parametric import ParametricModel
 from islands.models.signal_statement import describe_values
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.fmu.simulator import make_fmu_simulator
@@ -48,12 +50,15 @@ from islands.simulators.narx import NarxSimulator
 from islands.simulators.ode.output_system import SIMULATED
 from islands.simulators.ode.preparation import make_ode_simulator
 from islands.simulators.output_equation import OutputEquation
+from islands.simulators.parametric import ParametricSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.saved_extension import SavedExtension
 
 #: Smallest number of samples from which parameters and the initial state are estimated.
 MIN_SAMPLES = 20
+
+M = TypeVar("M", bound=DynamicModel)
 
 
 def make_simulator(
@@ -227,10 +232,10 @@ def make_fmu(spec: FmuSpec, record: Dataset, _columns: Mapping[str, Any]) -> Sim
 
 def make_identified_model(spec: ModelSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
     """Make a simulator of the identified model in a specification."""
-    return make_model_simulator(narx_from_json(json.dumps(spec.model), spec.name), spec.name, record)
+    return make_model_simulator(model_from_json(json.dumps(spec.model), spec.name), spec.name, record)
 
 
-def make_model_simulator(model: Model, name: str, record: Dataset) -> Simulator:
+def make_model_simulator(model: DynamicModel, name: str, record: Dataset) -> Simulator:
     """Make a simulator of a model; its free run starts from the first measured outputs.
 
     Parameters
@@ -246,17 +251,24 @@ def make_model_simulator(model: Model, name: str, record: Dataset) -> Simulator:
         The first input of the record is not that of the model, the sampling times differ, or the model
         describes filtered samples or means that the record does not have.
     """
-    if model.theta is None:
+    if isinstance(model, Model) and model.theta is None:
         raise ModelError(f"{name} has no parameters: estimate them first")
     model = _read_as_recorded(model, name, record)
-    simulator = NarxSimulator(model, name, fill_gaps(record.y))
+    simulator: Simulator
+    match model:
+        case Model():
+            simulator = NarxSimulator(measured_model(model), name, fill_gaps(record.y))
+        case ParametricModel():
+            simulator = ParametricSimulator(model, name, fill_gaps(record.y))
+        case _:
+            raise ModelError(f"{name} is of the class {model.kind}, which cannot be diagnosed")
     # Further columns of the record are channels, which the model does not read.
     match_record(model, record.first_inputs(1), name, advance=False)
     return simulator
 
 
-def _read_as_recorded(model: Model, name: str, record: Dataset) -> Model:
-    """Return a model that reads the signals of a record, with the offsets by which they differ.
+def _read_as_recorded(model: M, name: str, record: Dataset) -> M:
+    """Return a model of the signals of a record, whose preprocessing has the offsets by which they differ.
 
     A diagnosis fits effects of the measured input between its samples, so it does not filter, decimate or
     average a record for its simulation.
@@ -277,7 +289,7 @@ def _read_as_recorded(model: Model, name: str, record: Dataset) -> Model:
             f"{_list_steps(expected.rate_steps)})"
         )
     left = expected if done is None else expected.relative_to(done)
-    return measured_model(replace(model, preprocessing=left))
+    return replace(model, preprocessing=left)
 
 
 def _list_steps(steps: PreprocessingSteps) -> str:

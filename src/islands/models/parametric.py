@@ -1,0 +1,265 @@
+"""Base of model classes whose parameters are estimated by the error of the free run.
+
+A subclass states its difference equations as text; simulation, estimation, files, exports, diagnosis and the
+service work with them. Add it to ``islands.io.models.MODEL_CLASSES``.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any, ClassVar, Self
+
+from islands.data.channel_names import parse_channel_name
+from islands.data.dataset import Dataset
+from islands.data.preprocessing_steps import Preprocessing
+from islands.errors import ModelError
+from islands.expressions.parsing import parse_signals
+from islands.expressions.printing import (
+    LatexSignals,
+    MathmlSignals,
+    PlainSignals,
+    latex_number,
+    mathml_number,
+)
+from islands.expressions.tree import Expression, Lagged, replace_leaves
+from islands.models.block import Block, BlockTerm
+from islands.models.dynamic_model import EquationText
+from islands.models.equations import latex_statement, mathml_statement, signal_names
+from islands.models.signal_statement import describe_signals, describe_values, symbols
+
+#: Significant digits of the parameters in the text of an equation.
+_DIGITS = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParametricModel(ABC):
+    """Model with named parameters and difference equations of its output and of its states.
+
+    Attributes
+    ----------
+    parameters : tuple of float
+        In the order of ``names``.
+    input_names, output_name, dt, average, preprocessing
+        As of `DynamicModel`.
+    standard_errors : tuple of float or None
+        Standard errors of the parameters. None if unknown.
+
+    Raises
+    ------
+    ModelError
+        The number of parameters or of standard errors is not that of ``names``.
+    """
+
+    #: Tag of the class in documents.
+    kind: ClassVar[str]
+
+    #: Names of the parameters.
+    names: ClassVar[tuple[str, ...]]
+
+    #: Description of the class in one sentence.
+    summary: ClassVar[str]
+
+    #: Names of the states, ``x1``, ``x2``; ``starts`` are their values before the first prediction.
+    states: ClassVar[tuple[str, ...]] = ()
+    starts: ClassVar[tuple[str, ...]] = ()
+
+    #: Number of past samples before the first prediction.
+    maximum_lag: ClassVar[int] = 1
+
+    parameters: tuple[float, ...]
+    input_names: tuple[str, ...]
+    output_name: str
+    dt: float | None = None
+    average: int = 1
+    preprocessing: Preprocessing | None = None
+    standard_errors: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        for values in (self.parameters, self.standard_errors):
+            if values is not None and len(values) != len(self.names):
+                raise ModelError(f"a model {self.kind} has the parameters {', '.join(self.names)}")
+
+    @abstractmethod
+    def right_sides(self) -> Mapping[str, str]:
+        """Return the right side of the equation of the output ``y`` and of each state.
+
+        It reads past samples of signals, ``u(k-1)`` or ``u2(k-1)``, and parameters by name. That of the
+        output may also read sample k of the states.
+        """
+
+    @classmethod
+    @abstractmethod
+    def start(cls, record: Dataset) -> Iterable[Self]:
+        """Yield models with parameters from which the estimation on a record starts."""
+
+    @classmethod
+    def of_record(cls, record: Dataset, parameters: Sequence[float]) -> Self:
+        """Return a model with the columns and the sampling time of a record."""
+        return cls(
+            parameters=tuple(map(float, parameters)),
+            input_names=record.input_names,
+            output_name=record.output_name,
+            dt=record.dt,
+            preprocessing=record.preprocessing,
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return len(self.names)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return self.names
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs."""
+        return len(self.input_names)
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """Names of the inputs without the suffix ``+1``."""
+        return tuple(parse_channel_name(name).base for name in self.input_names)
+
+    @property
+    def leads(self) -> tuple[int, ...]:
+        """Number of samples that each signal of the block is read early."""
+        early = (int(parse_channel_name(name).at_once) for name in self.input_names)
+        return (0,) * (1 + len(self.states)) + tuple(early)
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the output, of the states and of the inputs in the equations."""
+        output, *inputs = symbols(self.inputs)
+        return (output, *self.states, *inputs)
+
+    def with_parameters(
+        self, values: Sequence[float], standard_errors: Sequence[float] | None = None
+    ) -> Self:
+        """Return a copy of the model with the given parameters and standard errors."""
+        errors = None if standard_errors is None else tuple(map(float, standard_errors))
+        return replace(self, parameters=tuple(map(float, values)), standard_errors=errors)
+
+    def block(self) -> Block:
+        """Return the difference equations of the model."""
+        sides = self.right_sides()
+        texts = [self._parse(sides[name]) for name in ("y", *self.states)]
+        return Block(
+            equations=tuple((BlockTerm(each),) for each in texts),
+            columns=(self.output_name, *self.states, *self.column_names),
+            signals=self.signals,
+            starts=tuple(map(self._parse, self.starts)),
+            leads=self.leads,
+            parameters=dict(zip(self.names, self.parameters, strict=True)),
+            maximum_lag=self.maximum_lag,
+            dt=None if self.dt is None else float(self.dt),
+            values=describe_values(self),
+            texts=tuple(self.equation().line.splitlines()),
+        )
+
+    def _parse(self, text: str) -> Expression:
+        return parse_signals(text, self.signals)
+
+    def equation(self) -> EquationText:
+        """Return the equations as text, with the values of the parameters."""
+        output, *inputs = signal_names(self)
+        named = (output, *self.states, *inputs)
+        numbers = {
+            name: f"{value:.{_DIGITS}g}" for name, value in zip(self.names, self.parameters, strict=True)
+        }
+        bracketed = {name: f"({number})" if number[0] == "-" else number for name, number in numbers.items()}
+        lines: list[str] = []
+        of_record: list[str] = []
+        rows, elements = [], []
+        mathml = MathmlSignals(self.signals, {name: mathml_number(each) for name, each in numbers.items()})
+        latex = LatexSignals(self.signals, {name: latex_number(each) for name, each in bracketed.items()})
+        for place, right in self._list_equations():
+            left = Lagged(place, 0)
+            sides = [printer.write(each) for printer in (latex, mathml) for each in (left, right)]
+            rows.append(f"{sides[0]} = {sides[1]}")
+            elements.append(f'<math display="block"><mrow>{sides[2]}<mo>=</mo>{sides[3]}</mrow></math>')
+            for found, signals in ((lines, self.signals), (of_record, named)):
+                plain = PlainSignals(signals, bracketed)
+                found.append(f"{plain.write(left)} = {plain.write(right)}")
+        statement = describe_signals(self)
+        elements += [f'<math display="block">{row}</math>' for row in mathml_statement(statement)]
+        rows += [latex_statement(statement)] if statement else []
+        line = "\n".join(lines)
+        return EquationText(
+            line=line,
+            plain=f"{line}\nwhere {statement}" if statement else line,
+            named="\n".join(of_record),
+            terms=self.names,
+            latex=rows[0] if len(rows) == 1 else _gather(rows),
+            mathml="\n".join(elements),
+        )
+
+    def _list_equations(self) -> list[tuple[int, Expression]]:
+        """Return the channel and the right side of each equation, in the columns of the record."""
+        sides, leads = self.right_sides(), self.leads
+
+        def delay(leaf: Lagged) -> Expression:
+            return Lagged(leaf.channel, leaf.lag - leads[leaf.channel])
+
+        names = ("y", *self.states)
+        return [(place, replace_leaves(self._parse(sides[name]), delay)) for place, name in enumerate(names)]
+
+    def document(self) -> dict[str, Any]:
+        """Return the model as JSON values."""
+        errors = self.standard_errors or (None,) * self.size
+        return {
+            "inputs": list(self.input_names),
+            "output": self.output_name,
+            "dt": self.dt,
+            "average": self.average,
+            "preprocessing": None if self.preprocessing is None else self.preprocessing.as_document(),
+            "equation": self.equation().line,
+            "parameters": [
+                {"name": name, "value": value, "standard_error": error}
+                for name, value, error in zip(self.names, self.parameters, errors, strict=True)
+            ],
+        }
+
+    @classmethod
+    def read(cls, document: Mapping[str, Any], name: str) -> Self:
+        """Return the model of JSON values.
+
+        Parameters
+        ----------
+        document : mapping
+            As of `document`.
+        name : str
+            Name of the file, for messages.
+
+        Raises
+        ------
+        ModelError
+            A field is missing or invalid.
+        """
+        try:
+            entries = {entry["name"]: entry for entry in document["parameters"]}
+            values = tuple(float(entries[each]["value"]) for each in cls.names)
+            errors = [entries[each].get("standard_error") for each in cls.names]
+            steps = document.get("preprocessing")
+            found = cls(
+                parameters=values,
+                input_names=tuple(map(str, document["inputs"])),
+                output_name=str(document["output"]),
+                dt=None if document.get("dt") is None else float(document["dt"]),
+                average=int(document.get("average", 1)),
+                preprocessing=None if steps is None else Preprocessing.from_document(steps),
+                standard_errors=None if None in errors else tuple(map(float, errors)),
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise ModelError(f"{name} is not a model {cls.kind}: {error!r} is missing or invalid") from error
+        if not found.input_names or not all(map(isfinite, found.parameters)):
+            raise ModelError(f"{name} is not a model {cls.kind}: it needs an input and finite parameters")
+        return found
+
+
+def _gather(rows: Sequence[str]) -> str:
+    lines = " \\\\ ".join(rows)
+    return f"\\begin{{gathered}} {lines} \\end{{gathered}}"
