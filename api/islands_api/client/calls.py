@@ -13,6 +13,7 @@ import httpx
 
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
+from islands.io.models import NARX
 from islands_api.client.recording_parts import make_part
 from islands_api.client.response_parsing import read_as, read_mapping
 from islands_api.dataset_schemas import DatasetPage, DatasetSummary, DatasetView
@@ -66,6 +67,7 @@ def submit(
     output: str,
     *,
     preset: str = AUTO,
+    model: str = NARX,
     seed: int = 0,
     dt: float | None = None,
     rows: str | None = None,
@@ -86,6 +88,8 @@ def submit(
         Input columns.
     output : str
         Output column.
+    model : str
+        Class of the models; others than ``narx`` are fitted without a search, and have no settings.
     dt : float, optional
         Sampling time in seconds, if the record has no time column.
     rows : str, optional
@@ -107,6 +111,7 @@ def submit(
         "inputs": as_list(inputs),
         "output": output,
         "preset": preset,
+        "model": None if model == NARX else model,
         "seed": seed,
         "dt": dt,
         "rows": rows,

@@ -16,10 +16,11 @@ from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
+from islands.facade.fit import fit
 from islands.facade.identify import identify
 from islands.facade.results.result import Result
 from islands.io.checkpoints import history_document
-from islands.io.models import model_json
+from islands.io.models import NARX, model_json
 from islands.io.result_folder import result_document
 from islands.io.result_text.model_description import describe
 from islands.progress import StoppedError
@@ -111,6 +112,16 @@ def _identify(
     reporter: "ProgressReporter",
     stop: SearchStop,
 ) -> SearchResult:
+    if spec.model != NARX:
+        fitted = fit(
+            record,
+            validation=validation,
+            model=spec.model,
+            seed=spec.seed,
+            progress=reporter.report_stage,
+            stop=stop,
+        )
+        return fitted.with_wall_time(reporter.spent).search_result
     preset: str | Choice = spec.preset
     if preset == AUTO and start.state is not None:
         # A job of an earlier version without preset stored no choice, and had this default.

@@ -21,6 +21,7 @@ from islands.errors import SettingsError
 from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings, get_text_type
 from islands.io.document_problems import find_problem
+from islands.io.models import MODEL_CLASSES, NARX
 from islands.io.simulator_spec.specification import ColumnSpec, SimulationSpec, innermost
 
 S = TypeVar("S", bound=BaseModel)
@@ -119,6 +120,11 @@ class Identification(BaseModel):
         description="The fraction at the end of every recording that selects the models, or a data set.",
     )
     preset: str = Field(default=AUTO, json_schema_extra={"enum": list(PRESET_NAMES)})
+    model: str = Field(
+        default=NARX,
+        description="Class of the models; others than narx are fitted without a search and have no settings.",
+        json_schema_extra={"enum": [NARX, *MODEL_CLASSES]},
+    )
     seed: Seed = 0
     settings: SettingsChanges = Field(default_factory=SettingsChanges)  # type: ignore[valid-type]
 

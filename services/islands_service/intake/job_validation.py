@@ -9,8 +9,8 @@ from math import prod
 from typing import Any
 
 from islands.data.compatibility import check_dt
-from islands.errors import RecordError, SettingsError, suggest
-from islands.io.models import model_from_json
+from islands.errors import RecordError, SettingsError, lookup, suggest
+from islands.io.models import MODEL_CLASSES, NARX, model_from_json
 from islands.io.records.column_names import find_column
 from islands.io.records.row_range import overlap, parse_rows
 from islands.io.records.validation import check_choice
@@ -80,9 +80,15 @@ def validate_job(
 
 
 def _check_spec(spec: Identification | Discrepancy, settings: ServiceSettings) -> int:
-    """Check a job without its data; return the number of its islands, 1 for a diagnosis."""
+    """Check a job without its data; return the number of its islands, 1 without a search."""
     if isinstance(spec, Discrepancy):
         check_discrepancy(spec)
+        return 1
+    if spec.model != NARX:
+        lookup(MODEL_CLASSES, spec.model, "class of models")
+        if spec.changes:
+            listed = ", ".join(spec.changes)
+            raise SettingsError(f"{listed}: settings are those of a search for models {NARX}, leave them out")
         return 1
     resolved = resolve_job_settings(spec, settings.max_islands, settings.max_evaluations)
     limit = settings.max_job_memory or int(DEFAULT_SHARE * machine_memory())

@@ -9,14 +9,18 @@ from numpy.typing import ArrayLike
 from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
+from islands.errors import SettingsError
 from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
+from islands.facade.class_fit import fit_class
 from islands.facade.library_fit import FitSettings
 from islands.facade.results.result import Result
 from islands.io.data_frames import read_data
+from islands.io.models import NARX
 from islands.io.result_folder import record_document
 from islands.progress import (
     ProgressCallback,
+    Steps,
     Stop,
     ignore_progress,
     never_stop,
@@ -36,6 +40,7 @@ def fit(
     inputs: str | Sequence[str] = (),
     output: str | None = None,
     validation: "RecordLike | float" = 0.25,
+    model: str = NARX,
     library: str = AUTO,
     degree: int | None = None,
     lags: int | None = None,
@@ -53,6 +58,9 @@ def fit(
 ) -> Result:
     """Fit models of increasing size to a record by subset selection and rank them on validation data.
 
+    With another ``model`` than ``narx``, fit the model of a class with named parameters by the error of its
+    free run; all settings from ``library`` to ``certificate`` are those of NARX models.
+
     Parameters
     ----------
     record : Dataset, data frame or array
@@ -67,6 +75,8 @@ def fit(
         Names of the columns of a frame.
     validation : Dataset, data frame or float
         Data that rank the models: a separate record, or the fraction at the end of ``record``.
+    model : str
+        Class of the models: ``narx``, or an entry of ``MODEL_CLASSES``.
     library : str
         An entry of ``LIBRARIES``, such as ``phi-polynomial`` for hysteresis or ``polynomial`` for smooth
         systems. ``auto`` fits several libraries and takes the best one, as the preset ``auto`` does.
@@ -126,11 +136,17 @@ def fit(
         certificate=certificate,
     )
     split = split_data(record, validation)
+    held_out = record_document(validation) if isinstance(validation, Dataset) else validation
+    if model != NARX:
+        given = library, degree, lags, delays, constraints, settings
+        if given != (AUTO, None, None, None, None, FitSettings()):
+            raise SettingsError(f"library, constraints, max_terms and the like are not for the model {model}")
+        found = fit_class(record, split, model, seed, Steps(progress, stop))
+        return Result.from_search(replace(found, settings={**found.settings, "validation": held_out}))
     try:
         found = fit_chosen_library(
             record, split, library, degree, lags, constraints, delays, settings, seed, progress, stop
         )
     except StoppedChoiceError as stopped:
         found = stopped.found
-    held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     return Result.from_search(replace(found, settings={**found.settings, "validation": held_out}))

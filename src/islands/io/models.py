@@ -24,9 +24,14 @@ from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, require_narx
 from islands.models.parametric import ParametricModel
 
+#: Tag of NARX models.
+NARX = Model.kind
+
+_CLASSES: dict[str, type[ParametricModel]] = {}
+
 #: Classes of models by tag that `fit` estimates by the error of the free run; NARX models are selected from a
 #: library or evolved.
-MODEL_CLASSES: Mapping[str, type[ParametricModel]] = MappingProxyType({})
+MODEL_CLASSES: Mapping[str, type[ParametricModel]] = MappingProxyType(_CLASSES)
 
 
 def model_json(model: DynamicModel | CoupledModel) -> str:

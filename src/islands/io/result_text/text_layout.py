@@ -4,6 +4,7 @@ from textwrap import fill
 
 from islands.models.dynamic_model import DynamicModel
 from islands.models.equations import signal_names
+from islands.models.narx import Model
 
 #: Largest number of characters of a line.
 WIDTH = 80
@@ -31,11 +32,25 @@ def term_table(model: DynamicModel) -> list[str]:
     """
     errors = model.standard_errors
     heading = "" if errors is None else _HEADING
+    if not isinstance(model, Model):
+        return _list_parameters(model, heading)
     lines = [f"{signal_names(model)[0]}(k) =".ljust(WIDTH - len(heading)) + heading]
     for position, (term, theta) in enumerate(zip(model.equation().terms, model.parameters, strict=True)):
         error = "" if errors is None else (f"{errors[position]:.2g}" if errors[position] else _FIXED)
         weight = f"  {'-' if theta < 0 else '+'} {abs(theta):<11.6g}"
         lines += _break_term(weight if term == "1" else f"{weight} * {term}", error, len(weight) + 3)
+    return [line.rstrip() for line in lines]
+
+
+def _list_parameters(model: DynamicModel, heading: str) -> list[str]:
+    """Return the equations of a model, and its parameters by name."""
+    lines = [part for line in model.equation().named.splitlines() for part in wrap(line, "    ")]
+    lines.append("parameters".ljust(WIDTH - len(heading)) + heading)
+    errors = model.standard_errors or (None,) * model.size
+    for name, value, error in zip(model.parameter_names, model.parameters, errors, strict=True):
+        stated = "" if error is None else f"{error:.2g}"
+        text = f"  {name} = {value:.6g}"
+        lines.append(text.ljust(WIDTH - len(stated)) + stated)
     return [line.rstrip() for line in lines]
 
 

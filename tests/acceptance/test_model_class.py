@@ -1,0 +1,138 @@
+"""A class of models that is added by its file and one entry passes fit, files, bands, exports, diagnosis."""
+
+import ctypes
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+import islands
+from islands.errors import ModelError, SettingsError
+from islands.export import export, write_export
+from islands.simulation.predictors import free_run
+from support.gain_scheduled import TRUE, GainScheduledModel, add_class, make_record
+from support.undrawn import undrawn_figures
+
+
+@pytest.fixture(autouse=True)
+def known_class(monkeypatch):
+    add_class(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def record():
+    return make_record()
+
+
+@pytest.fixture(scope="module")
+def result(record):
+    with pytest.MonkeyPatch.context() as patch:
+        add_class(patch)
+        return islands.fit(record, model="gain-scheduled")
+
+
+def model_of(record) -> GainScheduledModel:
+    return GainScheduledModel.of_record(record, TRUE)
+
+
+def test_a_fit_finds_the_parameters_with_their_standard_errors(result):
+    model = result.best.model
+    deviations = (np.array(model.parameters) - TRUE) / np.array(model.standard_errors)
+    assert np.abs(deviations).max() < 4.0
+    assert result.best.metrics["validation"]["free_run"].rmse == pytest.approx(0.01, rel=0.2)
+
+
+def test_a_saved_result_simulates_a_record_to_the_last_bit(result, record, tmp_path):
+    with undrawn_figures():
+        result.save(tmp_path)
+    found = islands.load(tmp_path)
+    assert found.best.model == result.best.model
+    np.testing.assert_array_equal(found.simulate(record).y, result.best.simulate(record).y)
+    band, expected = found.best.bands(record), result.best.bands(record)
+    np.testing.assert_array_equal(band.upper, expected.upper)
+    assert islands.load(tmp_path / "models/01.json").model == result.best.model
+    assert "pole = 0.9" in (tmp_path / "summary.txt").read_text()
+
+
+def test_a_band_contains_new_samples_with_its_probability(result):
+    fresh = make_record(2000, seed=7)
+    band = result.best.bands(fresh, 0.9)
+    known = ~np.isnan(band.y)
+    inside = (band.lower <= fresh.y) & (fresh.y <= band.upper)
+    assert 0.85 <= inside[known].mean() <= 0.95
+
+
+def test_equations_have_the_values_of_the_parameters(record):
+    model = model_of(record)
+    assert export(model, "plain").splitlines() == [
+        "y(k) = x1(k) + 10",
+        "x1(k) = 0.9*x1(k-1) + (1 - 0.9)*(2 + (-0.4)*u(k-1))*u(k-1)",
+    ]
+    assert "x_{1,k-1}" in export(model, "latex")
+    assert "<mi>x</mi><mrow><mn>1</mn><mo>,</mo><mi>k</mi>" in export(model, "mathml")
+
+
+def test_a_model_of_deviations_reads_the_record_as_measured(record):
+    centred = islands.preprocess(record, detrend="constant")
+    model = islands.fit(centred, model="gain-scheduled").best.model
+    assert model.preprocessing.output_offset == pytest.approx(record.y.mean())
+    error = (free_run(model, record).y - record.y)[1:]
+    assert np.sqrt(np.mean(error**2)) < 0.1
+    module = {}
+    exec(export(model, "python"), module)
+    found = module["simulate"](record.u[:, 0].tolist(), record.y[:1].tolist())
+    np.testing.assert_allclose(found[1:], free_run(model, record).y[1:], rtol=1e-12)
+
+
+def test_the_python_module_has_the_bits_of_the_simulation(record):
+    model, module = model_of(record), {}
+    exec(export(model, "python"), module)
+    found = module["simulate"](record.u[:, 0].tolist(), record.y[:1].tolist())
+    np.testing.assert_array_equal(found[1:], free_run(model, record).y[1:])
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
+def test_the_c_file_has_the_bits_of_the_simulation(record, tmp_path):
+    model = model_of(record)
+    write_export(model, "c", tmp_path / "model.c")
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2", "-ffp-contract=off"]
+    command = ["gcc", *flags, "-shared", "-fPIC", "model.c", "-o", "model.so", "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    rows = [record.u[:, 0].copy(), record.y.copy(), np.zeros(record.samples)]
+    pointer = ctypes.POINTER(ctypes.c_double)
+    pointers = (row.ctypes.data_as(pointer) for row in rows)
+    ctypes.CDLL(tmp_path / "model.so").simulate(*pointers, ctypes.c_size_t(record.samples))
+    np.testing.assert_array_equal(rows[1][1:], free_run(model, record).y[1:])
+
+
+def test_other_options_are_those_of_narx_models(record):
+    with pytest.raises(SettingsError, match="not for the model gain-scheduled"):
+        islands.fit(record, model="gain-scheduled", max_terms=3)
+    with pytest.raises(SettingsError, match=r"unknown class of models 'gain'.*gain-scheduled"):
+        islands.fit(record, model="gain")
+    with pytest.raises(ModelError, match="a NARX model is needed"):
+        islands.linearise(model_of(record), [1.0])
+
+
+def test_a_damaged_file_names_the_class(record, tmp_path):
+    file = tmp_path / "model.json"
+    islands.write_model(model_of(record), file)
+    file.write_text(file.read_text().replace('"slope"', '"tilt"'))
+    with pytest.raises(ModelError, match=r"is not a model gain-scheduled.*slope"):
+        islands.read_model(file)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("disturbance", [0.0, 0.2])
+def test_a_diagnosis_finds_a_disturbance_and_nothing_else(record, tmp_path, disturbance):
+    islands.write_model(model_of(record), tmp_path / "model.json")
+    measured = make_record(disturbance=disturbance, seed=3)
+    found = islands.diagnose(measured, f"model:{tmp_path / 'model.json'}")
+    assert [effect["name"] for effect in found.document["effects"]] == (
+        ["periodic-disturbance"] if disturbance else []
+    )
+    if disturbance:
+        found.save(tmp_path / "diagnosis")
+        extended = islands.load(tmp_path / "diagnosis").simulate(measured).y
+        assert np.sqrt(np.mean((extended - measured.y) ** 2)) == pytest.approx(0.01, rel=0.1)

@@ -1,0 +1,68 @@
+"""Jobs of a class of models that is not NARX: fit, models, exports, simulation and diagnosis over REST."""
+
+import json
+
+import numpy as np
+import pytest
+
+import islands
+from islands_api.client import Client
+from islands_api.web.auth import LOCAL_OWNER
+from islands_service.coordinator.identification_job import run_identification_job
+from islands_service.domain.job import REPORT, JobState
+from islands_service.figure_worker import read_search_result, render_figures, render_model_figures
+from islands_service.store.blobs import Blobs
+from support.gain_scheduled import TRUE, GainScheduledModel, add_class, make_record
+from support.job_runs import make_run
+from support.stores import LONG, taken
+
+pytestmark = pytest.mark.ci
+
+
+@pytest.fixture(autouse=True)
+def known_class(monkeypatch):
+    add_class(monkeypatch)
+
+
+@pytest.fixture
+def dataset(service, tmp_path):
+    islands.write_record(make_record(), tmp_path / "oven.csv")
+    with Client(service.url) as client:
+        yield client.upload(tmp_path / "oven.csv")
+
+
+def test_a_job_of_a_class_has_the_model_and_its_exports(service, dataset):
+    with Client(service.url) as client:
+        job = client.submit(dataset, "u_V", "y_K", model="gain-scheduled")
+        blobs, lease = Blobs(service.settings.blobs), taken(service.store, job.id)
+        outcome = run_identification_job(make_run(lease, service.store, blobs, lambda: None, LONG))
+        service.store.leases.finish(lease, outcome)
+        assert client.job(job).state == JobState.SUCCEEDED
+        (model,) = client.models(job)
+        document = json.loads(client.export(job, model.rank, "json"))
+        found = GainScheduledModel.read(document, "model")
+        np.testing.assert_allclose(found.parameters, TRUE, rtol=0.01)
+        assert "predict_x1" in client.export(job, model.rank, "c")
+        # The worker is another process, which does not have the class of this test.
+        stored = service.store.jobs.get(LOCAL_OWNER, job.id)
+        rebuilt = read_search_result(stored, service.store, blobs, model.rank)
+        drawn = render_model_figures(rebuilt, model.rank)
+        assert {"1/free-run.svg", "1/free-run.json"} <= drawn.keys()
+        assert b"x1(k)" in render_figures(stored, rebuilt)[REPORT]
+        # The model is a simulation of a diagnosis.
+        simulation = {"kind": "model", "model": document}
+        assert client.diagnose(dataset, "u_V", "y_K", simulation).state == JobState.QUEUED
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"model": "gain"}, "unknown class of models"),
+        ({"model": "gain-scheduled", "settings": {"generations": 3}}, "leave them out"),
+    ],
+)
+def test_an_unknown_class_and_settings_of_a_search_are_refused(service, dataset, given, message):
+    body = {"dataset": dataset.id, "inputs": ["u_V"], "output": "y_K", **given}
+    answer = service.client.post("/v1/jobs", json=body)
+    assert answer.status_code == 422
+    assert message in answer.json()["detail"]
