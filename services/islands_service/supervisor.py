@@ -77,6 +77,8 @@ class Role:
         File descriptor from which heartbeats are read; -1 if the process does not run.
     last_heartbeat : float, optional
         Time of the last heartbeat; None before the first one.
+    is_killed : bool
+        Whether the process is killed because it hangs. One that waits for a disk ends after that.
     started_at, start_at : float
         Time of the last start, and the earliest time of the next one.
     backoff : float
@@ -100,6 +102,7 @@ class Role:
     process: "subprocess.Popen[bytes] | None" = None
     pipe: int = -1
     last_heartbeat: float | None = None
+    is_killed: bool = False
     started_at: float = 0.0
     start_at: float = 0.0
     backoff: float = _FIRST_BACKOFF
@@ -181,9 +184,10 @@ def _check_role(
             if role.last_heartbeat is None
             else (role.last_heartbeat, role.patience)
         )
-        if now - since > timeout:
+        if now - since > timeout and not role.is_killed:
             _print(log, f"{role.name} has sent no heartbeat for {now - since:.1f} s: it is started again")
             role.process.kill()
+            role.is_killed = True
         return 0
     code, has_run = role.process.returncode, role.has_run
     _handle_exit(role, now)
@@ -219,7 +223,7 @@ def _start(role: Role, environment: Mapping[str, str]) -> None:
         preexec_fn=lambda: _set_parent_death_signal(role.orphaned),  # noqa: PLW1509 - this process has one thread
     )
     os.close(writing)
-    role.pipe, role.last_heartbeat, role.started_at = reading, None, monotonic()
+    role.pipe, role.last_heartbeat, role.is_killed, role.started_at = reading, None, False, monotonic()
 
 
 def _set_parent_death_signal(number: signal.Signals) -> None:

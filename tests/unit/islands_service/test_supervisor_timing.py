@@ -128,6 +128,27 @@ def test_role_without_heartbeats_is_killed_after_its_timeout(start_role: StartRo
     assert "api has sent no heartbeat for 5.1 s: it is started again" in role.log.getvalue()
 
 
+def test_silence_is_reported_once_until_the_process_is_gone(
+    start_role: StartRole, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A killed process that waits for a disk ends after the disk has answered."""
+    role = start_role(ONE_HEARTBEAT, patience=5.0)
+    for silences in (1, 2):
+        role.wait_for_heartbeat()
+        process = role.role.process
+        assert process is not None
+        with monkeypatch.context() as disk:
+            disk.setattr(process, "kill", lambda: None)
+            role.check(5.1)
+            for _ in range(3):
+                role.check(0.06)
+        process.kill()
+        role.ended(supervisor._STABLE_AFTER)
+        role.check()
+        assert role.log.getvalue().count("has sent no heartbeat") == silences
+        assert role.log.getvalue().count("ended (-9): it is started again") == silences
+
+
 def test_role_with_heartbeats_keeps_running(start_role: StartRole) -> None:
     role = start_role(LIVE, patience=5.0)
     process = role.role.process
