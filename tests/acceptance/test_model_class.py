@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 
 import islands
+from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError, SettingsError
 from islands.export import export, write_export
+from islands.io.simulator_spec.factory import make_simulator
+from islands.io.simulator_spec.specification import parse_spec
 from islands.simulation.predictors import free_run
+from support.equation_programs import OCTAVE, extend, run_c, run_matlab
 from support.gain_scheduled import TRUE, GainScheduledModel, add_class, make_record
 from support.undrawn import undrawn_figures
 
@@ -134,5 +138,16 @@ def test_a_diagnosis_finds_a_disturbance_and_nothing_else(record, tmp_path, dist
     )
     if disturbance:
         found.save(tmp_path / "diagnosis")
-        extended = islands.load(tmp_path / "diagnosis").simulate(measured).y
+        saved = islands.load(tmp_path / "diagnosis")
+        extended = saved.simulate(measured).y
         assert np.sqrt(np.mean((extended - measured.y) ** 2)) == pytest.approx(0.01, rel=0.1)
+
+
+def test_the_programs_of_an_extended_simulation_have_its_numbers(record, tmp_path):
+    islands.write_model(model_of(record), tmp_path / "model.json")
+    simulator = make_simulator(parse_spec(f"model:{tmp_path / 'model.json'}"), record, {})
+    spec, expected = extend(simulator, record, [CATALOGUE["periodic-disturbance"]])
+    np.testing.assert_allclose(run_c(spec, record, tmp_path), expected, rtol=1e-9)
+    if OCTAVE is not None:
+        (found,) = run_matlab([(spec, record)], tmp_path)
+        np.testing.assert_allclose(found, expected, rtol=1e-9)

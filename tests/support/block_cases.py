@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.export import measured_block
 from islands.models.block import Block
 from islands.models.coupled_narx import CoupledModel
+from islands.models.measured_signals import measured_block
 from islands.models.narx import Model
 from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.predictors import free_run

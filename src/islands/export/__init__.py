@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TypeAlias, TypeVar
 
-from islands.errors import ModelError, SettingsError, lookup
+from islands.errors import SettingsError, lookup
 from islands.export.fmu.archive import fmu2, fmu3
 from islands.export.languages.c import c_source
 from islands.export.languages.matlab import matlab_source
@@ -19,10 +19,10 @@ from islands.export.languages.modelica import modelica_source
 from islands.export.languages.python import python_source
 from islands.export.languages.s_function import s_function_source
 from islands.io.models import model_json
-from islands.models.block import Block, subtract_offsets
-from islands.models.coupled_narx import CoupledModel, measured_coupled_model
+from islands.models.block import Block
+from islands.models.coupled_narx import CoupledModel
 from islands.models.dynamic_model import DynamicModel
-from islands.models.narx import Model, measured_model
+from islands.models.measured_signals import measured_block
 
 #: Models that can be exported.
 Exported: TypeAlias = DynamicModel | CoupledModel
@@ -43,24 +43,6 @@ def latex(model: Exported) -> str:
 def mathml(model: Exported) -> str:
     """Return the equation of a model as ``math`` elements, which browsers render without a library."""
     return model.equation().mathml
-
-
-def measured_block(model: Exported) -> Block:
-    """Return the block of a model of the measured signals, with the offsets in its equations.
-
-    Raises
-    ------
-    ModelError
-        The model has no parameters.
-    """
-    if not model.parameters:
-        raise ModelError("the model has no parameters, so that there is nothing to export")
-    match model:
-        case Model():
-            return measured_model(model).block()
-        case CoupledModel():
-            return measured_coupled_model(model).block()
-    return subtract_offsets(model.block(), model.preprocessing)
 
 
 def _of_block(write: Callable[[Block], Text]) -> Callable[[Exported], Text]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from islands.expressions.tree import Expression
-from islands.models.narx import Model
+from islands.models.block import Block
 from islands.simulators.ode.system import OdeSystem
 
 
@@ -88,7 +88,7 @@ class SampledCore:
         Memory after a sample, with the output as ``y`` in addition.
     delay : int
         Samples by which the input ``x`` is delayed.
-    model : Model or None
+    block : Block or None
         Identified model in free run from measured outputs.
     columns : mapping
         Further columns of the record, by the names that the program gives to them.
@@ -101,7 +101,7 @@ class SampledCore:
     output: Expression | None = None
     after: tuple[tuple[str, Expression], ...] = ()
     delay: int = 0
-    model: Model | None = None
+    block: Block | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
     values: Mapping[str, NamedValue] = field(default_factory=dict)
     start: Mapping[str, NamedValue] = field(default_factory=dict)

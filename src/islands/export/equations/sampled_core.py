@@ -9,10 +9,9 @@ from islands.export.equations.extended_equations import NamedValue, SampledCore
 from islands.export.equations.program_system import refuse
 from islands.expressions.primitives import ADD, MUL, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Symbol
-from islands.io.models import narx_from_json
+from islands.io.models import model_from_json
 from islands.io.simulator_spec.specification import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
-from islands.models.equations import equation
-from islands.models.narx import measured_model
+from islands.models.measured_signals import measured_block
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.ode.output_system import INPUT, SIMULATED, make_output_system
 from islands.simulators.ode.system import OdeSystem
@@ -48,11 +47,11 @@ def read_output_system(spec: ExtendedSpec) -> OdeSystem:
 
 def _make_model(spec: ModelSpec, output: str) -> SampledCore:
     # The program reads the same column as the simulation, which may be one sample early.
-    model = measured_model(narx_from_json(json.dumps(spec.model), spec.name))
-    model = replace(model, input_names=(INPUT,))
+    model = replace(model_from_json(json.dumps(spec.model), spec.name), input_names=(INPUT,))
+    block = measured_block(model)
     return SampledCore(
-        f"free run of the model {equation(model)} from {model.maximum_lag} measured outputs",
-        model=model,
+        f"free run of the model {'; '.join(block.texts)} from {block.maximum_lag} measured outputs",
+        block=block,
         columns={MEASURED: output},
     )
 

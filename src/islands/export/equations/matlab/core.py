@@ -4,6 +4,7 @@ from islands.export.equations.equation_code import EquationCode
 from islands.export.equations.extended_equations import SampledCore
 from islands.export.equations.sampled_core import MEASURED, RECORDED
 from islands.export.languages.matlab import matlab_definition, matlab_name
+from islands.models.block import Block
 
 _FUNCTION = """\
 function y = simulate_core(p, s, r)
@@ -18,8 +19,8 @@ def write_matlab_core(core: SampledCore, code: EquationCode) -> str:
     """Return the function ``simulate_core``, and the functions that it calls."""
     names = code.identifiers
     u = f"r.{names[code.equations.system.input]}"
-    if core.model is not None:
-        return _write_model(core, u, f"r.{names[MEASURED]}")
+    if core.block is not None:
+        return _write_model(core.block, u, f"r.{names[MEASURED]}")
     if core.output is None:
         return _write([f"y = r.{names[RECORDED]};"])
     local = {"x": "x", "y": "y(k)", **{name: name for name, _ in core.after}}
@@ -31,21 +32,28 @@ def write_matlab_core(core: SampledCore, code: EquationCode) -> str:
     return _write(["y = zeros(r.samples, 1);", *before, *_loop("1", each)])
 
 
-def _write_model(core: SampledCore, u: str, measured: str) -> str:
-    model = core.model
-    assert model is not None
-    lag = model.maximum_lag
-    block = model.block()
-    added = block.terms(0, lambda name, lag: f"{name}(k-{lag})", matlab_name)
-    each = ["total = 0;", *(f"total = total + {each};" for each in added), "y(k) = total;"]
+def _write_model(block: Block, u: str, measured: str) -> str:
+    lag, states = block.maximum_lag, block.signals[block.outputs : block.computed]
     lines = [
         f"u = {u};",
         "y = zeros(r.samples, 1);",
         f"given = min({lag}, r.samples);",
         f"y(1:given) = {measured}(1:given);",
-        *_loop(str(lag + 1), each),
     ]
+    each = []
+    for place, name in enumerate(states):
+        start = block.start_text(place, _read, matlab_name)
+        lines += [f"{name} = zeros(r.samples, 1);", f"for k = 1:given, {name}(k) = {start}; end"]
+        added = block.terms(place + block.outputs, _read, matlab_name)
+        each += [f"{name}(k) = 0;", *(f"{name}(k) = {name}(k) + {term};" for term in added)]
+    added = block.terms(0, _read, matlab_name)
+    each += ["total = 0;", *(f"total = total + {term};" for term in added), "y(k) = total;"]
+    lines += _loop(str(lag + 1), each)
     return _write(lines) + "".join(f"{matlab_definition(each)}\n" for each in block.primitives)
+
+
+def _read(name: str, lag: int) -> str:
+    return f"{name}(k-{lag})" if lag else f"{name}(k)"
 
 
 def _loop(first: str, lines: list[str]) -> list[str]:
