@@ -8,9 +8,11 @@ from islands.models.block import Block
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
 from islands.models.narx import Model
+from islands.simulation.block_simulation import make_simulator
 from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
+from support.gain_scheduled import TRUE, GainScheduledModel, make_record
 from support.programs import CASES, model, record, record_of
 
 #: Chosen for their states: past inputs and outputs, several inputs, no past, an input that acts at once.
@@ -29,8 +31,13 @@ OF_STATES = {
     "at once": replace(model({"y(k-1)": 0.5, "u1(k-1)*u2(k-2)": 0.25}, ("a_V+1", "b_A")), dt=0.1),
 }
 
-#: Models of several outputs as well.
-OF_BLOCKS = {**OF_STATES, "two masses": TWO_MASSES, "prey": PREY}
+#: Models of several outputs, and of a state that is not measured, as well.
+OF_BLOCKS = {
+    **OF_STATES,
+    "two masses": TWO_MASSES,
+    "prey": PREY,
+    "not measured": GainScheduledModel.of_record(make_record(), TRUE),
+}
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,8 @@ def block_case(name):
     exported = OF_BLOCKS[name]
     if isinstance(exported, CoupledModel):
         return coupled_case(exported, make_coupled_record(exported, samples=60))
+    if isinstance(exported, GainScheduledModel):
+        return state_case(exported, make_record(samples=60))
     return model_case(exported, record(exported.inputs, dt=0.1) if name == "at once" else record_of(name))
 
 
@@ -67,6 +76,14 @@ def model_case(exported, data):
     simulated = free_run(exported, data)
     assert simulated.outcome
     return make_case(exported, data.u, data.y[:, None], simulated.y[:, None])
+
+
+def state_case(exported, data):
+    """Return the case of a model with states, which are outputs of its block."""
+    block, first = measured_block(exported), exported.maximum_lag
+    simulated = make_simulator(block, data, None, first)(np.array([exported.parameters]))[0].T
+    start = np.array([data.y[:first], *(data.y[:first] - TRUE[-1] for _ in block.starts)]).T
+    return make_case(exported, data.u, np.concatenate([start, simulated[first:]]), simulated)
 
 
 def coupled_case(exported, data):

@@ -189,7 +189,7 @@ def run_matlab_system(case, folder):
     (folder / "narx_system.m").write_text(text.replace("(Static, Access = private)", "(Static)"))
     np.array(case.past).tofile(folder / "past")
     case.inputs.tofile(folder / "inputs")
-    direct = " ".join(str(int(each)) for each in case.block.feedthrough[case.block.outputs :])
+    direct = " ".join(str(int(each)) for each in case.block.feedthrough)
     script = _SYSTEM_LOOP.format(inputs=case.inputs.shape[1], outputs=case.block.outputs, direct=direct)
     octave(script, folder)
     return np.fromfile(folder / "outputs").reshape(case.outputs.shape)
