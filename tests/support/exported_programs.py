@@ -190,7 +190,7 @@ def run_matlab_system(case, folder):
     np.array(case.past).tofile(folder / "past")
     case.inputs.tofile(folder / "inputs")
     direct = " ".join(str(int(each)) for each in case.block.feedthrough)
-    script = _SYSTEM_LOOP.format(inputs=case.inputs.shape[1], outputs=case.block.outputs, direct=direct)
+    script = _SYSTEM_LOOP.format(inputs=case.inputs.shape[1], outputs=case.block.computed, direct=direct)
     octave(script, folder)
     return np.fromfile(folder / "outputs").reshape(case.outputs.shape)
 
