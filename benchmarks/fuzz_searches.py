@@ -30,15 +30,15 @@ from threadpoolctl import threadpool_limits
 import islands
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
+from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.result import Diagnosis
 from islands.errors import IslandsError
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.results.result import Result
-from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.result_folder import result_json
-from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.models.candidate_library import LIBRARIES
+from islands.simulators.specification.equations import OdeSpec
 
 Generator = np.random.Generator
 Signal = NDArray[np.float64]

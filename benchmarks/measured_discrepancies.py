@@ -25,9 +25,9 @@ import numpy as np  # noqa: E402 - after the environment is set
 
 import islands  # noqa: E402
 from islands.diagnosis.detectability import diagnose_surrogate  # noqa: E402
+from islands.diagnosis.documents.extension_json import extended_document  # noqa: E402
 from islands.diagnosis.surrogates import SurrogateCase, injection_strengths, make_surrogates  # noqa: E402
-from islands.io.simulator_spec.document import extended_document  # noqa: E402
-from islands.io.simulator_spec.factory import make_simulator  # noqa: E402
+from islands.simulators.specification.factory import make_simulator  # noqa: E402
 
 NAIVE = Path(__file__).parents[1] / "tests" / "support" / "naive_damper.py"
 DATA = Path(os.environ.get("ISLANDS_MEASURED_DIR", Path(__file__).parents[2] / "shared/data"))

@@ -19,13 +19,15 @@ import numpy as np
 
 import islands
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
-from islands.diagnosis.calibration.preparation import make_context, make_target
+from islands.diagnosis.calibration.preparation import make_target
+from islands.diagnosis.calibration.record_simulation import simulate_spec
+from islands.diagnosis.documents.extension_json import extended_json
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.errors import RecordError
-from islands.io.simulator_spec.document import extended_json
-from islands.io.simulator_spec.factory import make_simulator, simulate_spec
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.specification.factory import make_simulator
 
 STEPS = 10
 

@@ -11,9 +11,9 @@ from islands.diagnosis.planning.experiment import Experiment, make_model
 from islands.diagnosis.planning.experiment_setup import make_experiment
 from islands.diagnosis.procedure import diagnose
 from islands.effects.interface.effect import Effect
-from islands.io.simulator_spec.factory import make_simulator
 from islands.performance.trials.injection.noise import NOISES
 from islands.simulators.interface import get_tolerances
+from islands.simulators.specification.factory import make_simulator
 from islands.systems.signals import sines
 
 ROOT = Path(__file__).resolve().parents[1]

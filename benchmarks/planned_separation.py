@@ -30,9 +30,9 @@ from islands.diagnosis.planning.planned_input import find_limits
 from islands.diagnosis.planning.response_dictionary import ResponseDictionary
 from islands.diagnosis.planning.separation import require_detection
 from islands.diagnosis.procedure import diagnose
-from islands.io.simulator_spec.factory import make_simulator
 from islands.performance.trials.injection.noise import NOISES
 from islands.simulators.interface import get_tolerances
+from islands.simulators.specification.factory import make_simulator
 
 #: Number of records of each cause.
 SEEDS = 10

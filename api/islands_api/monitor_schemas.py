@@ -5,7 +5,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from islands.io.simulator_spec.specification import SimulationSpec
+from islands.simulators.specification.table import SimulationSpec
 from islands_api.schemas import DATASET_ID, ResponseModel
 from islands_service.domain.job import PRIORITIES
 from islands_service.domain.job_spec import Name, Seconds, check_single

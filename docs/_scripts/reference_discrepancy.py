@@ -13,7 +13,7 @@ from islands.effects.interface.context import ForceCoordinate, Parameter, Simula
 from islands.effects.interface.effect import Effect, EffectTemplate
 from islands.expressions.parsing import NAMED_FUNCTIONS
 from islands.expressions.primitives import EQUATION_FUNCTIONS
-from islands.io.simulator_spec.specification import SIMULATORS
+from islands.simulators.specification.table import SIMULATORS
 
 Entry = Effect | EffectTemplate | NoiseDetector
 

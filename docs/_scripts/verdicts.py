@@ -22,8 +22,8 @@ from islands.figures.style import (
     house_style,
     save,
 )
-from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.simulators.ode.system import OdeParameter
+from islands.simulators.specification.equations import OdeSpec
 
 PICTURE = Path(__file__).parents[1] / "pictures" / "verdicts.svg"
 

@@ -48,7 +48,7 @@ _PUBLIC = {
     "facade.results.result": ("Result",),
     "facade.results.saved_result": ("read_result",),
     "facade.results.saved_simulation": ("SavedDiagnosis", "SavedSimulation"),
-    "io.checkpoints.monitor_state": ("SavedMonitor", "read_monitor", "write_monitor"),
+    "diagnosis.documents.monitor_state": ("SavedMonitor", "read_monitor", "write_monitor"),
     "io.data_frames": ("as_record",),
     "io.models": ("read_coupled_model", "read_model", "write_model"),
     "io.records": ("read_record", "write_record"),

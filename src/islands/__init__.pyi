@@ -6,6 +6,9 @@ from islands.data.preprocessing import preprocess as preprocess
 from islands.data.split import Split as Split
 from islands.data.split import split as split
 from islands.diagnosis.detectability import self_test as self_test
+from islands.diagnosis.documents.monitor_state import SavedMonitor as SavedMonitor
+from islands.diagnosis.documents.monitor_state import read_monitor as read_monitor
+from islands.diagnosis.documents.monitor_state import write_monitor as write_monitor
 from islands.diagnosis.planning.experiment_plan import ExperimentPlan as ExperimentPlan
 from islands.effects.catalogue import EFFECTS as EFFECTS
 from islands.effects.interface.context import Parameter as Parameter
@@ -45,9 +48,6 @@ from islands.facade.results.result import Result as Result
 from islands.facade.results.saved_result import read_result as read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis as SavedDiagnosis
 from islands.facade.results.saved_simulation import SavedSimulation as SavedSimulation
-from islands.io.checkpoints.monitor_state import SavedMonitor as SavedMonitor
-from islands.io.checkpoints.monitor_state import read_monitor as read_monitor
-from islands.io.checkpoints.monitor_state import write_monitor as write_monitor
 from islands.io.data_frames import as_record as as_record
 from islands.io.models import read_coupled_model as read_coupled_model
 from islands.io.models import read_model as read_model

@@ -22,8 +22,8 @@ from islands.evolution.settings import Settings
 from islands.export import EXPORTS
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.io.records import READERS
-from islands.io.simulator_spec.specification import SIMULATORS
 from islands.models.candidate_library import LIBRARIES
+from islands.simulators.specification.table import SIMULATORS
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED
 from islands_service.engines import ENGINES

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from islands.io.checkpoints.monitor_document import describe_status, monitor_document
-from islands.io.checkpoints.monitor_state import SavedMonitor
+from islands.diagnosis.documents.monitor_json import describe_status, monitor_document
+from islands.diagnosis.documents.monitor_state import SavedMonitor
 from islands.io.records import write_record
 from islands_service.domain.job import JobOutcome, JobState
 from support.monitor_updates import store_monitor

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from islands.io.simulator_spec.specification import PhysicalSpec
+from islands.simulators.specification.table import PhysicalSpec
 from support.service import problem_of
 from support.simulated_records import extension
 

@@ -8,14 +8,14 @@ import pytest
 import scipy
 
 from islands.data.dataset import Dataset, join
-from islands.diagnosis.calibration.preparation import make_context
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
 from islands.effects.interface.effect import Effect
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import LinearSpec
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import LinearSpec
 from support.simulated_records import SAMPLES, made, names
 
 #: First sample of every recording, and the sample after the last.

@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.diagnosis.calibration.preparation import count_fitted_samples, select_effects
 from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.context import SimulationContext
 from islands.effects.interface.effect import Effect, Site
 from islands.export.fmu.compiler import find_compiler
-from islands.io.simulator_spec.specification import SIMULATORS, PhysicalSpec
 from islands.simulators import (
     intersample,
     linear,
@@ -21,10 +20,12 @@ from islands.simulators import (
     recorded_output,
     saved_extension,
 )
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.fmu import simulator as fmu
 from islands.simulators.interface import Simulator
 from islands.simulators.ode import simulator as ode
+from islands.simulators.specification.table import SIMULATORS, PhysicalSpec
 from support.simulated_records import made, names
 
 #: Classes of the simulators that are not physical systems; those of "held" and "terms" are
@@ -44,12 +45,14 @@ CLASSES = {
 #: Modules of the package that define no simulator of a specification.
 SHARED_MODULES = {
     "__init__",
-    "built_in",
+    "built_in_estimates",
+    "context",
+    "coordinates",
     "extended",
-    "ode_effects",
-    "ode_preparation",
-    "record_channels",
-    "shooting",
+    "interface",
+    "mapped_input",
+    "model_form",
+    "second_order",
 }
 
 
@@ -91,8 +94,10 @@ def possible_effects(simulator: Simulator, context: SimulationContext) -> list[E
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 def test_every_simulator_has_a_record() -> None:
     assert set(names()) == made().keys()
-    modules = {path.stem for path in Path(intersample.__file__).parent.glob("*.py")}
-    assert modules - SHARED_MODULES == {type(make(name)).__module__.rpartition(".")[2] for name in made()}
+    package = Path(intersample.__file__).parent
+    modules = {path.stem for path in package.glob("*.py")} - SHARED_MODULES
+    modules |= {f"{path.parent.name}.simulator" for path in package.glob("*/simulator.py")}
+    assert modules == {type(make(name)).__module__.removeprefix("islands.simulators.") for name in made()}
 
 
 def test_a_simulator_has_the_class_of_its_name(name: str, simulator: Simulator) -> None:

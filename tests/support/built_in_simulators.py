@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from islands.io.simulator_spec.ode_spec import read_built_in
 from islands.simulators.ode.preparation import make_ode_simulator
 from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.specification.equations import read_built_in
 from support.simulated_records import recorded, wave
 
 

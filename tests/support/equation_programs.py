@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import evaluate_fit
-from islands.diagnosis.calibration.preparation import make_context
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.documents.extension_json import extended_document
 from islands.effects.catalogue import CATALOGUE, catalogue_order
 from islands.effects.interface.effect import Effect, Site
 from islands.export.equations.equation_collection import collect_equations
 from islands.export.extension import export_extended
-from islands.io.simulator_spec.document import extended_document
-from islands.io.simulator_spec.specification import LocalExtendedSpec
 from islands.performance.benchmark.compiled_c import compile_model
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.specification.table import LocalExtendedSpec
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import numpy as np
 from benchmarks.monitor import SIMULATION, make_record
 
 from islands.data.dataset import Dataset
+from islands.diagnosis.documents.monitor_state import SavedMonitor
 from islands.facade.record_monitor import create_monitor, monitor_record
-from islands.io.checkpoints.monitor_state import SavedMonitor
 
 __all__ = ["ONSET", "SIMULATION", "TRAINING", "follow", "make_records", "undisturbed_monitor"]
 

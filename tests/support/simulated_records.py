@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.export.fmu.compiler import find_compiler
-from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import (
+from islands.simulators.interface import Simulator
+from islands.simulators.specification.code import FmuSpec, ProgramSpec
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import (
     SIMULATORS,
     ColumnSpec,
     LinearSpec,
@@ -24,7 +25,6 @@ from islands.io.simulator_spec.specification import (
     ModelSpec,
     PhysicalSpec,
 )
-from islands.simulators.interface import Simulator
 from support.oscillator_fmus import write_oscillator
 from support.repository import ROOT
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from islands.errors import SettingsError
-from islands.io.simulator_spec.specification import SIMULATORS
+from islands.simulators.specification.table import SIMULATORS
 
 Record = Annotated[
     Path, typer.Argument(help="The record: text, XLSX, NPZ, MAT, HDF5, Parquet, MDF or TDMS; also .gz, .zip.")

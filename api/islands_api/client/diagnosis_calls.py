@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from islands.errors import SettingsError
-from islands.io.simulator_spec.specification import SIMULATORS, innermost, parse_spec
+from islands.simulators.specification.table import SIMULATORS, innermost, parse_spec
 from islands_api.client.calls import DatasetRef, RequestSpec, as_list, get_id, make_submission
 from islands_api.client.recording_parts import make_part
 from islands_api.schemas import JobView

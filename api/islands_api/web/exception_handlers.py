@@ -14,8 +14,8 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.routing import Match
 
+from islands.document_problems import explain_problem
 from islands.errors import IslandsError
-from islands.io.document_problems import explain_problem
 from islands_api.oidc.bearer_token import TokenRefusedError
 from islands_api.web.problems import (
     MEDIA_TYPE,

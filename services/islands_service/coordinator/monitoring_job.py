@@ -6,23 +6,23 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from islands.data.dataset import Dataset
-from islands.effects.interface.context import Signal
-from islands.errors import RecordError
-from islands.facade.record_monitor import create_monitor, monitor_record
-from islands.io.checkpoints.monitor_document import (
+from islands.diagnosis.documents.monitor_json import (
     describe_alarm,
     describe_monitor,
     describe_record,
     describe_status,
 )
-from islands.io.checkpoints.monitor_state import (
+from islands.diagnosis.documents.monitor_state import (
     RejectedRecord,
     SavedMonitor,
     head_to_json,
     monitor_from_head,
     record_to_json,
 )
-from islands.io.result_text.monitor_text import describe_alarm_text, describe_last_record
+from islands.diagnosis.documents.monitor_text import describe_alarm_text, describe_last_record
+from islands.effects.interface.context import Signal
+from islands.errors import RecordError
+from islands.facade.record_monitor import create_monitor, monitor_record
 from islands_service.coordinator.job_failures import check_readable, make_problem_document
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import JobOutcome, JobState, ProgressReport

@@ -17,12 +17,12 @@ from pydantic import (
     create_model,
 )
 
+from islands.document_problems import find_problem
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings, get_text_type
-from islands.io.document_problems import find_problem
 from islands.io.models import MODEL_CLASSES, NARX
-from islands.io.simulator_spec.specification import ColumnSpec, SimulationSpec, innermost
+from islands.simulators.specification.table import ColumnSpec, SimulationSpec, innermost
 
 S = TypeVar("S", bound=BaseModel)
 

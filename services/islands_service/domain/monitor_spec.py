@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from islands.errors import SettingsError
-from islands.io.simulator_spec.specification import SimulationSpec
+from islands.simulators.specification.table import SimulationSpec
 from islands_service.domain.job_spec import (
     DatasetId,
     Discrepancy,

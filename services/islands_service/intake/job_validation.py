@@ -14,7 +14,7 @@ from islands.io.models import MODEL_CLASSES, NARX, model_from_json
 from islands.io.records.column_names import find_column
 from islands.io.records.row_range import overlap, parse_rows
 from islands.io.records.validation import check_choice
-from islands.io.simulator_spec.specification import SIMULATORS, ModelSpec, PhysicalSpec, innermost
+from islands.simulators.specification.table import SIMULATORS, ModelSpec, PhysicalSpec, innermost
 from islands_service.domain.job_memory import DEFAULT_SHARE, estimate_memory, machine_memory
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
 from islands_service.domain.search_limits import LIMITS, MAX_SHIFT, resolve_job_settings

@@ -28,7 +28,7 @@ _CHECK_SECONDS = 0.1
 _PRELOADED = [
     "__main__",
     "islands.diagnosis.procedure",
-    "islands.io.simulator_spec.factory",
+    "islands.simulators.specification.factory",
     "scipy.signal",
 ]
 

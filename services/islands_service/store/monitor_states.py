@@ -35,8 +35,8 @@ _ROWS: Select[Any] = select(
 )
 
 
-#: Schema of a state with its records: that of `islands.io.checkpoints.monitor_state`, which this module does
-#: not import for its numerical packages. A test compares them.
+#: Schema of a state with its records: that of `islands.diagnosis.documents.monitor_state`, which this module
+#: does not import for its numerical packages. A test compares them.
 STATE_SCHEMA = "islands.monitor-state/1"
 
 

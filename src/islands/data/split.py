@@ -12,6 +12,13 @@ from islands.data.magnitudes import check_magnitudes
 from islands.data.missing_outputs import skip_missing_outputs
 from islands.errors import SettingsError
 
+#: Fraction of a record, at its end, that a diagnosis reserves for hold-out validation.
+HOLDOUT_FRACTION = 0.25
+
+#: Minimum number of samples of each of several recordings, and of each part of one that the hold-out part
+#: divides: its initial state is estimated from them.
+MIN_RECORDING_SAMPLES = 20
+
 
 @dataclass(frozen=True, slots=True)
 class Split:
@@ -149,3 +156,19 @@ def _recordings_share_samples(one: Dataset, other: Dataset) -> bool:
 
 def _agree(one: Dataset, other: Dataset) -> bool:
     return np.array_equal(one.y, other.y) and np.array_equal(one.u, other.u)
+
+
+def estimation_part(record: Dataset) -> Dataset:
+    """Return the part of a record that is used for estimation, without the hold-out part at its end.
+
+    The hold-out part is that of the record, or its last quarter, which may consist of whole recordings. The
+    quarter begins with a recording if less than `MIN_RECORDING_SAMPLES` would be divided from one.
+    """
+    if record.held_out:
+        return record[: -record.held_out]
+    fitted = int((1.0 - HOLDOUT_FRACTION) * record.samples)
+    for boundary, _ in record.bounds[1:]:
+        if abs(fitted - boundary) < MIN_RECORDING_SAMPLES:
+            fitted = boundary
+            break
+    return record[:fitted]

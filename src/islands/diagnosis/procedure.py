@@ -16,7 +16,6 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult,
 from islands.diagnosis.calibration.noise_model import is_rounding_error
 from islands.diagnosis.calibration.preparation import (
     count_fitted_samples,
-    make_context,
     make_target,
     select_effects,
     validate_prior,
@@ -53,6 +52,7 @@ from islands.effects.interface.effect import Effect
 from islands.errors import RecordError
 from islands.parallel import ParallelMap
 from islands.progress import ProgressCallback, ignore_progress
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator, find_read_channels, get_tolerances
 from islands.simulators.output_equation import add_output_equation

@@ -15,16 +15,16 @@ from islands.errors import ModelError
 from islands.expressions.primitives import MUL, PRIMITIVES, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, replace_leaves
 from islands.io.models import narx_from_json
-from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
-from islands.io.simulator_spec.spec_base import EffectSpec, ScalesSpec
-from islands.io.simulator_spec.specification import (
+from islands.models.narx import Model, make_model, measured_model
+from islands.simulators.specification.base import EffectSpec, ScalesSpec
+from islands.simulators.specification.code import FmuSpec, ProgramSpec
+from islands.simulators.specification.table import (
     ExtendedSpec,
     LinearSpec,
     LocalSpec,
     ModelSpec,
     SimulationSpec,
 )
-from islands.models.narx import Model, make_model, measured_model
 
 _Terms = list[tuple[Expression, float]]
 _Values = Mapping[str, float]

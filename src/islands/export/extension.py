@@ -11,11 +11,11 @@ from islands.export.closed_form import closed_form
 from islands.export.equations.c.equations import c_equations
 from islands.export.equations.equation_collection import collect_equations
 from islands.export.equations.matlab.equations import matlab_equations
-from islands.io.simulator_spec.ode_spec import OdeParameterSpec, OdeSpec
-from islands.io.simulator_spec.spec_base import ValueSpec
-from islands.io.simulator_spec.specification import LocalExtendedSpec
 from islands.models.narx import Model
 from islands.simulators.ode.output_system import SYMBOL_MEANINGS
+from islands.simulators.specification.base import ValueSpec
+from islands.simulators.specification.equations import OdeParameterSpec, OdeSpec
+from islands.simulators.specification.table import LocalExtendedSpec
 
 
 def as_text(spec: LocalExtendedSpec) -> str:

@@ -14,13 +14,13 @@ from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect, Signal
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.data_frames import as_record
-from islands.io.simulator_spec.factory import make_model_simulator, make_simulator
-from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
 from islands.models.narx import Model
 from islands.parallel import ParallelMap
 from islands.progress import ProgressCallback, ignore_progress
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.specification.factory import make_model_simulator, make_simulator
+from islands.simulators.specification.table import LocalSpec, SimulationSpec
 
 if TYPE_CHECKING:
     from islands.io.data_frames import RecordLike

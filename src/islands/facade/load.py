@@ -15,9 +15,9 @@ from islands.facade.results.result import Result
 from islands.facade.results.saved_result import read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
 from islands.io.models import read_coupled_model, read_model
-from islands.io.simulator_spec.code_spec import FmuSpec
-from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import EXTENDED_FILE, LocalExtendedSpec, parse_spec
+from islands.simulators.specification.code import FmuSpec
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.table import EXTENDED_FILE, LocalExtendedSpec, parse_spec
 from islands.systems.published_models import get_published_model
 
 #: Values of `load`; each has ``simulate`` and ``export``.

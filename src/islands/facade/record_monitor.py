@@ -9,6 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset
+from islands.diagnosis.documents.monitor_state import RejectedRecord, SavedMonitor
 from islands.diagnosis.monitoring.alarm_rate import DEFAULT_RATE, parse_alarm_rate
 from islands.diagnosis.monitoring.record_follower import (
     TRAINING,
@@ -18,10 +19,10 @@ from islands.diagnosis.monitoring.record_follower import (
 )
 from islands.effects.interface.context import Signal
 from islands.errors import RecordError, SettingsError
-from islands.io.checkpoints.monitor_state import RejectedRecord, SavedMonitor
-from islands.io.simulator_spec.document import describe_extension
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import (
+from islands.simulators.interface import Simulator
+from islands.simulators.specification.description import describe_extension
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import (
     ExtendedSpec,
     LocalSpec,
     SimulationSpec,
@@ -29,7 +30,6 @@ from islands.io.simulator_spec.specification import (
     is_extended,
     parse_spec,
 )
-from islands.simulators.interface import Simulator
 
 _LOCAL_SPEC: TypeAdapter[LocalSpec] = TypeAdapter(LocalSpec)
 

@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from islands.data.preprocessing_steps import Preprocessing
+from islands.document_problems import find_problem
 from islands.errors import ModelError
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
-from islands.io.document_problems import find_problem
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model, canonical_order
 from islands.models.regressor import Regressor, regressor

@@ -1,18 +1,18 @@
 """HTML report of a diagnosis: sentences, numbers and figures."""
 
 from islands.diagnosis.detectability import NOTHING, SelfTest
-from islands.diagnosis.findings import ResidualFormula
-from islands.diagnosis.result import Diagnosis
-from islands.diagnosis.surrogates import STRENGTHS
-from islands.figures.discrepancy import DISCREPANCY_FIGURES
-from islands.figures.form_values import draw_effect_shape, draw_free_forms, list_free_forms
-from islands.io.result_text.diagnosis_text import (
+from islands.diagnosis.documents.result_text import (
     describe_finding,
     describe_left_out,
     describe_noise_floor,
     describe_verdict,
     summarise_self_test,
 )
+from islands.diagnosis.findings import ResidualFormula
+from islands.diagnosis.result import Diagnosis
+from islands.diagnosis.surrogates import STRENGTHS
+from islands.figures.diagnosis import DIAGNOSIS_FIGURES
+from islands.figures.form_values import draw_effect_shape, draw_free_forms, list_free_forms
 from islands.reports.rendering import TEMPLATES, inline_figure
 
 #: Captions of the figures, in the order of the report.
@@ -64,7 +64,7 @@ def diagnosis_report(
     """
     figures = [
         (_CAPTIONS[each], inline_figure(draw(found)))
-        for each, draw in DISCREPANCY_FIGURES.items()
+        for each, draw in DIAGNOSIS_FIGURES.items()
         if found.candidates or each != "ladder"
     ]
     if list_free_forms(found):

@@ -16,8 +16,8 @@ from islands.evolution.presets import resolve_settings
 from islands.export import export
 from islands.expressions.parsing import parse
 from islands.io.records.reading_options import ReadingOptions
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import PhysicalSpec, parse_spec
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import PhysicalSpec, parse_spec
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import get_published_model
 

@@ -14,6 +14,7 @@ from islands.data.dataset import Dataset
 from islands.data.split import hold_out
 from islands.diagnosis.calibration.fit_journal import FitJournal
 from islands.diagnosis.detectability import SelfTest, self_test
+from islands.diagnosis.documents.result_text import summarise_self_test
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import InterimFindings
@@ -24,12 +25,11 @@ from islands.errors import SettingsError
 from islands.facade.explain_residual import FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, REPORT_FILE, DiagnosisResult
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.result_text.diagnosis_text import summarise_self_test
 from islands.io.result_text.text_layout import wrap
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import ColumnSpec, innermost, parse_spec
 from islands.progress import Steps, StoppedError
 from islands.simulators.interface import Simulator
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import ColumnSpec, innermost, parse_spec
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder

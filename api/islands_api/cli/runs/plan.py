@@ -10,18 +10,18 @@ import typer
 
 from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
+from islands.diagnosis.documents.plan_json import plan_document
+from islands.diagnosis.documents.plan_text import plan_text
+from islands.diagnosis.documents.result_json import as_json
 from islands.diagnosis.planning.experiment_plan import DecisiveLimits, ExperimentPlan
 from islands.diagnosis.planning.planned_input import InputForm, InputLimits, PlannedInput
 from islands.errors import SettingsError, lookup
 from islands.figures.separability import draw_separability
 from islands.figures.style import save
-from islands.io.diagnosis_json import as_json
-from islands.io.plan_json import plan_document
 from islands.io.records import read_dataset
 from islands.io.records.reading_options import ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands.io.records.writer import write_input
-from islands.io.result_text.plan_text import plan_text
 from islands_api.cli.console import output
 from islands_api.cli.option_groups import group_options, make_option
 

@@ -14,7 +14,7 @@ from rich.table import Table
 from islands.io.models import narx_from_json
 from islands.io.result_text.model_table import LEGEND, MARK
 from islands.io.result_text.text_layout import term_table, wrap
-from islands.io.simulator_spec.specification import EXTENDED_FILE
+from islands.simulators.specification.table import EXTENDED_FILE
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
 
-from islands.io.simulator_spec.specification import ExtendedSpec
+from islands.simulators.specification.table import ExtendedSpec
 from islands_api.monitor_schemas import (
     MonitorPage,
     MonitorRecordPage,

@@ -9,8 +9,8 @@ from islands.diagnosis.interim_findings import InterimFindings
 from islands.diagnosis.procedure import diagnose
 from islands.facade.explain_residual import FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DiagnosisResult
-from islands.io.simulator_spec.factory import make_simulator
 from islands.parallel import ParallelMap
+from islands.simulators.specification.factory import make_simulator
 from islands_service.coordinator.diagnosis.checkpoints import DiagnosisCheckpoints
 from islands_service.coordinator.diagnosis.progress import DiagnosisProgress
 from islands_service.coordinator.heartbeat import JobCancelled

@@ -1,34 +1,26 @@
-"""Preparation of a diagnosis: checks of the record, estimation part, context and applicable effects."""
+"""Preparation of a diagnosis: checks of the record and of the tolerances, applicable effects, target."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.data.magnitudes import check_magnitudes
-from islands.data.segments import fill_gaps, is_resting, split_at_gaps
+from islands.data.segments import is_resting, split_at_gaps
+from islands.data.split import MIN_RECORDING_SAMPLES, estimation_part
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect, SimulationContext, Site
 from islands.effects.scale import wrong_parameter
 from islands.errors import RecordError, SettingsError, suggest
-from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
-
-#: Fraction of the record, at its end, that is reserved for hold-out validation.
-HOLDOUT_FRACTION = 0.25
 
 #: Minimum number of samples of a record, in all recordings together.
 MIN_SAMPLES = 200
 
 #: Families of effects on the output that are visible while the simulated output rests.
 _FAMILIES_AT_REST = ("baseline", "memory", "disturbance")
-
-#: Minimum number of samples of each of several recordings, and of each part of one that the hold-out part
-#: divides: its initial state is estimated from them.
-MIN_RECORDING_SAMPLES = 20
 
 
 def select_effects(
@@ -129,22 +121,6 @@ def validate_prior(tolerance: Mapping[str, float], simulator: Simulator) -> Mapp
     return dict(tolerance)
 
 
-def estimation_part(record: Dataset) -> Dataset:
-    """Return the part of a record that is used for estimation, without the hold-out part at its end.
-
-    The hold-out part is that of the record, or its last quarter, which may consist of whole recordings. The
-    quarter begins with a recording if less than `MIN_RECORDING_SAMPLES` would be divided from one.
-    """
-    if record.held_out:
-        return record[: -record.held_out]
-    fitted = int((1.0 - HOLDOUT_FRACTION) * record.samples)
-    for boundary, _ in record.bounds[1:]:
-        if abs(fitted - boundary) < MIN_RECORDING_SAMPLES:
-            fitted = boundary
-            break
-    return record[:fitted]
-
-
 def count_fitted_samples(record: Dataset) -> int:
     """Return the number of samples used for estimation, after checking that the record is usable.
 
@@ -195,46 +171,3 @@ def make_target(record: Dataset, fitted: int, prior_std: Mapping[str, float]) ->
     is_fitted = is_known & (np.arange(record.samples) < fitted)
     segments = split_at_gaps(is_known, record.segments)
     return Target(record.y, is_fitted, None, prior_std, segments=segments, fitted=fitted)
-
-
-def make_context(record: Dataset, simulator: Simulator, fitted: int) -> SimulationContext:
-    """Make the context of a simulation: its input, and the scales of the record.
-
-    Parameters
-    ----------
-    fitted : int
-        Number of samples used for estimation.
-
-    Raises
-    ------
-    RecordError
-        The simulation diverges on the input.
-    """
-    names, units = record.input_names, record.input_units
-    context = SimulationContext(
-        u=np.ascontiguousarray(record.u[:, 0]),
-        dt=record.dt,
-        channels={
-            name: np.ascontiguousarray(record.u[:, index]) for index, name in enumerate(names) if index
-        },
-        units=dict(zip(names[1:], units[1:], strict=True)),
-        input_peak=peak_amplitude(record.u[:, 0]),
-        output_peak=1.0,
-        input_unit=units[0] or "1",
-        output_unit=record.output_unit or "1",
-        fit_end_time=fitted * record.dt,
-        segments=record.segments,
-        measured=fill_gaps(record.y),
-    )
-    simulation = ExtendedSimulator(simulator, (), context)
-    nominal = simulation.simulate(simulation.nominal)
-    if not np.isfinite(nominal).all():
-        raise RecordError(
-            f"the simulation {simulator.name} diverges on this input: check its parameters, its units and "
-            "the sampling time"
-        )
-    peak = peak_amplitude(nominal)
-    if is_resting(nominal[:fitted]):  # it may rest at zero, while the measured output creeps
-        peak = max(float(np.max(np.abs(nominal))), peak_amplitude(record.y[~np.isnan(record.y)]))
-    scaled = replace(context, output_peak=peak)
-    return replace(scaled, force_coordinate=simulator.make_force_coordinate(scaled, nominal))

@@ -12,11 +12,12 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     evaluate_fit,
     prior_precision,
 )
-from islands.diagnosis.calibration.preparation import make_context, make_target
+from islands.diagnosis.calibration.preparation import make_target
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.gross_errors.correction import Correction
 from islands.effects.interface.effect import Signal
 from islands.errors import RecordError
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 

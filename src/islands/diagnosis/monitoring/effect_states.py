@@ -15,7 +15,6 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 from islands.diagnosis.calibration.noise_model import NoiseModel
 from islands.diagnosis.calibration.preparation import (
     MIN_SAMPLES,
-    make_context,
     make_target,
     select_effects,
     validate_prior,
@@ -28,6 +27,7 @@ from islands.effects.interface.context import Signal
 from islands.effects.interface.effect import Effect
 from islands.effects.scale import wrong_parameter
 from islands.errors import RecordError
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator, get_tolerances
 

@@ -6,19 +6,15 @@ from dataclasses import replace
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.preparation import (
-    MIN_SAMPLES,
-    estimation_part,
-    make_context,
-    make_target,
-    select_effects,
-)
+from islands.data.split import estimation_part
+from islands.diagnosis.calibration.preparation import MIN_SAMPLES, make_target, select_effects
 from islands.diagnosis.planning.channel_noise import make_white_noise
 from islands.diagnosis.planning.experiment import Experiment, MeasuredChannel
 from islands.diagnosis.planning.noise_estimate import estimate_noise
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect
 from islands.errors import RecordError, SettingsError
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.recorded_output import RecordedOutput

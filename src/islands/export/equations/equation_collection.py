@@ -24,9 +24,6 @@ from islands.export.equations.program_system import drop_force, read_system, ref
 from islands.export.equations.sampled_core import read_core, read_output_system
 from islands.expressions.primitives import EQUATION_FUNCTIONS, NEG
 from islands.expressions.tree import Apply, Constant, Expression, Primitive, Symbol, substitute
-from islands.io.simulator_spec.document import read_scales
-from islands.io.simulator_spec.spec_base import EffectSpec
-from islands.io.simulator_spec.specification import ExtendedSpec
 from islands.simulators.mapped_input import count_sampled_maps
 from islands.simulators.ode.effects import (
     LAW_STATE,
@@ -37,6 +34,9 @@ from islands.simulators.ode.effects import (
 )
 from islands.simulators.ode.system import OdeSystem
 from islands.simulators.ode.system_parts import OdeEffect
+from islands.simulators.specification.base import EffectSpec
+from islands.simulators.specification.description import read_scales
+from islands.simulators.specification.table import ExtendedSpec
 
 #: Signal that is the factor of the gain; no name in equations has brackets.
 GAIN_SIGNAL = "gain(t)"

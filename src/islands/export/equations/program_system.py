@@ -6,11 +6,11 @@ from islands.data.channel_names import parse_channel_name
 from islands.errors import ModelError
 from islands.expressions.primitives import ADD, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Symbol
-from islands.io.simulator_spec.ode_spec import OdeSpec, read_built_in
-from islands.io.simulator_spec.specification import SIMULATORS, ExtendedSpec, PhysicalSpec
 from islands.simulators.ode.equation_parser import FORCE
 from islands.simulators.ode.preparation import fill_units
 from islands.simulators.ode.system import OdeSystem
+from islands.simulators.specification.equations import OdeSpec, read_built_in
+from islands.simulators.specification.table import SIMULATORS, ExtendedSpec, PhysicalSpec
 
 
 def refuse(what: str) -> ModelError:

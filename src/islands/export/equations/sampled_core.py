@@ -10,11 +10,11 @@ from islands.export.equations.program_system import refuse
 from islands.expressions.primitives import ADD, MUL, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Symbol
 from islands.io.models import model_from_json
-from islands.io.simulator_spec.specification import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
 from islands.models.measured_signals import measured_block
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.ode.output_system import INPUT, SIMULATED, make_output_system
 from islands.simulators.ode.system import OdeSystem
+from islands.simulators.specification.table import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
 
 #: Names of the columns that a program reads besides the input: the measured and a simulated output.
 MEASURED, RECORDED = "y_measured", "simulated"

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from islands.diagnosis.detectability import SelfTest
+from islands.diagnosis.documents.extension_json import extended_document, extended_json
+from islands.diagnosis.documents.result_json import as_json, diagnosis_document
+from islands.diagnosis.documents.result_text import summarise_diagnosis
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.result import Diagnosis
 from islands.errors import ModelError, lookup
 from islands.facade.results.notebook_html import render_sentences
 from islands.facade.results.saved_simulation import SavedSimulation
-from islands.io.diagnosis_json import as_json, diagnosis_document
-from islands.io.result_text.diagnosis_text import summarise_diagnosis
-from islands.io.simulator_spec.document import extended_document, extended_json
-from islands.io.simulator_spec.specification import EXTENDED_FILE, LocalExtendedSpec
 from islands.progress import Steps
 from islands.simulation.predictors import Simulation
+from islands.simulators.specification.table import EXTENDED_FILE, LocalExtendedSpec
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,7 +114,7 @@ class DiagnosisResult(Diagnosis):
         Parameters
         ----------
         kind : str
-            A key of ``islands.figures.discrepancy.DISCREPANCY_FIGURES``: ``over-time``, ``loops``,
+            A key of ``islands.figures.diagnosis.DIAGNOSIS_FIGURES``: ``over-time``, ``loops``,
             ``residual`` or ``ladder``.
 
         Raises
@@ -122,9 +122,9 @@ class DiagnosisResult(Diagnosis):
         SettingsError
             There is no such figure.
         """
-        from islands.figures.discrepancy import DISCREPANCY_FIGURES  # noqa: PLC0415 - matplotlib
+        from islands.figures.diagnosis import DIAGNOSIS_FIGURES  # noqa: PLC0415 - matplotlib
 
-        return lookup(DISCREPANCY_FIGURES, kind, "figure")(self)
+        return lookup(DIAGNOSIS_FIGURES, kind, "figure")(self)
 
     @property
     def extension(self) -> SavedSimulation:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
 
     from islands.io.data_frames import RecordLike
-    from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
+    from islands.simulators.specification.table import LocalSpec, SimulationSpec
 
 #: Samples of a shooting interval (case 1 of the paper), unless a setting or a result states another number.
 SHOOTING = 500
@@ -71,7 +71,7 @@ def simulate(
     if interval is not None:
         raise SettingsError(f"a simulator has no mode {mode!r}: take free-run")
     # Import the simulators of the discrepancy analysis only if they are used.
-    from islands.io.simulator_spec.factory import simulate_spec  # noqa: PLC0415
+    from islands.diagnosis.calibration.record_simulation import simulate_spec  # noqa: PLC0415
 
     record = as_record(record)
     y = simulate_spec(model, record, columns)

@@ -14,10 +14,10 @@ from islands.export.closed_form import closed_form
 from islands.export.extension import export_extended
 from islands.facade.results.model_simulation import simulate
 from islands.io.data_frames import as_record
-from islands.io.simulator_spec.code_spec import FmuSpec
-from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost
 from islands.simulation.predictors import Simulation
+from islands.simulators.specification.code import FmuSpec
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.table import ColumnSpec, LocalExtendedSpec, innermost
 
 if TYPE_CHECKING:
     from islands.io.data_frames import RecordLike

@@ -10,7 +10,6 @@ from islands.estimation.estimate import estimate
 from islands.estimation.refinement import refine
 from islands.expressions.primitives import MUL, PRIMITIVES
 from islands.expressions.tree import Apply, Expression, Lagged
-from islands.io.simulator_spec.factory import make_simulator
 from islands.models.narx import Model
 from islands.models.regressor import Regressor, regressor
 from islands.performance.trials.injection.measurement import VISIBLE_FRACTION, FaultyRecord
@@ -24,6 +23,7 @@ from islands.simulation.predictors import free_run
 from islands.simulators.interface import Simulator
 from islands.simulators.narx import NarxSimulator
 from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.specification.factory import make_simulator
 
 #: Parameter constraint of the identified actuator: the output stays constant under a constant input.
 _CONSTRAINT = "hysteresis"

@@ -10,7 +10,6 @@ import scipy
 from islands.data.dataset import join
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.diagnosis.calibration.noise_model import fit_noise
-from islands.diagnosis.calibration.preparation import make_context as make_record_context
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.holdout import cross_validate_gain
 from islands.diagnosis.inference.hypothesis import Hypothesis
@@ -22,10 +21,11 @@ from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.inference.verdict import choose_reference_fit
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
-from islands.io.simulator_spec.factory import make_simulator
+from islands.simulators.context import make_context as make_record_context
 from islands.simulators.coordinates import input_coordinate, output_coordinate
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.linear import LinearSimulator
+from islands.simulators.specification.factory import make_simulator
 from support.simulated_records import made
 
 LENGTHS = (400, 300, 300)

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from islands.diagnosis.documents.result_json import as_json, diagnosis_document
+from islands.diagnosis.documents.result_text import summarise_diagnosis
 from islands.diagnosis.inference import noise_floor
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import (
@@ -22,8 +24,6 @@ from islands.diagnosis.interim_findings import (
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
-from islands.io.diagnosis_json import as_json, diagnosis_document
-from islands.io.result_text.diagnosis_text import summarise_diagnosis
 from islands.simulators.recorded_output import RecordedOutput
 from support.simulated_records import recorded, wave
 

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.data.split import HOLDOUT_FRACTION
 from islands.diagnosis import assembly as diagnosis_assembly
 from islands.diagnosis import procedure as diagnosis
 from islands.diagnosis.calibration.intersample_selection import get_discretisation
-from islands.diagnosis.calibration.preparation import HOLDOUT_FRACTION, MIN_SAMPLES
+from islands.diagnosis.calibration.preparation import MIN_SAMPLES
+from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError, SettingsError
-from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.trial import TOLERANCE
 from islands.simulators.intersample import InterSample, ResampledSimulator
@@ -124,7 +125,8 @@ def test_cause_of_little_confidence_is_unknown(monkeypatch: pytest.MonkeyPatch) 
 
 
 def _nominal(record: Dataset) -> tuple:
-    from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context
+    from islands.diagnosis.calibration.preparation import count_fitted_samples
+    from islands.simulators.context import make_context
 
     core = make_piezo()
     context = make_context(record, core, count_fitted_samples(record))

@@ -5,12 +5,12 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
+from islands.diagnosis.documents.extension_json import extended_document
 from islands.diagnosis.inference.noise_detectors import DETECTORS
 from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
-from islands.figures.discrepancy import DISCREPANCY_FIGURES
-from islands.io.simulator_spec.document import extended_document
+from islands.figures.diagnosis import DIAGNOSIS_FIGURES
 from support.simulated_records import recorded
 
 SAMPLES, DT = 400, 0.1
@@ -90,7 +90,7 @@ def test_extended_simulation_of_a_creep_test_repeats_the_creep() -> None:
 
 @pytest.mark.ci
 def test_figures_show_a_resting_record(crept: islands.DiagnosisResult) -> None:
-    assert all(draw(crept).axes for draw in DISCREPANCY_FIGURES.values())
+    assert all(draw(crept).axes for draw in DIAGNOSIS_FIGURES.values())
 
 
 def test_output_that_rests_at_a_held_input_has_lost_no_samples() -> None:

@@ -14,7 +14,7 @@ from islands.diagnosis.inference.noise_floor import noise_variance_from_periods
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.facade.explain_residual import explain_residual
-from islands.figures.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.diagnosis import DIAGNOSIS_FIGURES
 from support.simulated_records import recorded, wave
 
 RNG = np.random.default_rng(3)
@@ -83,7 +83,7 @@ def test_strength_and_gain_are_those_of_the_known_samples() -> None:
     known = ~np.isnan(found.record.y) & (np.arange(SAMPLES) >= found.estimation_samples)
     rmse = np.sqrt(np.mean((found.record.y - found.best.output)[known] ** 2))
     assert found.gain.after.rmse == pytest.approx(rmse)
-    assert all(draw(found).axes for draw in DISCREPANCY_FIGURES.values())
+    assert all(draw(found).axes for draw in DIAGNOSIS_FIGURES.values())
     assert explain_residual(found) is None
 
 

@@ -7,19 +7,16 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.preparation import (
-    MIN_RECORDING_SAMPLES,
-    count_fitted_samples,
-    estimation_part,
-)
+from islands.data.split import MIN_RECORDING_SAMPLES, estimation_part
+from islands.diagnosis.calibration.preparation import count_fitted_samples
+from islands.diagnosis.documents.extension_json import extended_document
+from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.surrogates import make_surrogates
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError
-from islands.io.diagnosis_json import diagnosis_document
-from islands.io.simulator_spec.document import extended_document
-from islands.io.simulator_spec.factory import make_simulator
+from islands.simulators.specification.factory import make_simulator
 from support.joined_oscillator import DT, SIGMA, STATES, oscillator_recordings
 
 #: Effects that are searched for in a fast test.

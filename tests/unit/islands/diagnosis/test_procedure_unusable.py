@@ -12,7 +12,7 @@ from islands.data.dataset import Dataset
 from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import IslandsError, RecordError, SettingsError
-from islands.io.simulator_spec.specification import LocalSpec, PhysicalSpec
+from islands.simulators.specification.table import LocalSpec, PhysicalSpec
 from support.simulated_records import MODEL_SPEC, PROGRAM_SPEC, recorded, wave
 
 #: Simulations whose parameters come from the record, and simulations that are given completely.

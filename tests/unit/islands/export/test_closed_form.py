@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.errors import ModelError
 from islands.export.closed_form import closed_form
-from islands.io.simulator_spec.factory import simulate_spec
-from islands.io.simulator_spec.specification import LocalExtendedSpec
 from islands.simulation.predictors import free_run
+from islands.simulators.specification.table import LocalExtendedSpec
 from support.simulated_records import DT, MODEL, wave
 
 CORES = {

@@ -12,7 +12,7 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.expressions.parsing import parse
-from islands.figures.discrepancy import DISCREPANCY_FIGURES
+from islands.figures.diagnosis import DIAGNOSIS_FIGURES
 from islands.figures.free_run import draw_free_run
 from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop
@@ -78,7 +78,7 @@ FIGURES: dict[str, "Callable[[], Figure]"] = {
         f"{name} of a diagnosis, {of[0]} samples of {of[2]:g} s": lambda draw=draw, of=of: draw(
             diagnosis(*of)
         )
-        for name, draw in DISCREPANCY_FIGURES.items()
+        for name, draw in DIAGNOSIS_FIGURES.items()
         # The spectrum of the third case has little more than one decade.
         for of in ((400, 1.0, 1e-3), (800, 12_345.0, 1e-3), (400, 1.0, 7.0))
     },
@@ -86,7 +86,7 @@ FIGURES: dict[str, "Callable[[], Figure]"] = {
 
 
 #: All figures of the diagnosis of one record. The level ci checks one of them.
-DIAGNOSED = tuple(f"{name} of a diagnosis, 400 samples of 0.001 s" for name in DISCREPANCY_FIGURES)
+DIAGNOSED = tuple(f"{name} of a diagnosis, 400 samples of 0.001 s" for name in DIAGNOSIS_FIGURES)
 
 #: Figures that are saved twice at the level ci.
 SAVED = ("a run of two segments", "a loop of two inputs", DIAGNOSED[1])

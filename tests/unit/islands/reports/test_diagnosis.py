@@ -10,10 +10,10 @@ import scipy
 import islands
 from islands.diagnosis.detectability import SelfTest, estimate_rate
 from islands.diagnosis.discovery.missing_terms import Discovery
+from islands.diagnosis.documents.result_text import summarise_diagnosis, summarise_self_test
 from islands.diagnosis.inference.finding import Value
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
-from islands.io.result_text.diagnosis_text import summarise_diagnosis, summarise_self_test
 from islands.reports.diagnosis import diagnosis_report
 
 EQUATIONS = Discovery("dx/dt = -x + a1*x**3; a1 = 0.2", ("jump",), ("cubic-stiffness",), 2.0)

@@ -10,17 +10,18 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.preparation import make_context
+from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.errors import ModelError
 from islands.expressions.tree import Symbol
-from islands.io.simulator_spec.document import describe_extension
-from islands.io.simulator_spec.factory import make_simulator, simulate_spec
-from islands.io.simulator_spec.specification import SIMULATORS, LocalExtendedSpec, PhysicalSpec
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.ode.preparation import make_ode_simulator
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.ode.system_parts import OdeEffect
+from islands.simulators.specification.description import describe_extension
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import SIMULATORS, LocalExtendedSpec, PhysicalSpec
 from islands.systems.bouc_wen import BoucWenPiezo
 from islands.systems.bouc_wen import simulate as simulate_piezo
 from support.built_in_simulators import make_oscillator, make_piezo, make_tanks

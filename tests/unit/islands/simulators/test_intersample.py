@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context
+from islands.diagnosis.calibration.preparation import count_fitted_samples
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator, resample_input

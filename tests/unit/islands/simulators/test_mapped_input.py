@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.preparation import make_context
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, Site
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator

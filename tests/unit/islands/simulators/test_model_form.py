@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
-from islands.diagnosis.calibration.preparation import make_context
+from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.documents.extension_json import extended_document
 from islands.effects.model_form import CORE_SHAPE
 from islands.expressions.parsing import parse
 from islands.io.models import model_from_json
-from islands.io.simulator_spec.document import extended_document
-from islands.io.simulator_spec.factory import simulate_spec
 from islands.models.narx import Model, make_model
 from islands.performance.trials.cases import CASES
 from islands.performance.trials.injection.measurement import FaultyRecord, inject
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.model_form import SLOPE
 from islands.simulators.narx import NarxSimulator

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.preparation import make_context
 from islands.effects.interface.effect import Signal
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import SimulationRun
 from islands.simulators.ode.system import OUTPUT

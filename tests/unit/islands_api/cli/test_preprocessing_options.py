@@ -5,11 +5,11 @@ import pytest
 
 import islands
 from islands.data.signal_map import match_rate
-from islands.diagnosis.calibration.preparation import make_context
 from islands.expressions.parsing import parse
-from islands.io.simulator_spec.factory import make_simulator
 from islands.models.narx import make_model
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.specification.factory import make_simulator
 from support.command_line import fail, stored, succeed
 from support.exported_programs import run_c
 from support.undrawn import undrawn_figures

@@ -10,6 +10,14 @@ from typing import Annotated, Any
 import typer
 
 from islands.data.dataset import Dataset
+from islands.diagnosis.documents.monitor_json import monitor_json
+from islands.diagnosis.documents.monitor_state import (
+    RejectedRecord,
+    SavedMonitor,
+    read_monitor,
+    write_monitor,
+)
+from islands.diagnosis.documents.monitor_text import describe_alarm_text, describe_last_record
 from islands.diagnosis.monitoring.alarm_rate import DEFAULT_RATE
 from islands.diagnosis.monitoring.record_follower import TRAINING
 from islands.errors import IslandsError, SettingsError
@@ -21,17 +29,9 @@ from islands.facade.record_monitor import (
 )
 from islands.figures.monitored_states import draw_monitored_states
 from islands.figures.style import save
-from islands.io.checkpoints.monitor_document import monitor_json
-from islands.io.checkpoints.monitor_state import (
-    RejectedRecord,
-    SavedMonitor,
-    read_monitor,
-    write_monitor,
-)
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.result_text.monitor_text import describe_alarm_text, describe_last_record
-from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import ColumnSpec, ExtendedSpec, LocalSpec, innermost
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.table import ColumnSpec, ExtendedSpec, LocalSpec, innermost
 from islands_api.cli import options
 from islands_api.cli.commands.monitoring.watched_folder import WatchedFolder, find_time, hash_file
 from islands_api.cli.console import compile_kernels, errors, output

@@ -11,7 +11,6 @@ import pytest
 
 from islands.diagnosis.calibration.fit_journal import FitJournal, RecordedFit, journal_from_document
 from islands.diagnosis.calibration.noise_model import NoiseModel
-from islands.diagnosis.calibration.preparation import make_context
 from islands.diagnosis.calibration.starts_calibrator import (
     CalibratedStart,
     CalibrationTask,
@@ -19,6 +18,7 @@ from islands.diagnosis.calibration.starts_calibrator import (
 )
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import CATALOGUE
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from support.simulated_records import recorded, wave

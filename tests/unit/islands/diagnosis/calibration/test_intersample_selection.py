@@ -12,8 +12,9 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     calibrate,
     evaluate_fit,
 )
-from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context
+from islands.diagnosis.calibration.preparation import count_fitted_samples
 from islands.diagnosis.calibration.target import Target
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator

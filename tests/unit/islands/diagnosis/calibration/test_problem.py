@@ -5,13 +5,13 @@ import pytest
 
 from islands.diagnosis.calibration import levenberg_marquardt
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, minimise
-from islands.diagnosis.calibration.preparation import make_context
 from islands.diagnosis.calibration.problem import CalibrationProblem, simulate_together
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import CATALOGUE
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import PhysicalSpec
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import PhysicalSpec
 from support.simulated_records import recorded, wave
 
 SPRING = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import islands
+from islands.diagnosis.calibration.record_simulation import simulate_spec
+from islands.diagnosis.documents.extension_json import extended_document
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.filters import low_pass
 from islands.effects.free_forms import FREE_FORMS
 from islands.effects.interface.context import SimulationContext
 from islands.figures.form_values import draw_free_forms
-from islands.io.simulator_spec.document import extended_document
-from islands.io.simulator_spec.factory import simulate_spec
 from islands.kernels.curve import PLACES
 from islands.performance.trials.trial import Trial, run_trial
 from islands.simulators.extended import ExtendedSimulator

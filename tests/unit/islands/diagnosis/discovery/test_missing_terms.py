@@ -12,26 +12,28 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
-from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, make_target
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
+from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.discovery.candidate_terms import (
     MAX_MULTIPLIED_SIGNALS,
     find_free_numbers,
     list_candidate_terms,
 )
 from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
+from islands.diagnosis.documents.extension_json import extended_json
+from islands.diagnosis.documents.result_json import diagnosis_document
+from islands.diagnosis.documents.result_text import summarise_diagnosis
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.export.fmu.compiler import find_compiler
-from islands.io.diagnosis_json import diagnosis_document
-from islands.io.result_text.diagnosis_text import summarise_diagnosis
-from islands.io.simulator_spec.document import extended_json
-from islands.io.simulator_spec.factory import make_simulator, simulate_spec
-from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import LocalExtendedSpec
 from islands.reports.diagnosis import diagnosis_report
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import LocalExtendedSpec
 from support.equation_programs import run_c
 
 DT = 0.01

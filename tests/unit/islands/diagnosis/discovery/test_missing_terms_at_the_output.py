@@ -10,18 +10,18 @@ import scipy
 
 import islands
 from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.record_simulation import simulate_spec
+from islands.diagnosis.documents.extension_json import extended_json
+from islands.diagnosis.documents.result_text import summarise_diagnosis
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Signal
 from islands.export.extension import export_extended
-from islands.io.result_text.diagnosis_text import summarise_diagnosis
-from islands.io.simulator_spec.document import extended_json
-from islands.io.simulator_spec.factory import simulate_spec
-from islands.io.simulator_spec.specification import LocalExtendedSpec
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.specification.table import LocalExtendedSpec
 
 DT = 0.01
 

@@ -11,9 +11,9 @@ from islands.diagnosis.gross_errors.channel_corrections import correct_swapped_c
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.factory import make_simulator
 from support.simulated_records import wave
 
 DT, SAMPLES = 1.0, 500

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.errors import RecordError
-from islands.figures.discrepancy import DISCREPANCY_FIGURES
-from islands.io.diagnosis_json import as_json, diagnosis_document
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import PhysicalSpec
+from islands.figures.diagnosis import DIAGNOSIS_FIGURES
 from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import PhysicalSpec
 from support.simulated_records import DT, recorded, simulate_oscillator, wave
 
 TOLERANCE = {"m": 0.02, "c": 0.05, "k": 0.02}
@@ -175,6 +175,6 @@ def test_corrected_simulation_is_shown_in_the_unit_of_the_record() -> None:
     residual = found.record.y - found.best.output
     assert np.std(residual) == pytest.approx(2.0, rel=0.1)
     assert found.noise_floor == pytest.approx(2.0, rel=0.1)
-    labels = [line.get_label() for line in DISCREPANCY_FIGURES["over-time"](found).axes[0].lines]
+    labels = [line.get_label() for line in DIAGNOSIS_FIGURES["over-time"](found).axes[0].lines]
     assert "corrected" in labels
     assert '"gross error"' in as_json(diagnosis_document(found))

@@ -5,13 +5,13 @@ import pytest
 from numpy.typing import NDArray
 
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
-from islands.diagnosis.calibration.preparation import make_context
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.confounders import Confounder, find_confounder
 from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.kernels.memory_operators import play_from, slider
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.linear import LinearSimulator

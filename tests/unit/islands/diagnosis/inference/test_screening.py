@@ -5,9 +5,9 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import evaluate_fit
-from islands.diagnosis.calibration.preparation import make_context
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.linear import LinearSimulator
 

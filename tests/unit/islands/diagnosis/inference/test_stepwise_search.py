@@ -15,7 +15,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     evaluate_fit,
     whiten_target,
 )
-from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.diagnosis.calibration.preparation import count_fitted_samples, select_effects
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.hypothesis import Hypothesis, without_effect
 from islands.diagnosis.inference.screening import SCORE_TIE, screen_effects
@@ -23,6 +23,7 @@ from islands.diagnosis.inference.stepwise_search import MIN_GAIN, refine_by_swap
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator

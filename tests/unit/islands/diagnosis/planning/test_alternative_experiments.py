@@ -12,7 +12,7 @@ from islands.diagnosis.planning.alternative_experiments import (
 from islands.diagnosis.planning.experiment_setup import make_experiment
 from islands.diagnosis.planning.pair_separation import CausePair, separate_pairs
 from islands.diagnosis.planning.planned_input import InputLimits
-from islands.io.simulator_spec.factory import make_simulator
+from islands.simulators.specification.factory import make_simulator
 from support.planned import (
     amplifier_experiment,
     coloured_noise,

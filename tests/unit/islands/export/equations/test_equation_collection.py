@@ -5,7 +5,7 @@ import pytest
 from islands.errors import ModelError, SettingsError
 from islands.export.equations.equation_collection import collect_equations
 from islands.export.extension import EXTENDED_EXPORTS, export_extended
-from islands.io.simulator_spec.specification import LocalExtendedSpec
+from islands.simulators.specification.table import LocalExtendedSpec
 from support.simulated_records import DT, MODEL
 
 PIEZO = {"kind": "bouc-wen-piezo"}

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from islands.diagnosis.calibration.preparation import make_context
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError
 from islands.export.extension import export_extended
 from islands.export.fmu.compiler import find_compiler
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import ColumnSpec, LinearSpec, ModelSpec
+from islands.simulators.context import make_context
 from islands.simulators.ode.output_system import make_output_system
 from islands.simulators.output_equation import OutputEquation, add_output_equation
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import ColumnSpec, LinearSpec, ModelSpec
 from support.equation_programs import OCTAVE, compare, extend, list_effects, run_c, run_matlab
 from support.simulated_records import MODEL_SPEC, recorded, wave
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.diagnosis.calibration.preparation import count_fitted_samples, select_effects
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.performance.trials.cases import CASES, identify_actuator
@@ -13,6 +13,7 @@ from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.injection.piezo import PIEZO
 from islands.performance.trials.oracle import compute_gain_share
 from islands.simulation.predictors import free_run
+from islands.simulators.context import make_context
 
 
 @pytest.mark.parametrize("name", CASES)

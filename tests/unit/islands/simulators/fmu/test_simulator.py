@@ -12,20 +12,21 @@ from numpy.typing import NDArray
 
 import islands
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.preparation import make_context
+from islands.diagnosis.calibration.record_simulation import simulate_spec
+from islands.diagnosis.documents.extension_json import extended_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.errors import RecordError
 from islands.export import write_export
 from islands.export.fmu.compiler import find_compiler
 from islands.io.models import model_from_json
-from islands.io.simulator_spec.code_spec import FmuSpec
-from islands.io.simulator_spec.document import extended_document
-from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.models.narx import Model
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.fmu.simulator import FmuSimulator
 from islands.simulators.interface import Simulator, get_tolerances
+from islands.simulators.specification.code import FmuSpec
+from islands.simulators.specification.factory import make_simulator
 from support.oscillator_fmus import write_oscillator
 from support.simulated_records import DT, EQUATIONS, FMUS, MODEL, recorded, simulate_oscillator, wave
 

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 import islands
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
-from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, make_target
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
+from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
+from islands.diagnosis.documents.extension_json import extended_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
@@ -22,14 +24,14 @@ from islands.effects.interface.force import ForceLaw
 from islands.errors import ModelError
 from islands.export.closed_form import closed_form
 from islands.export.fmu.compiler import find_compiler
-from islands.io.simulator_spec.code_spec import FmuSpec
-from islands.io.simulator_spec.document import extended_document
-from islands.io.simulator_spec.factory import make_simulator, simulate_spec
-from islands.io.simulator_spec.ode_spec import OdeSpec
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.fmu.fmi_description import FmiVariable, read_description
 from islands.simulators.fmu.model import choose_variables
 from islands.simulators.fmu.system import make_fmu_system
+from islands.simulators.specification.code import FmuSpec
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.factory import make_simulator
 from support.oscillator_fmus import write_oscillator
 from support.simulated_records import FMUS, recorded, wave
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.diagnosis.calibration.preparation import make_context
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, ForceLaw
 from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import PhysicalSpec
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import PhysicalSpec
 from support.simulated_records import recorded, wave
 
 LAWS = [

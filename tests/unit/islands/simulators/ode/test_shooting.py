@@ -8,12 +8,12 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.preparation import make_context
 from islands.effects.catalogue import CATALOGUE
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import PhysicalSpec
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import PhysicalSpec
 from support.simulated_records import made, recorded, simulate_oscillator, wave
 
 EFFECTS = {

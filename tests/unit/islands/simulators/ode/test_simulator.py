@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 import islands
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.preparation import make_context
 from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError, RecordError, SettingsError
-from islands.io.simulator_spec.document import describe_extension
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import parse_spec
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import BatchSimulator, SimulationRun, Simulator, get_tolerances
 from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.specification.description import describe_extension
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import parse_spec
 from support.repository import DOCS
 from support.simulated_records import EQUATIONS, recorded, wave
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.preparation import make_context
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Signal
 from islands.errors import IslandsError
-from islands.io.simulator_spec.factory import make_simulator
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.specification.factory import make_simulator
 from support.simulated_records import EQUATIONS, wave
 
 SAMPLES = 400

@@ -8,10 +8,10 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.fit_journal import FitJournal
+from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.inference.screening import StartFinder
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE
-from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.parallel import ParallelMap
 from islands.simulators.recorded_output import RecordedOutput
 from islands_api.cli.runs.diagnosis_fits import CONTINUE, FITS, explain_continuation, keep_fits, write_fits

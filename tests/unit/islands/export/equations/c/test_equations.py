@@ -17,12 +17,12 @@ from islands.export.equations.equation_collection import CHANNEL_OPERATORS
 from islands.export.equations.matlab.operators import MATLAB_OPERATORS
 from islands.export.extension import export_extended
 from islands.export.fmu.compiler import find_compiler
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import LocalExtendedSpec
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.ode.system import OUTPUT
 from islands.simulators.ode.system_parts import OdeParameter
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import LocalExtendedSpec
 from support.equation_programs import compare, extend, fix_states, list_effects, run_c
 from support.simulated_records import EQUATIONS, made, recorded, wave
 

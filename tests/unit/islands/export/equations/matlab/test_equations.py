@@ -9,9 +9,9 @@ from islands.data.dataset import Dataset
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Site
 from islands.export.extension import export_extended
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.ode_spec import OdeSpec
 from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.factory import make_simulator
 from support.equation_programs import OCTAVE, compare, extend, list_effects, run_matlab
 from support.simulated_records import EQUATIONS, made, recorded, wave
 

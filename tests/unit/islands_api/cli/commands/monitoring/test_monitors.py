@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
+from islands.diagnosis.documents.monitor_json import monitor_document
+from islands.diagnosis.documents.monitor_state import monitor_to_json
 from islands.facade.record_monitor import reject_record
-from islands.io.checkpoints.monitor_document import monitor_document
-from islands.io.checkpoints.monitor_state import monitor_to_json
 from islands_api.cli.commands.monitoring.watched_folder import hash_file
 from islands_api.cli.service import client_options
 from islands_api.web.auth import LOCAL_OWNER

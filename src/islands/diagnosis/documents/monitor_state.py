@@ -14,7 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 from islands.diagnosis.monitoring.record_follower import MonitoredRecord, MonitorState
 from islands.errors import SettingsError
 from islands.io.checkpoints.writing import replace_file
-from islands.io.simulator_spec.specification import LocalSpec
+from islands.simulators.specification.table import LocalSpec
 
 SCHEMA = "islands.monitor-state/1"
 

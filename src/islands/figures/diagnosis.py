@@ -295,6 +295,6 @@ def _draw_autocorrelation(axes: Axes, diagnosis: Diagnosis) -> None:
 
 
 #: Figures by name, in the order of a report.
-DISCREPANCY_FIGURES: Mapping[str, Callable[[Diagnosis], Figure]] = MappingProxyType(
+DIAGNOSIS_FIGURES: Mapping[str, Callable[[Diagnosis], Figure]] = MappingProxyType(
     {"over-time": draw_over_time, "loops": draw_loops, "residual": draw_residual, "ladder": draw_screening}
 )

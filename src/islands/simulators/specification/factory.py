@@ -8,40 +8,21 @@ from pkgutil import resolve_name
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset, same_dt
 from islands.data.magnitudes import check_magnitudes
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.data.segments import fill_gaps
-from islands.diagnosis.calibration.levenberg_marquardt import calibrate
-from islands.diagnosis.calibration.preparation import estimation_part, make_context, make_target
+from islands.data.split import estimation_part
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
 from islands.errors import ModelError, RecordError, SettingsError, lookup, suggest
 from islands.io.models import model_from_json
-from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
-from islands.io.simulator_spec.document import read_scales
-from islands.io.simulator_spec.ode_spec import OdeSpec, read_built_in
-from islands.io.simulator_spec.spec_base import ParameterRange, SimulatorEntry
-from islands.io.simulator_spec.specification import (
-    SIMULATORS,
-    ColumnSpec,
-    ExtendedSpec,
-    LinearSpec,
-    LocalExtendedSpec,
-    LocalSpec,
-    ModelSpec,
-    PhysicalSpec,
-    SimulationSpec,
-    parse_spec,
-)
 from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, measured_model
 from islands.models.parametric import ParametricModel
 from islands.models.signal_statement import describe_values
-from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.fmu.simulator import make_fmu_simulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
@@ -54,6 +35,21 @@ from islands.simulators.parametric import ParametricSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.saved_extension import SavedExtension
+from islands.simulators.specification.base import ParameterRange, SimulatorEntry
+from islands.simulators.specification.code import FmuSpec, ProgramSpec
+from islands.simulators.specification.description import read_scales
+from islands.simulators.specification.equations import OdeSpec, read_built_in
+from islands.simulators.specification.table import (
+    SIMULATORS,
+    ColumnSpec,
+    ExtendedSpec,
+    LinearSpec,
+    LocalSpec,
+    ModelSpec,
+    PhysicalSpec,
+    SimulationSpec,
+    parse_spec,
+)
 
 #: Smallest number of samples from which parameters and the initial state are estimated.
 MIN_SAMPLES = 20
@@ -97,41 +93,6 @@ def make_simulator(
             _check_estimable(record)
     simulator: Simulator = resolve_name(entry.factory)(spec, record, columns or {})
     return simulator
-
-
-def simulate_spec(
-    spec: str | Mapping[str, Any] | SimulationSpec | LocalSpec,
-    record: Dataset,
-    columns: Mapping[str, Any] | None = None,
-) -> NDArray[np.float64]:
-    """Simulate the output of a record; an extended simulation can be given as its document.
-
-    Initial states are fitted to the measured output of the record.
-
-    Returns
-    -------
-    ndarray, shape (samples,)
-
-    Raises
-    ------
-    RecordError
-        The columns or units of the record are not those of the extended simulation.
-    """
-    if isinstance(spec, Mapping):
-        spec = LocalExtendedSpec.model_validate(spec)
-    if isinstance(spec, ExtendedSpec):
-        record = match_record(ColumnReference(spec.inputs, spec.output), record, "the extended simulation")
-    simulator = make_simulator(spec, record, columns)
-    alone = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
-    is_state = np.array([parameter.initial for parameter in alone.parameters], dtype=bool)
-    if not is_state.any():
-        return alone.simulate(alone.nominal)
-    # Initial states belong to this record. All other parameters keep their values. With friction there are
-    # several minima; the nominal states may be those of another record, which was not at rest.
-    target = make_target(record, record.samples, {})
-    resting = np.clip(np.where(is_state, 0.0, alone.nominal), *alone.bounds)
-    fits = [calibrate(alone, target, start, is_fixed=~is_state) for start in (alone.nominal, resting)]
-    return min(fits, key=lambda fit: np.nan_to_num(fit.mean_square, nan=np.inf)).output
 
 
 def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:

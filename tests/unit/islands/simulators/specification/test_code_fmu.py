@@ -6,9 +6,9 @@ import pytest
 
 from islands.errors import SettingsError
 from islands.export.fmu.compiler import find_compiler
-from islands.io.simulator_spec.code_spec import FmuParameterSpec, FmuSpec
-from islands.io.simulator_spec.specification import parse_spec
 from islands.simulators.fmu.system import make_fmu_system
+from islands.simulators.specification.code import FmuParameterSpec, FmuSpec
+from islands.simulators.specification.table import parse_spec
 from support.simulated_records import write_fmu
 
 

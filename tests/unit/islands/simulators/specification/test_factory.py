@@ -9,16 +9,17 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.data.preprocessing import preprocess
-from islands.diagnosis.calibration.preparation import make_context
+from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.errors import RecordError
 from islands.expressions.parsing import parse
 from islands.io.models import model_json
-from islands.io.simulator_spec.factory import make_simulator, simulate_spec
-from islands.io.simulator_spec.ode_spec import OdeSpec
-from islands.io.simulator_spec.specification import ModelSpec
 from islands.models.narx import make_model
 from islands.simulation.predictors import free_run
+from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import ModelSpec
 
 DT = 0.01
 

@@ -11,7 +11,6 @@ from pydantic import BeforeValidator, Field, FiniteFloat, ValidationInfo, model_
 from pydantic_core import PydanticCustomError
 
 from islands.errors import ModelError, SettingsError
-from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
 from islands.simulators.ode.equation_parser import MAX_CHARACTERS
 from islands.simulators.ode.output_system import make_output_system
 from islands.simulators.ode.system import OdeSystem
@@ -22,6 +21,7 @@ from islands.simulators.ode.system_document import (
     describe_system,
     make_system,
 )
+from islands.simulators.specification.base import SimulatorSpec, SpecModel
 
 _Name = Annotated[str, Field(min_length=1, max_length=100)]
 _Unit = Annotated[str, Field(max_length=50)]

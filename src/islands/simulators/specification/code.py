@@ -13,14 +13,14 @@ from urllib.parse import parse_qsl
 from pydantic import BeforeValidator, Field, FiniteFloat
 
 from islands.errors import SettingsError
-from islands.io.simulator_spec.ode_spec import OdeForceSpec, OdeParameterSpec
-from islands.io.simulator_spec.spec_base import SimulatorSpec, SpecModel
 from islands.simulators.fmu.fmi_description import read_description
 from islands.simulators.fmu.model import FmuModel, FmuParameterChoice, choose_variables
 from islands.simulators.fmu.system import make_fmu_system, render_extension
 from islands.simulators.ode.equation_parser import MAX_CHARACTERS
 from islands.simulators.ode.system import OdeSystem
 from islands.simulators.ode.system_document import MAX_PARAMETERS, describe_system, make_force, make_parameter
+from islands.simulators.specification.base import SimulatorSpec, SpecModel
+from islands.simulators.specification.equations import OdeForceSpec, OdeParameterSpec
 
 _Name = Annotated[str, Field(min_length=1, max_length=500)]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.figures.discrepancy import DISCREPANCY_FIGURES, draw_residual, draw_screening
+from islands.figures.diagnosis import DIAGNOSIS_FIGURES, draw_residual, draw_screening
 from islands.figures.style import save
 
 pytestmark = pytest.mark.usefixtures("without_layout")
@@ -41,7 +41,7 @@ def residual_figure():
 def figures_of_long_record():
     """Return the figures of a diagnosis of a figures_of_long_record record, by name."""
     found = diagnosis(samples=6000)
-    return {name: draw(found) for name, draw in DISCREPANCY_FIGURES.items()}
+    return {name: draw(found) for name, draw in DIAGNOSIS_FIGURES.items()}
 
 
 def test_residual_figure_has_a_panel_per_signal() -> None:
@@ -73,12 +73,12 @@ def divide(samples: int, boundary: int):
 def test_lines_are_interrupted_between_recordings() -> None:
     divided = divide(900, 600)
     for name, panels in (("over-time", 2), ("loops", 2)):
-        axes = DISCREPANCY_FIGURES[name](divided).axes
+        axes = DIAGNOSIS_FIGURES[name](divided).axes
         assert len(axes) == panels
         for line in [line for panel in axes for line in panel.lines if len(line.get_xdata()) > 2]:
             assert np.flatnonzero(np.isnan(line.get_xdata() + line.get_ydata())).size == 1
     # One boundary in each panel over time.
-    shown = DISCREPANCY_FIGURES["over-time"](divided).axes
+    shown = DIAGNOSIS_FIGURES["over-time"](divided).axes
     assert [line.get_xdata()[0] for panel in shown for line in panel.lines if len(line.get_xdata()) == 2] == [
         pytest.approx(599.5 * DT)
     ] * 2
@@ -132,13 +132,13 @@ def test_long_record_is_shown_completely_and_in_a_section() -> None:
     whole, part = (np.ptp(shown[place].get_xlim()) for place in (0, 2))
     assert len(shown) == 4
     assert part < whole / 4
-    assert len(DISCREPANCY_FIGURES["over-time"](diagnosis()).axes) == 2
+    assert len(DIAGNOSIS_FIGURES["over-time"](diagnosis()).axes) == 2
 
 
 def test_diagnosis_without_effects_has_no_lines_after_extension() -> None:
     clean = diagnosis(friction=0.0)
     assert clean.best is clean.base
-    for draw in DISCREPANCY_FIGURES.values():
+    for draw in DIAGNOSIS_FIGURES.values():
         texts = {text.get_text() for panel in draw(clean).axes for text in _legend(panel)}
         assert not texts & {"before", "after", "extended"}
 
@@ -153,7 +153,7 @@ def test_screening_figure_colours_the_named_effects() -> None:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("name", DISCREPANCY_FIGURES)
+@pytest.mark.parametrize("name", DIAGNOSIS_FIGURES)
 def test_figure_files_are_smaller_than_300_kilobytes(name: str, tmp_path) -> None:
     path = tmp_path / "figure.svg"
     save(figures_of_long_record()[name], path)

@@ -1,7 +1,7 @@
 """Specifications of simulators: text on the command line, JSON over REST, and the table of all simulators.
 
-This module checks specifications and does not import the kernels; `islands.io.simulator_spec.factory` makes
-simulators. To add a simulator, write its class and add an entry to `SIMULATORS`.
+This module checks specifications and does not import the kernels; `islands.simulators.specification.factory`
+makes simulators. To add a simulator, write its class and add an entry to `SIMULATORS`.
 """
 
 from collections.abc import Mapping
@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
+from islands.document_problems import find_problem
 from islands.errors import ModelError, SettingsError, lookup
-from islands.io.document_problems import find_problem
-from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
-from islands.io.simulator_spec.ode_spec import OdeSpec, OutputEquationSpec
-from islands.io.simulator_spec.spec_base import (
+from islands.simulators.ode.system_document import MAX_STATES, MAX_STEPS
+from islands.simulators.specification.base import (
     EffectSpec,
     ParameterRange,
     ScalesSpec,
@@ -24,7 +23,8 @@ from islands.io.simulator_spec.spec_base import (
     SpecModel,
     read_object,
 )
-from islands.simulators.ode.system_document import MAX_STATES, MAX_STEPS
+from islands.simulators.specification.code import FmuSpec, ProgramSpec
+from islands.simulators.specification.equations import OdeSpec, OutputEquationSpec
 
 #: Name of the file of an extended simulation in the folder of a diagnosis.
 EXTENDED_FILE = "extended.json"
@@ -133,7 +133,7 @@ class LocalExtendedSpec(ExtendedSpec):
 
 
 _ESTIMATORS = "islands.simulators.built_in_estimates"
-_FACTORY = "islands.io.simulator_spec.factory"
+_FACTORY = "islands.simulators.specification.factory"
 
 _ENTRIES = (
     SimulatorEntry(

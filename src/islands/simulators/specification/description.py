@@ -1,29 +1,11 @@
-"""Extended simulations as documents: ``extended.json``, which can be used as a simulation."""
+"""Specifications of simulators with given values, and of extended simulators."""
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
 
-import numpy as np
-
-from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
-from islands.effects import model_form
 from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
-from islands.effects.interface.effect import Effect, Site
+from islands.effects.interface.effect import Effect
 from islands.io.models import model_json
-from islands.io.simulator_spec.code_spec import FmuSpec, ProgramSpec
-from islands.io.simulator_spec.ode_spec import OdeSpec, OutputEquationSpec
-from islands.io.simulator_spec.spec_base import EffectSpec, FrameSpec, ScalesSpec, ValueSpec
-from islands.io.simulator_spec.specification import (
-    ColumnSpec,
-    LinearSpec,
-    LocalExtendedSpec,
-    LocalSpec,
-    ModelSpec,
-    PhysicalSpec,
-)
-from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.fmu.simulator import FmuSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
@@ -35,47 +17,17 @@ from islands.simulators.parametric import ParametricSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.saved_extension import SavedExtension
-
-
-def extended_json(fit: CalibrationResult, record: Dataset) -> str:
-    """Return ``extended.json``: a simulator with its effects and the values of both."""
-    return json.dumps(extended_document(fit, record), indent=2, allow_nan=False) + "\n"
-
-
-def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]:
-    """Return a simulator with its effects and the values of both as a JSON document.
-
-    Wrong parameters are corrected and missing terms of a model are added to it, so that they are no longer
-    effects.
-    """
-    simulation, values = fit.simulation, fit.values.copy()
-    names = [parameter.name for parameter in simulation.simulator.parameters]
-    for effect in simulation.effects:
-        if effect.site == Site.PARAMETER:
-            index = names.index(effect.name.partition(":")[2])
-            values[index] *= 1.0 + values[simulation.get_slice(effect)][0]
-    parts = [(effect, _get_own_slice(simulation, effect)) for effect in simulation.effects]
-    shape = {
-        parameter.name: float(value)
-        for effect, part in parts
-        if effect.name == model_form.CORE_SHAPE
-        for parameter, value in zip(simulation.parameters[part], values[part], strict=True)
-    }
-    found = [
-        _make_effect_spec(effect, simulation.parameters[part], values[part])
-        for effect, part in parts
-        if effect.site != Site.PARAMETER and effect.name != model_form.CORE_SHAPE
-    ]
-    signals = (record.input_names, record.output_name)
-    return _make_extended_spec(
-        simulation.simulator, values[: len(names)], found, simulation.context, *signals, shape
-    ).model_dump(mode="json", by_alias=True)
-
-
-def _get_own_slice(simulation: ExtendedSimulator, effect: Effect) -> slice:
-    """Return the slice of an effect without its last values, the initial states of further recordings."""
-    part = simulation.get_slice(effect)
-    return slice(part.start, part.stop - int(np.count_nonzero(simulation.is_copy[part])))
+from islands.simulators.specification.base import EffectSpec, FrameSpec, ScalesSpec, ValueSpec
+from islands.simulators.specification.code import FmuSpec, ProgramSpec
+from islands.simulators.specification.equations import OdeSpec, OutputEquationSpec
+from islands.simulators.specification.table import (
+    ColumnSpec,
+    LinearSpec,
+    LocalExtendedSpec,
+    LocalSpec,
+    ModelSpec,
+    PhysicalSpec,
+)
 
 
 def describe_extension(
@@ -109,9 +61,9 @@ def describe_extension(
             found = []
             for effect in simulator.added:
                 parameters = effect.parameters(simulator.scales)
-                found.append(_make_effect_spec(effect, parameters, values[start : start + len(parameters)]))
+                found.append(make_effect_spec(effect, parameters, values[start : start + len(parameters)]))
                 start += len(parameters)
-            return _make_extended_spec(
+            return make_extended_spec(
                 simulator.simulator, values[:inner_size], found, simulator.scales, inputs, output, shape
             )
         case NarxSimulator():
@@ -146,7 +98,7 @@ def describe_extension(
     raise AssertionError(simulator)
 
 
-def _make_extended_spec(
+def make_extended_spec(
     simulator: Simulator,
     values: Signal,
     effects: Sequence[EffectSpec],
@@ -155,6 +107,7 @@ def _make_extended_spec(
     output: str,
     shape: Mapping[str, float] | None = None,
 ) -> LocalExtendedSpec:
+    """Return the specification of a simulator with effects; the arguments as of `describe_extension`."""
     intersample, oversampling, inner = InterSample.FOH, 1, simulator
     if isinstance(simulator, ResampledSimulator):
         intersample, oversampling = simulator.intersample, simulator.oversampling
@@ -247,7 +200,8 @@ def _make_frame_spec(coordinate: ForceCoordinate) -> FrameSpec:
     )
 
 
-def _make_effect_spec(effect: Effect, parameters: Sequence[Parameter], values: Signal) -> EffectSpec:
+def make_effect_spec(effect: Effect, parameters: Sequence[Parameter], values: Signal) -> EffectSpec:
+    """Return the specification of an effect with the values of its parameters."""
     return EffectSpec(
         name=effect.name,
         site=str(effect.site),

@@ -9,25 +9,28 @@ from pydantic import ValidationError
 
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
-from islands.diagnosis.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.diagnosis.calibration.preparation import count_fitted_samples, select_effects
+from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.documents.extension_json import extended_document, extended_json
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE, catalogue_order
 from islands.effects.interface.effect import Effect
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.export.extension import as_json
-from islands.io.simulator_spec.document import describe_extension, extended_document, extended_json
-from islands.io.simulator_spec.factory import make_simulator, simulate_spec
-from islands.io.simulator_spec.specification import (
+from islands.simulators.context import make_context
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.saved_extension import SavedExtension
+from islands.simulators.specification.description import describe_extension
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import (
     LocalExtendedSpec,
     ModelSpec,
     PhysicalSpec,
     innermost,
     parse_spec,
 )
-from islands.simulators.extended import ExtendedSimulator
-from islands.simulators.ode.simulator import OdeSimulator
-from islands.simulators.saved_extension import SavedExtension
 from support.simulated_records import SpecAndRecord, made, names
 
 NAMES = names()

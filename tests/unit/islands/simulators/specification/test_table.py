@@ -8,8 +8,8 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from islands.errors import SettingsError
-from islands.io.simulator_spec.spec_base import SimulatorEntry
-from islands.io.simulator_spec.specification import (
+from islands.simulators.specification.base import SimulatorEntry
+from islands.simulators.specification.table import (
     SIMULATORS,
     ExtendedSpec,
     LocalExtendedSpec,

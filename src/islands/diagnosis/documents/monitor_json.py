@@ -3,9 +3,9 @@
 import json
 from typing import Any
 
+from islands.diagnosis.documents.monitor_state import SavedMonitor
+from islands.diagnosis.documents.monitor_text import describe_change
 from islands.diagnosis.monitoring.record_follower import Alarm, MonitoredRecord, MonitorState
-from islands.io.checkpoints.monitor_state import SavedMonitor
-from islands.io.result_text.monitor_text import describe_change
 
 SCHEMA = "islands.monitor/1"
 

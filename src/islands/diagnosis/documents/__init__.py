@@ -1,0 +1,1 @@
+"""Results of a diagnosis, plans and states of monitoring as JSON, and as text for readers."""

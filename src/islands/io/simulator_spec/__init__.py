@@ -1,1 +1,0 @@
-"""Specifications of simulators: table, factory, extended simulations as JSON. Read `specification` first."""

@@ -1,0 +1,1 @@
+"""Specifications of simulators: table, factory, extended simulations as JSON. Read `table` first."""
