@@ -12,7 +12,6 @@ from islands.diagnosis.planning.experiment_setup import make_experiment
 from islands.diagnosis.procedure import diagnose
 from islands.effects.interface.effect import Effect
 from islands.performance.trials.injection.noise import NOISES
-from islands.simulators.interface import get_tolerances
 from islands.simulators.specification.factory import make_simulator
 from islands.systems.signals import sines
 
@@ -113,7 +112,7 @@ def make_plans(planned: Planned, kind: str) -> NoisePlans:
     """Measure noise in one record without a cause, and make the experiments of its plans."""
     record = Dataset(u=planned.u, y=np.full(planned.u.size, np.nan), dt=planned.dt)
     simulator = make_simulator(planned.spec, record)
-    prior_std = get_tolerances(simulator)
+    prior_std = simulator.tolerances
     simulation = make_model(make_experiment(record, simulator, 1.0, prior_std)[0]).output
     clean = simulation.simulate(simulation.nominal)
     size = planned.noise * float(np.std(clean))

@@ -31,7 +31,6 @@ from islands.diagnosis.planning.response_dictionary import ResponseDictionary
 from islands.diagnosis.planning.separation import require_detection
 from islands.diagnosis.procedure import diagnose
 from islands.performance.trials.injection.noise import NOISES
-from islands.simulators.interface import get_tolerances
 from islands.simulators.specification.factory import make_simulator
 
 #: Number of records of each cause.
@@ -143,7 +142,7 @@ def count_decided(pair: tuple[str, str], seeds: Sequence[int]) -> tuple[int, int
     planned = EXPERIMENTS["dc-motor"]
     record = Dataset(u=planned.u, y=np.full(planned.u.size, np.nan), dt=planned.dt)
     simulator = make_simulator(planned.spec, record)
-    experiment, effects = make_experiment(record, simulator, NOISE, get_tolerances(simulator))
+    experiment, effects = make_experiment(record, simulator, NOISE, simulator.tolerances)
     dictionary = ResponseDictionary(experiment)
     known = {effect.name: effect for effect in effects}
     causes = [CauseScale(dictionary, known[name]).find_cause(LOW) for name in pair]

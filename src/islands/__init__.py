@@ -56,6 +56,7 @@ _PUBLIC = {
     "models.operating_point": ("static_characteristic",),
     "models.sympy_expression": ("to_sympy",),
     "simulation.step_response": ("step_response",),
+    "simulators.interface": ("Simulator",),
     "models.coupled_narx": ("CoupledModel",),
 }
 _MODULES = {name: module for module, names in _PUBLIC.items() for name in names}

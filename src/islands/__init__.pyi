@@ -60,5 +60,6 @@ from islands.models.narx import make_model as make_model
 from islands.models.operating_point import static_characteristic as static_characteristic
 from islands.models.sympy_expression import to_sympy as to_sympy
 from islands.simulation.step_response import step_response as step_response
+from islands.simulators.interface import Simulator as Simulator
 
 __version__: str

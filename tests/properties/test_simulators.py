@@ -52,6 +52,7 @@ SHARED_MODULES = {
     "interface",
     "mapped_input",
     "model_form",
+    "parametric",  # of classes of models, which `tests/acceptance` adds
     "second_order",
 }
 

@@ -54,7 +54,7 @@ from islands.parallel import ParallelMap
 from islands.progress import ProgressCallback, ignore_progress
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
-from islands.simulators.interface import Simulator, find_read_channels, get_tolerances
+from islands.simulators.interface import Simulator
 from islands.simulators.output_equation import add_output_equation
 
 #: Maximum number of intersample behaviours and step sizes with which effects are searched for.
@@ -105,9 +105,9 @@ def diagnose(
         same name, or an effect is invalid.
     """
     interim = interim or InterimFindings()
-    prior_std = validate_prior({**get_tolerances(simulator), **(tolerance or {})}, simulator)
+    prior_std = validate_prior({**simulator.tolerances, **(tolerance or {})}, simulator)
     fitted = count_fitted_samples(record)
-    record, record_findings = admit_channels(record, fitted, find_read_channels(simulator))
+    record, record_findings = admit_channels(record, fitted, simulator.read_channels)
     record_findings += describe_gaps(record)
     target = make_target(record, fitted, prior_std)
     try:

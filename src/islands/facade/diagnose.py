@@ -1,7 +1,7 @@
 """`diagnose` names what a simulation gets wrong on a record; `plan_experiment` says what one could show."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from threadpoolctl import threadpool_limits
 
@@ -12,13 +12,16 @@ from islands.diagnosis.planning.experiment_plan import plan_experiment as plan_w
 from islands.diagnosis.procedure import diagnose as diagnose_simulator
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect, Signal
+from islands.errors import SettingsError
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.data_frames import as_record
 from islands.models.narx import Model
+from islands.models.parametric import ParametricModel
 from islands.parallel import ParallelMap
 from islands.progress import ProgressCallback, ignore_progress
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.specification.base import SpecModel
 from islands.simulators.specification.factory import make_model_simulator, make_simulator
 from islands.simulators.specification.table import LocalSpec, SimulationSpec
 
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
 
 def diagnose(
     record: "RecordLike",
-    simulation: str | Model | SimulationSpec | LocalSpec | Simulator,
+    simulation: str | Model | ParametricModel | SimulationSpec | LocalSpec | Simulator,
     *,
     inputs: str | Sequence[str] = (),
     output: str | None = None,
@@ -102,7 +105,7 @@ def diagnose(
 
 def plan_experiment(
     record: Dataset,
-    simulation: str | Model | SimulationSpec | LocalSpec | Simulator,
+    simulation: str | Model | ParametricModel | SimulationSpec | LocalSpec | Simulator,
     *,
     noise_std: float | None = None,
     separate: Sequence[str] = (),
@@ -151,17 +154,20 @@ def plan_experiment(
 
 
 def _as_simulator(
-    simulation: str | Model | SimulationSpec | LocalSpec | Simulator,
+    simulation: str | Model | ParametricModel | SimulationSpec | LocalSpec | Simulator,
     record: Dataset,
     columns: Mapping[str, Signal] | None,
 ) -> Simulator:
-    simulator: Any = simulation
-    if isinstance(simulation, Model):
-        simulator = make_model_simulator(simulation, "the model", record)
-    elif isinstance(simulation, str) or hasattr(simulation, "kind"):  # a simulator has no `kind`
-        simulator = make_simulator(simulation, record, columns)  # type: ignore[arg-type]
-    made: Simulator = simulator
-    return made
+    if isinstance(simulation, Simulator):
+        return simulation
+    if isinstance(simulation, Model | ParametricModel):
+        return make_model_simulator(simulation, "the model", record)
+    if isinstance(simulation, str | SpecModel):
+        return make_simulator(simulation, record, columns)
+    raise SettingsError(
+        f"a simulation of the type {type(simulation).__name__} cannot be diagnosed: derive its class from "
+        "islands.Simulator, or give a Python function to islands.function_simulator"
+    )
 
 
 def function_simulator(function: Callable[..., Signal], **nominal: float) -> Simulator:

@@ -13,9 +13,6 @@ from islands.simulators.interface import (
     Forces,
     SimulationRun,
     Simulator,
-    fits_states,
-    is_batch_simulator,
-    simulate_runs,
     split_recordings,
 )
 from islands.simulators.mapped_input import MappedInput, map_input
@@ -131,12 +128,12 @@ class ExtendedSimulator:
     @property
     def is_batch(self) -> bool:
         """Whether several simulations of one call cost less than one by one."""
-        return is_batch_simulator(self.simulator)
+        return self.simulator.is_batch
 
     @property
     def fits_states(self) -> bool:
         """Whether states are fitted to the record in each simulation."""
-        return fits_states(self.simulator)
+        return self.simulator.fits_states
 
     @property
     def simulator_slice(self) -> slice:
@@ -190,7 +187,7 @@ class ExtendedSimulator:
         if effect_parameters or forces:
             run = self._make_run(values, effect_parameters, forces, {})
             with np.errstate(over="ignore", invalid="ignore"):
-                y = simulate_runs(self.simulator, [run], self.context)[0]
+                y = self.simulator.simulate_batch([run], self.context)[0]
             return self._apply_output_maps([y], values[None]).reshape(-1)
         return self.simulate_batch(values[None])[0]
 
@@ -258,7 +255,7 @@ class ExtendedSimulator:
             for key, values in points.items()
         ]
         with np.errstate(over="ignore", invalid="ignore"):
-            found = np.ascontiguousarray(simulate_runs(self.simulator, runs, self.context))
+            found = np.ascontiguousarray(self.simulator.simulate_batch(runs, self.context))
         return dict(zip(points, found, strict=True))
 
     def _apply_output_maps(self, outputs: Sequence[Signal], points: Signal) -> Signal:

@@ -1,100 +1,19 @@
 """Interface of the simulators that are compared with a record."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from types import MappingProxyType
+from typing import Self
 
 import numpy as np
 
 from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect, ForceLaw, Site
+from islands.simulators.coordinates import input_coordinate
 
 #: Force laws on the coordinate of a simulator, each with its values.
 Forces = Sequence[tuple[ForceLaw, Signal]]
-
-
-class Simulator(Protocol):
-    """Simulator: parameters, sites at which effects can enter, and simulation of the output."""
-
-    @property
-    def name(self) -> str:
-        """Name in reports; that of the command line for a physical system."""
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the simulator."""
-
-    @property
-    def sites(self) -> frozenset[Site]:
-        """Sites at which effects can enter."""
-
-    @property
-    def supported_effects(self) -> frozenset[str]:
-        """Names of the effects of the catalogue that the state equation supports."""
-
-    @property
-    def built_in_effects(self) -> frozenset[str]:
-        """Names of the effects already modelled by the simulator; excluded from the search."""
-
-    @property
-    def state_effects(self) -> tuple[Effect, ...]:
-        """Effects on the states of the simulator, in addition to the catalogue."""
-
-    @property
-    def is_continuous_time(self) -> bool:
-        """Whether a differential equation is integrated, so that the input between samples matters."""
-
-    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """Return the coordinate that forces act on; ``output`` is the nominal output, shape (samples,)."""
-
-    def simulate(
-        self,
-        values: Signal,
-        x: Signal,
-        context: SimulationContext,
-        effect_parameters: Mapping[str, float],
-        forces: Forces,
-    ) -> Signal:
-        """Simulate the output.
-
-        Parameters
-        ----------
-        values : ndarray, shape (parameters,)
-        x : ndarray, shape (samples,)
-            Input after the input maps.
-        context : SimulationContext
-        effect_parameters : mapping
-            Parameters of supported effects by name; an effect without parameters here is not active.
-        forces : sequence
-            Force laws on the coordinate, each with its values.
-
-        Returns
-        -------
-        ndarray, shape (samples,)
-            Output before the output maps.
-        """
-
-
-@runtime_checkable
-class RecordBoundSimulator(Protocol):
-    """Simulator that contains samples of the record, such as measured initial outputs."""
-
-    def for_samples(self, first: int, last: int) -> Simulator:
-        """Return the simulator of a recording that begins at sample ``first`` and ends before ``last``."""
-
-
-@runtime_checkable
-class TolerancedSimulator(Protocol):
-    """Simulator that states how well its parameters are known."""
-
-    @property
-    def tolerances(self) -> Mapping[str, float]:
-        """Relative standard deviations of parameters about their nominal values, by name."""
-
-
-def get_tolerances(simulator: Simulator) -> Mapping[str, float]:
-    """Return the tolerances that a simulator states; most simulators state none."""
-    return simulator.tolerances if isinstance(simulator, TolerancedSimulator) else {}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,9 +58,115 @@ class SimulationRun:
         return self.characteristic(signal.reshape(-1)).reshape(signal.shape)
 
 
-@runtime_checkable
-class BatchSimulator(Protocol):
-    """Simulator that computes several runs at once, faster than one by one and with the same bits."""
+class Simulator(ABC):
+    """Simulator: parameters, sites at which effects can enter, and simulation of the output.
+
+    A subclass defines ``name``, ``sites`` and `simulate`; everything else has a default. Subclasses that
+    compute several runs at once derive from `BatchSimulator`.
+    """
+
+    __slots__ = ()
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Name in reports; that of the command line for a physical system."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the simulator; none by default."""
+        return ()
+
+    @property
+    @abstractmethod
+    def sites(self) -> frozenset[Site]:
+        """Sites at which effects can enter."""
+
+    @property
+    def supported_effects(self) -> frozenset[str]:
+        """Names of the effects of the catalogue that the state equation supports; none by default."""
+        return frozenset()
+
+    @property
+    def built_in_effects(self) -> frozenset[str]:
+        """Names of the effects already modelled by the simulator; excluded from the search."""
+        return frozenset()
+
+    @property
+    def state_effects(self) -> tuple[Effect, ...]:
+        """Effects on the states of the simulator, in addition to the catalogue."""
+        return ()
+
+    @property
+    def is_continuous_time(self) -> bool:
+        """Whether a differential equation is integrated, so that the input between samples matters."""
+        return False
+
+    @property
+    def tolerances(self) -> Mapping[str, float]:
+        """Relative standard deviations of parameters about their nominal values, by name."""
+        return MappingProxyType({})
+
+    @property
+    def read_channels(self) -> frozenset[str]:
+        """Channels of the record that are read by their names."""
+        return frozenset()
+
+    @property
+    def fits_states(self) -> bool:
+        """Whether states are fitted to the record within each simulation."""
+        return False
+
+    @property
+    def is_batch(self) -> bool:
+        """Whether several runs at once cost less than one by one."""
+        return False
+
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
+        """Return the coordinate that forces act on: the input, unless a subclass has another one.
+
+        Parameters
+        ----------
+        output : ndarray, shape (samples,)
+            Nominal output.
+        """
+        return input_coordinate(context, output)
+
+    def for_samples(self, first: int, last: int) -> Self:  # noqa: ARG002 - for subclasses with samples
+        """Return the simulator of a recording that begins at sample ``first`` and ends before ``last``.
+
+        A simulator that contains samples of the record, such as measured initial outputs, returns another
+        one.
+        """
+        return self
+
+    @abstractmethod
+    def simulate(
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        forces: Forces,
+    ) -> Signal:
+        """Simulate the output.
+
+        Parameters
+        ----------
+        values : ndarray, shape (parameters,)
+        x : ndarray, shape (samples,)
+            Input after the input maps.
+        context : SimulationContext
+        effect_parameters : mapping
+            Parameters of supported effects by name; an effect without parameters here is not active.
+        forces : sequence
+            Force laws on the coordinate, each with its values.
+
+        Returns
+        -------
+        ndarray, shape (samples,)
+            Output before the output maps.
+        """
 
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
@@ -157,15 +182,35 @@ class BatchSimulator(Protocol):
         -------
         ndarray, shape (runs, samples)
         """
+        outputs = []
+        for run in runs:
+            own, x = context, run.apply_characteristic(run.x)
+            if run.intersample_values is not None:
+                between = run.apply_characteristic(run.intersample_values)
+                own = replace(context, u=x, intersample_values=between)
+            output = self.simulate(run.values, x, own, run.effect_parameters, run.forces)
+            outputs.append(output[::every])
+        return np.stack(outputs)
 
 
-class BatchSimulation:
-    """Base class of simulators that compute several runs at once."""
+class BatchSimulator(Simulator):
+    """Simulator that computes several runs at once, faster than one by one and with the same bits."""
 
     __slots__ = ()
 
+    @property
+    def is_batch(self) -> bool:
+        """True."""
+        return True
+
+    @abstractmethod
+    def simulate_batch(
+        self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
+    ) -> Signal:
+        """Simulate several runs; see `Simulator.simulate_batch`."""
+
     def simulate(
-        self: BatchSimulator,
+        self,
         values: Signal,
         x: Signal,
         context: SimulationContext,
@@ -177,76 +222,80 @@ class BatchSimulation:
         return self.simulate_batch([run], context)[0].copy()
 
 
-@runtime_checkable
-class WrappingSimulator(Protocol):
-    """Simulator that runs another one."""
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatorWrapper(Simulator):
+    """Base class of simulators that run another one; forwards what that one declares.
+
+    Attributes
+    ----------
+    simulator : Simulator
+        The simulator that is run.
+    """
+
+    simulator: Simulator
 
     @property
-    def simulator(self) -> Simulator:
-        """The simulator that is run."""
-
-
-@runtime_checkable
-class ShootingSimulator(Protocol):
-    """Simulator that may fit the states of shooting intervals to the record within each simulation."""
+    def name(self) -> str:
+        """Name of the wrapped simulator."""
+        return self.simulator.name
 
     @property
-    def shots(self) -> object | None:
-        """Shooting intervals; None for a free run."""
-
-
-@runtime_checkable
-class ChannelReadingSimulator(Protocol):
-    """Simulator that reads channels of the record by their names."""
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the wrapped simulator."""
+        return self.simulator.parameters
 
     @property
-    def channels(self) -> Mapping[str, str]:
-        """Channels of the record by the names that the simulator gives to them."""
+    def sites(self) -> frozenset[Site]:
+        """Sites of the wrapped simulator."""
+        return self.simulator.sites
 
+    @property
+    def supported_effects(self) -> frozenset[str]:
+        """Supported effects of the wrapped simulator."""
+        return self.simulator.supported_effects
 
-def _unwrap(simulator: Simulator) -> Simulator:
-    while isinstance(simulator, WrappingSimulator):
-        simulator = simulator.simulator
-    return simulator
+    @property
+    def built_in_effects(self) -> frozenset[str]:
+        """Built-in effects of the wrapped simulator."""
+        return self.simulator.built_in_effects
 
+    @property
+    def state_effects(self) -> tuple[Effect, ...]:
+        """State effects of the wrapped simulator."""
+        return self.simulator.state_effects
 
-def is_batch_simulator(simulator: Simulator) -> bool:
-    """Return whether a simulator, or the one that it runs, computes several runs at once."""
-    return isinstance(_unwrap(simulator), BatchSimulator)
+    @property
+    def is_continuous_time(self) -> bool:
+        """Whether the wrapped simulator integrates a differential equation."""
+        return self.simulator.is_continuous_time
 
+    @property
+    def tolerances(self) -> Mapping[str, float]:
+        """Tolerances that the wrapped simulator states."""
+        return self.simulator.tolerances
 
-def fits_states(simulator: Simulator) -> bool:
-    """Return whether a simulator, or the one that it runs, fits states to the record in each simulation."""
-    inner = _unwrap(simulator)
-    return isinstance(inner, ShootingSimulator) and inner.shots is not None
+    @property
+    def read_channels(self) -> frozenset[str]:
+        """Channels that the wrapped simulator reads."""
+        return self.simulator.read_channels
 
+    @property
+    def fits_states(self) -> bool:
+        """Whether the wrapped simulator fits states to the record."""
+        return self.simulator.fits_states
 
-def find_read_channels(simulator: Simulator) -> frozenset[str]:
-    """Return the channels of the record that a simulator, or the one that it runs, reads by their names."""
-    inner = _unwrap(simulator)
-    return frozenset(inner.channels.values()) if isinstance(inner, ChannelReadingSimulator) else frozenset()
+    @property
+    def is_batch(self) -> bool:
+        """Whether the wrapped simulator computes several runs at once."""
+        return self.simulator.is_batch
 
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
+        """Return the force coordinate of the wrapped simulator."""
+        return self.simulator.make_force_coordinate(context, output)
 
-def simulate_runs(
-    simulator: Simulator, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
-) -> Signal:
-    """Simulate as `BatchSimulator.simulate_batch`, at once if the simulator can."""
-    if isinstance(simulator, BatchSimulator):
-        return simulator.simulate_batch(runs, context, every)
-    outputs = []
-    for run in runs:
-        own, x = context, run.apply_characteristic(run.x)
-        if run.intersample_values is not None:
-            between = run.apply_characteristic(run.intersample_values)
-            own = replace(context, u=x, intersample_values=between)
-        output = simulator.simulate(run.values, x, own, run.effect_parameters, run.forces)
-        outputs.append(output[::every])
-    return np.stack(outputs)
-
-
-def take_recording(simulator: Simulator, first: int, last: int) -> Simulator:
-    """Return the simulator of one of several recordings; most simulators are the same for all of them."""
-    return simulator.for_samples(first, last) if isinstance(simulator, RecordBoundSimulator) else simulator
+    def for_samples(self, first: int, last: int) -> Self:
+        """Return the wrapper of the simulator of one recording."""
+        return replace(self, simulator=self.simulator.for_samples(first, last))
 
 
 def split_recordings(
@@ -256,6 +305,6 @@ def split_recordings(
     if len(context.bounds) == 1:
         return ((simulator, context),)
     return tuple(
-        (take_recording(simulator, *bounds), part)
+        (simulator.for_samples(*bounds), part)
         for bounds, part in zip(context.bounds, context.split(), strict=True)
     )

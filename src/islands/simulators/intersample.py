@@ -1,6 +1,6 @@
 """Simulation with a smaller step than the sampling time, and the input between samples."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import lru_cache
@@ -10,71 +10,15 @@ import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
-from islands.effects.interface.effect import Effect, Site
+from islands.effects.interface.context import Signal, SimulationContext
 from islands.simulators.interface import (
-    BatchSimulation,
+    BatchSimulator,
     SimulationRun,
-    Simulator,
-    get_tolerances,
-    simulate_runs,
-    take_recording,
+    SimulatorWrapper,
 )
 
 #: Samples on each side of a value that the band-limited interpolation reads.
 REACH = 10
-
-
-class SimulatorWrapper:
-    """Base class of wrappers of a simulator; forwards all declarations."""
-
-    __slots__ = ()
-
-    simulator: Simulator
-
-    @property
-    def name(self) -> str:
-        """Name of the wrapped simulator."""
-        return self.simulator.name
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the wrapped simulator."""
-        return self.simulator.parameters
-
-    @property
-    def sites(self) -> frozenset[Site]:
-        """Sites of the wrapped simulator."""
-        return self.simulator.sites
-
-    @property
-    def supported_effects(self) -> frozenset[str]:
-        """Supported effects of the wrapped simulator."""
-        return self.simulator.supported_effects
-
-    @property
-    def built_in_effects(self) -> frozenset[str]:
-        """Built-in effects of the wrapped simulator."""
-        return self.simulator.built_in_effects
-
-    @property
-    def state_effects(self) -> tuple[Effect, ...]:
-        """State effects of the wrapped simulator."""
-        return self.simulator.state_effects
-
-    @property
-    def is_continuous_time(self) -> bool:
-        """Whether the wrapped simulator integrates a differential equation."""
-        return self.simulator.is_continuous_time
-
-    @property
-    def tolerances(self) -> Mapping[str, float]:
-        """Tolerances that the wrapped simulator states."""
-        return get_tolerances(self.simulator)
-
-    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """Return the force coordinate of the wrapped simulator."""
-        return self.simulator.make_force_coordinate(context, output)
 
 
 class InterSample(StrEnum):
@@ -86,7 +30,7 @@ class InterSample(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResampledSimulator(BatchSimulation, SimulatorWrapper):
+class ResampledSimulator(SimulatorWrapper, BatchSimulator):
     """Simulator with ``oversampling`` steps per sample.
 
     Attributes
@@ -97,18 +41,13 @@ class ResampledSimulator(BatchSimulation, SimulatorWrapper):
         Steps per sample.
     """
 
-    simulator: Simulator
     intersample: InterSample = InterSample.FOH
     oversampling: int = 1
-
-    def for_samples(self, first: int, last: int) -> "ResampledSimulator":
-        """Return the resampled simulator of one recording."""
-        return replace(self, simulator=take_recording(self.simulator, first, last))
 
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
     ) -> Signal:
-        """Simulate several runs; see `BatchSimulator.simulate_batch`."""
+        """Simulate several runs; see `Simulator.simulate_batch`."""
         signals = {id(run.x): self._resample(run.x) for run in runs}
         finer = []
         for run in runs:
@@ -120,7 +59,7 @@ class ResampledSimulator(BatchSimulation, SimulatorWrapper):
             dt=context.dt / self.oversampling,
             intersample_values=finer[0].intersample_values,
         )
-        return simulate_runs(self.simulator, finer, resampled, every * self.oversampling)
+        return self.simulator.simulate_batch(finer, resampled, every * self.oversampling)
 
     def _resample(self, x: Signal) -> tuple[Signal, Signal]:
         return _resample_bytes(x.tobytes(), self.intersample, self.oversampling)

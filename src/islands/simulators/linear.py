@@ -2,17 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
-from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
-from islands.effects.interface.effect import Effect, Site
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Site
 from islands.effects.interface.force import add_output_forces
 from islands.errors import RecordError
-from islands.simulators.coordinates import input_coordinate
-from islands.simulators.interface import Forces
+from islands.simulators.interface import Forces, Simulator
 
 #: Iterations of the method of Steiglitz and McBride.
 _ITERATIONS = 12
@@ -22,7 +22,7 @@ _SCALE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LinearSimulator:
+class LinearSimulator(Simulator):
     """``A(q) (y - level) = B(q) (u - reference input)``, with an input delay and an initial state.
 
     There are as many poles as zeros.
@@ -47,12 +47,9 @@ class LinearSimulator:
     reference_input: float
     delay: int
     unit: str
-    name: str = "linear"
-    sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
-    supported_effects: frozenset[str] = frozenset()
-    built_in_effects: frozenset[str] = frozenset(("offset",))
-    state_effects: tuple[Effect, ...] = ()
-    is_continuous_time: bool = False
+    name: ClassVar[str] = "linear"
+    sites: ClassVar[frozenset[Site]] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
+    built_in_effects: ClassVar[frozenset[str]] = frozenset(("offset",))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -65,10 +62,6 @@ class LinearSimulator:
             Parameter("level", self.unit, self.level, _SCALE * abs(self.level) + gain),
             *(Parameter(f"state {1 + place}", self.unit, 0.0, gain, initial=True) for place in range(order)),
         )
-
-    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """Return the input as the coordinate."""
-        return input_coordinate(context, output)
 
     def simulate(
         self,

@@ -20,7 +20,6 @@ from islands.models.regressor import Regressor, regressor
 from islands.simulators.interface import (
     SimulationRun,
     Simulator,
-    simulate_runs,
     split_recordings,
 )
 
@@ -174,7 +173,7 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
                     SimulationRun(nominal + change, part.u, shape, ())
                     for change, shape in zip(changes, shapes, strict=True)
                 ]
-                outputs.append(simulate_runs(each, runs, part))
+                outputs.append(each.simulate_batch(runs, part))
             return np.concatenate(outputs, axis=1)[:, :fitted]
 
         moved = np.vstack([np.zeros(len(own)), _STEP * np.diag([each.scale for each in own])])

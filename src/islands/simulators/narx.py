@@ -2,19 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect, Site
 from islands.effects.interface.force import sum_output_forces
 from islands.errors import ModelError
 from islands.models.narx import Model, make_model
 from islands.models.regressor import Regressor
 from islands.simulation.linked import LinkedModel
-from islands.simulators.coordinates import input_coordinate
-from islands.simulators.interface import BatchSimulation, SimulationRun
+from islands.simulators.interface import BatchSimulator, SimulationRun
 from islands.simulators.model_form import SLOPE, MissingTerm, missing_terms, model_form
 
 #: Typical change of a parameter, relative to its value.
@@ -22,7 +22,7 @@ _SCALE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NarxSimulator(BatchSimulation):
+class NarxSimulator(BatchSimulator):
     """Free run of a model, started from the first measured samples; its parameters are calibrated.
 
     Parameters of terms with a single factor that reads the output alone, such as y(k-1), are fixed, so that a
@@ -38,13 +38,10 @@ class NarxSimulator(BatchSimulation):
     """
 
     model: Model
-    name: str
+    name: str = field()  # without it, the property of the base class would be the default
     start: Signal
-    sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
-    supported_effects: frozenset[str] = frozenset()
-    built_in_effects: frozenset[str] = frozenset()
+    sites: ClassVar[frozenset[Site]] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
     state_effects: tuple[Effect, ...] = field(init=False)
-    is_continuous_time: bool = False
     _calibrated: NDArray[np.int64] = field(init=False, repr=False)
     _theta: Signal = field(init=False, repr=False)
     _linked: LinkedModel = field(init=False, repr=False)
@@ -110,14 +107,10 @@ class NarxSimulator(BatchSimulation):
         terms += [(term.with_slope(shape[SLOPE]), shape[term.name]) for term in self._missing]
         return make_model(terms, model.input_names, model.output_name, model.dt)
 
-    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """Return the input as the coordinate."""
-        return input_coordinate(context, output)
-
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
     ) -> Signal:
-        """Simulate several runs; see `BatchSimulator.simulate_batch`."""
+        """Simulate several runs; see `Simulator.simulate_batch`."""
         theta = np.tile(self._theta, (len(runs), 1))
         theta[:, self._calibrated] = [run.values[:-1] for run in runs]
         warm_up = self._linked.warm_up

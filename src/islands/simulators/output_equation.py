@@ -8,13 +8,11 @@ import numpy as np
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.expressions.evaluation import evaluate
 from islands.simulators.interface import (
-    BatchSimulation,
+    BatchSimulator,
     SimulationRun,
     Simulator,
-    simulate_runs,
-    take_recording,
+    SimulatorWrapper,
 )
-from islands.simulators.intersample import SimulatorWrapper
 from islands.simulators.ode.equation_parser import TIME
 from islands.simulators.ode.output_system import INPUT, SIMULATED, make_output_system
 from islands.simulators.ode.simulator import make_parameter
@@ -25,7 +23,7 @@ RATE = f"rate({INPUT})"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OutputEquation(BatchSimulation, SimulatorWrapper):
+class OutputEquation(SimulatorWrapper, BatchSimulator):
     """Simulation whose output is an expression of that of another one, of its input, and of the time.
 
     Attributes
@@ -38,7 +36,6 @@ class OutputEquation(BatchSimulation, SimulatorWrapper):
         Largest absolute value of ``y_sim`` in a nominal simulation.
     """
 
-    simulator: Simulator
     system: OdeSystem
     sizes: Mapping[str, float]
 
@@ -53,10 +50,6 @@ class OutputEquation(BatchSimulation, SimulatorWrapper):
         own = dict(zip(names, values[values.size - len(names) :].tolist(), strict=True))
         return replace(self, system=self.system.with_values(own))
 
-    def for_samples(self, first: int, last: int) -> "OutputEquation":
-        """Return the equation around the simulation of one recording."""
-        return replace(self, simulator=take_recording(self.simulator, first, last))
-
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
     ) -> Signal:
@@ -69,7 +62,7 @@ class OutputEquation(BatchSimulation, SimulatorWrapper):
             key = (run.values[:count].tobytes(), run.input_key, tuple(run.effect_parameters.items()), forces)
             distinct.setdefault(key, replace(run, values=run.values[:count]))
             keys.append(key)
-        outputs = simulate_runs(self.simulator, list(distinct.values()), context)
+        outputs = self.simulator.simulate_batch(list(distinct.values()), context)
         simulated = dict(zip(distinct, outputs, strict=True))
         if not self.system.parameters:
             return np.stack([simulated[key] for key in keys])[:, ::every]

@@ -2,26 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
-from islands.effects.interface.effect import Effect, Site
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Site
 from islands.effects.interface.force import sum_output_forces
 from islands.errors import ModelError
 from islands.models.block import Block, subtract_offsets
 from islands.models.parametric import ParametricModel
 from islands.simulation.block_simulation import BlockSimulator
-from islands.simulators.coordinates import input_coordinate
-from islands.simulators.interface import BatchSimulation, SimulationRun
+from islands.simulators.interface import BatchSimulator, SimulationRun
 
 #: Typical change of a parameter, relative to its value.
 _SCALE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ParametricSimulator(BatchSimulation):
+class ParametricSimulator(BatchSimulator):
     """Free run of a model, started from the first measured samples; all of its parameters are calibrated.
 
     Attributes
@@ -38,13 +38,9 @@ class ParametricSimulator(BatchSimulation):
     """
 
     model: ParametricModel
-    name: str
+    name: str = field()  # without it, the property of the base class would be the default
     start: Signal
-    sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
-    supported_effects: frozenset[str] = frozenset()
-    built_in_effects: frozenset[str] = frozenset()
-    state_effects: tuple[Effect, ...] = ()
-    is_continuous_time: bool = False
+    sites: ClassVar[frozenset[Site]] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
     _block: Block = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -78,14 +74,10 @@ class ParametricSimulator(BatchSimulation):
         """Return the model with the given values of its parameters."""
         return self.model.with_parameters(values[: self.model.size].tolist())
 
-    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """Return the input as the coordinate."""
-        return input_coordinate(context, output)
-
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
     ) -> Signal:
-        """Simulate several runs; see `BatchSimulator.simulate_batch`."""
+        """Simulate several runs; see `Simulator.simulate_batch`."""
         simulated: NDArray[np.float64] = np.empty((len(runs), runs[0].x.size))
         groups: dict[tuple[int, float], list[int]] = {}
         for place, run in enumerate(runs):

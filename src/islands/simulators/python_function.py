@@ -4,15 +4,15 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
+from typing import ClassVar
 
 import numpy as np
 
-from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
-from islands.effects.interface.effect import Effect, Site
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Site
 from islands.effects.interface.force import add_output_forces
 from islands.errors import RecordError, SettingsError, suggest
-from islands.simulators.coordinates import input_coordinate
-from islands.simulators.interface import Forces
+from islands.simulators.interface import Forces, Simulator
 
 #: Typical change of a parameter, relative to its value.
 _SCALE = 0.01
@@ -22,7 +22,7 @@ _MAX_CHANGE = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PythonFunctionSimulator:
+class PythonFunctionSimulator(Simulator):
     """``function(u, dt, **parameters) -> y``; arguments with a numeric default are parameters.
 
     Attributes
@@ -37,11 +37,7 @@ class PythonFunctionSimulator:
     function: Callable[..., Signal]
     source: str
     given: Mapping[str, float] = field(default_factory=dict)
-    sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.PARAMETER, Site.OUTPUT))
-    supported_effects: frozenset[str] = frozenset()
-    built_in_effects: frozenset[str] = frozenset()
-    state_effects: tuple[Effect, ...] = ()
-    is_continuous_time: bool = False
+    sites: ClassVar[frozenset[Site]] = frozenset((Site.INPUT, Site.FORCE, Site.PARAMETER, Site.OUTPUT))
 
     def __post_init__(self) -> None:
         try:
@@ -85,10 +81,6 @@ class PythonFunctionSimulator:
             )
             for name, value in self.given.items()
         )
-
-    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """Return the input as the coordinate."""
-        return input_coordinate(context, output)
 
     def simulate(
         self,

@@ -2,18 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
-from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
-from islands.effects.interface.effect import Effect, Site
+from islands.effects.interface.context import Signal, SimulationContext
+from islands.effects.interface.effect import Site
 from islands.effects.interface.force import add_output_forces
-from islands.simulators.coordinates import input_coordinate
-from islands.simulators.interface import Forces
+from islands.simulators.interface import Forces, Simulator
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RecordedOutput:
+class RecordedOutput(Simulator):
     """Output of an external simulation.
 
     The simulation cannot be repeated with a different input or equation. Only effects on the output and
@@ -29,21 +29,12 @@ class RecordedOutput:
 
     column: str
     simulated: Signal
-    parameters: tuple[Parameter, ...] = ()
-    sites: frozenset[Site] = frozenset((Site.FORCE, Site.OUTPUT))
-    supported_effects: frozenset[str] = frozenset()
-    built_in_effects: frozenset[str] = frozenset()
-    state_effects: tuple[Effect, ...] = ()
-    is_continuous_time: bool = False
+    sites: ClassVar[frozenset[Site]] = frozenset((Site.FORCE, Site.OUTPUT))
 
     @property
     def name(self) -> str:
         """Name in reports."""
         return f"column {self.column}"
-
-    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """Return the input as the coordinate."""
-        return input_coordinate(context, output)
 
     def for_samples(self, first: int, last: int) -> "RecordedOutput":
         """Return the output of one recording."""

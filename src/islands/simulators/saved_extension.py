@@ -8,8 +8,7 @@ import numpy as np
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect
 from islands.simulators.extended import ExtendedSimulator
-from islands.simulators.interface import Forces, Simulator, take_recording
-from islands.simulators.intersample import SimulatorWrapper
+from islands.simulators.interface import Forces, SimulatorWrapper
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +27,6 @@ class SavedExtension(SimulatorWrapper):
         duration.
     """
 
-    simulator: Simulator
     added: tuple[Effect, ...]
     values: Signal
     scales: SimulationContext
@@ -58,10 +56,6 @@ class SavedExtension(SimulatorWrapper):
     def built_in_effects(self) -> frozenset[str]:
         """Built-in effects of the simulator, and the added effects."""
         return self.simulator.built_in_effects | {effect.name for effect in self.added}
-
-    def for_samples(self, first: int, last: int) -> "SavedExtension":
-        """Return the extension of the simulator of one recording."""
-        return replace(self, simulator=take_recording(self.simulator, first, last))
 
     def simulate(
         self,

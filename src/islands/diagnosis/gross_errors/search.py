@@ -26,7 +26,7 @@ from islands.diagnosis.gross_errors.scale_corrections import (
 from islands.diagnosis.gross_errors.time_offset import correct_time_offset
 from islands.effects.interface.effect import Signal
 from islands.errors import RecordError
-from islands.simulators.interface import Simulator, find_read_channels
+from islands.simulators.interface import Simulator
 
 #: Makes the corrections of a record; receives the record, the names of the channels that the simulation
 #: reads, the simulated output and the fitted samples.
@@ -92,7 +92,7 @@ def find_gross_errors(
         free_error = _compute_free_error(base, target)
         nominal = base.simulation.simulate(base.simulation.nominal)
     found = []
-    read = find_read_channels(simulator)
+    read = simulator.read_channels
     for check in CHECKS:
         for candidate in _select(check(record, read, nominal, target.fitted), simulator, target, nominal):
             if (fit := candidate.calibrate()) is None:

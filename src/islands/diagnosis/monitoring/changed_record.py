@@ -20,17 +20,15 @@ from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import (
-    BatchSimulation,
+    BatchSimulator,
     SimulationRun,
     Simulator,
-    simulate_runs,
-    take_recording,
+    SimulatorWrapper,
 )
-from islands.simulators.intersample import SimulatorWrapper
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CentredSimulator(BatchSimulation, SimulatorWrapper):
+class CentredSimulator(SimulatorWrapper, BatchSimulator):
     """Simulator whose nominal values are the means of undisturbed records, the means of their prior.
 
     Attributes
@@ -40,7 +38,6 @@ class CentredSimulator(BatchSimulation, SimulatorWrapper):
         Nominal values by the names of parameters; all others are those of the simulator.
     """
 
-    simulator: Simulator
     means: Mapping[str, float]
 
     @property
@@ -51,15 +48,11 @@ class CentredSimulator(BatchSimulation, SimulatorWrapper):
             for each in self.simulator.parameters
         )
 
-    def for_samples(self, first: int, last: int) -> "CentredSimulator":
-        """Return the simulator of one recording."""
-        return replace(self, simulator=take_recording(self.simulator, first, last))
-
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
     ) -> Signal:
         """Simulate the outputs of several runs, at once if the simulator can."""
-        return simulate_runs(self.simulator, runs, context, every)
+        return self.simulator.simulate_batch(runs, context, every)
 
 
 def explain_record(

@@ -29,7 +29,7 @@ from islands.effects.scale import wrong_parameter
 from islands.errors import RecordError
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
-from islands.simulators.interface import Simulator, get_tolerances
+from islands.simulators.interface import Simulator
 
 #: Fraction of a response that calibration must leave, so that the effect can be monitored.
 MIN_VISIBLE = 0.01
@@ -252,7 +252,7 @@ def calibrate_record(
             f"the record has {known} measured outputs, and monitoring needs at least {MIN_SAMPLES}: give "
             "longer records"
         )
-    prior_std = validate_prior({**get_tolerances(simulator), **tolerance}, simulator)
+    prior_std = validate_prior({**simulator.tolerances, **tolerance}, simulator)
     context = make_context(record, simulator, record.samples)
     simulation = ExtendedSimulator(simulator, (), context)
     target = make_target(record, record.samples, prior_std)

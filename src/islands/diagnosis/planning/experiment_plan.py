@@ -25,7 +25,7 @@ from islands.errors import SettingsError, lookup
 from islands.parallel import ParallelMap
 from islands.progress import ProgressCallback, StoppedError, ignore_progress
 from islands.simulators.extended import ExtendedSimulator
-from islands.simulators.interface import Simulator, get_tolerances
+from islands.simulators.interface import Simulator
 
 #: Maximum number of pairs that an experiment is optimised for, if none is given.
 MAX_PAIRS = 8
@@ -134,7 +134,7 @@ def plan_experiment(
         A setting is not possible, or an effect of the pair is not applicable or not detectable.
     """
     progress("simulating", 0.0)
-    prior_std = validate_prior({**get_tolerances(simulator), **(tolerance or {})}, simulator)
+    prior_std = validate_prior({**simulator.tolerances, **(tolerance or {})}, simulator)
     experiment, effects = make_experiment(record, simulator, noise_std, prior_std, catalogue)
     context = experiment.context
     if np.isnan(record.y).all():

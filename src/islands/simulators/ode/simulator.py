@@ -12,7 +12,7 @@ from islands.effects.interface.force import ForceLaw, pack_force_laws, sum_outpu
 from islands.effects.time_variation import GAIN_EFFECTS, gain_over_time
 from islands.expressions.tree import Expression, Symbol
 from islands.simulators.coordinates import input_coordinate, output_coordinate, peak_amplitude
-from islands.simulators.interface import BatchSimulation, SimulationRun
+from islands.simulators.interface import BatchSimulator, SimulationRun
 from islands.simulators.ode.effects import (
     extend_system,
     find_effects,
@@ -37,7 +37,7 @@ _GAIN = "gain(t)"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OdeSimulator(BatchSimulation):
+class OdeSimulator(BatchSimulator):
     """``dx/dt = f(x, u, parameters, t)`` by RK4.
 
     Attributes
@@ -97,6 +97,16 @@ class OdeSimulator(BatchSimulation):
         free = (each for each in self.system.parameters if not each.fixed)
         return {each.name: each.tolerance for each in free if each.tolerance is not None}
 
+    @property
+    def read_channels(self) -> frozenset[str]:
+        """Channels that the equations read."""
+        return frozenset(self.channels.values())
+
+    @property
+    def fits_states(self) -> bool:
+        """Whether there are shooting intervals."""
+        return self.shots is not None
+
     def _list_initial_states(self) -> tuple[Parameter, ...]:
         return tuple(
             self._make_initial(each.name, each.unit, each.lower, each.upper)
@@ -131,7 +141,7 @@ class OdeSimulator(BatchSimulation):
     def simulate_batch(
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
     ) -> Signal:
-        """Simulate runs with the same effects and force laws; see `BatchSimulator.simulate_batch`."""
+        """Simulate runs with the same effects and force laws; see `Simulator.simulate_batch`."""
         active = tuple(
             each for each in list_terms(self.system) if each.name in runs[0].effect_parameters and each.term
         )

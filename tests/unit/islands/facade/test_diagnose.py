@@ -83,6 +83,34 @@ def test_function_simulator_is_diagnosed_like_the_function_of_a_file(
     assert found.best.values.tolist() == same.best.values.tolist()
 
 
+class Stage(islands.Simulator):
+    """Amplifier with the methods that a simulator must have, and one parameter."""
+
+    name = "stage"
+    sites = frozenset((islands.Site.INPUT, islands.Site.OUTPUT))
+    parameters = (islands.Parameter("gain", "um/V", 0.8, 0.008),)
+
+    def simulate(self, values: Signal, x: Signal, *_further: object) -> Signal:
+        return values[0] * x
+
+
+def test_simulator_of_the_user_is_diagnosed_like_a_function(
+    record: tuple[islands.Dataset, Signal],
+) -> None:
+    data, _ = record
+    found = islands.diagnose(data, Stage(), effects=(THERMAL_GAIN,))
+    same = islands.diagnose(data, islands.function_simulator(_proportional), effects=(THERMAL_GAIN,))
+    assert [each.name for each in found.effects] == ["thermal-gain"]
+    assert found.best.values == pytest.approx(same.best.values, rel=1e-6)
+
+
+def test_simulator_of_the_user_derives_from_the_base_class(record: tuple[islands.Dataset, Signal]) -> None:
+    with pytest.raises(islands.SettingsError, match=r"derive .* islands.Simulator"):
+        islands.diagnose(record[0], _proportional)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="abstract"):
+        islands.Simulator()  # type: ignore[abstract]
+
+
 def test_function_simulator_takes_nominal_values_by_name() -> None:
     (parameter,) = islands.function_simulator(_proportional, gain=0.7).parameters
     assert (parameter.name, parameter.nominal) == ("gain", 0.7)

@@ -24,7 +24,7 @@ from islands.models.narx import Model
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.fmu.simulator import FmuSimulator
-from islands.simulators.interface import Simulator, get_tolerances
+from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.factory import make_simulator
 from support.oscillator_fmus import write_oscillator
@@ -186,7 +186,7 @@ def test_a_hidden_effect_is_named_and_a_clean_record_has_none(tmp_path: Path) ->
     tolerances = "\n".join(f"{name} = {{ tolerance = 0.05 }}" for name in ("m", "c", "k"))
     path.write_text(f'file = "{oscillator()}"\n[parameters]\n{tolerances}\n')
     simulator = make_simulator(f"fmu:{path}", clean)
-    assert get_tolerances(simulator) == {"m": 0.05, "c": 0.05, "k": 0.05}
+    assert simulator.tolerances == {"m": 0.05, "c": 0.05, "k": 0.05}
     assert islands.diagnose(clean, simulator).verdict == Verdict.NOTHING
     limited = replace(clean, y=np.clip(oscillation(250).y, -0.15, 0.15) + clean.y - oscillation(250).y)
     found = islands.diagnose(limited, f"fmu:{path}")

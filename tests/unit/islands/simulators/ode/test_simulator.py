@@ -15,7 +15,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
-from islands.simulators.interface import BatchSimulator, SimulationRun, Simulator, get_tolerances
+from islands.simulators.interface import BatchSimulator, SimulationRun, Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator
@@ -176,8 +176,8 @@ def test_runs_at_once_have_the_bits_of_single_runs() -> None:
 def test_tolerances_are_those_of_the_file() -> None:
     simulator = example("dc-motor").simulator
     expected = {"R": 0.05, "L": 0.1, "K": 0.03, "J": 0.05}
-    assert get_tolerances(ResampledSimulator(simulator)) == expected
-    assert get_tolerances(example("bouc-wen-piezo").simulator) == {}
+    assert ResampledSimulator(simulator).tolerances == expected
+    assert example("bouc-wen-piezo").simulator.tolerances == {}
     with pytest.raises(SettingsError, match="the tolerance of R is a fraction"):  # given ones take precedence
         islands.diagnose(make_record("dc-motor"), simulator, tolerance={"R": 2.0})
 
