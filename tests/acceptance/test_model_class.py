@@ -11,9 +11,9 @@ import islands
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError, SettingsError
 from islands.export import export, write_export
-from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.specification import parse_spec
 from islands.simulation.predictors import free_run
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import parse_spec
 from support.equation_programs import OCTAVE, extend, run_c, run_matlab
 from support.gain_scheduled import TRUE, GainScheduledModel, add_class, make_record
 from support.undrawn import undrawn_figures
