@@ -1,6 +1,6 @@
 """Findings: named causes with their confidence, their parameters, and the causes that explain as much."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import scipy
@@ -171,21 +171,38 @@ def _describe_effect(
     if outcome.verdict == Verdict.REMAINDER and explained < 1.0:
         others.append(make_unlisted_cause(named, 1.0 - explained))
     free = {each.effect.cause for each, _ in screened if each.effect.is_free}
-    equal = {
-        cause
-        for cause, other in scored.items()
-        if other.score > named.score - (0.0 if cause in free else EQUIVALENCE_MARGIN)
-    }
+    equal = list_equivalents(scored, named, free)
     finding = Finding(
         name,
         family,
         compute_confidence(named, others),
-        tuple(sorted(equal, key=lambda cause: -scored[cause].score)),
+        equal,
         values,
         named.score,
         explained,
     )
     return finding, [each for each, _ in screened if each.effect.cause in equal]
+
+
+def list_equivalents(
+    scored: Mapping[str, ScoredAlternative], named: ScoredAlternative, free: Collection[str]
+) -> tuple[str, ...]:
+    """Return the causes that a record cannot distinguish from the named one, best first, equal ones by name.
+
+    Parameters
+    ----------
+    scored : mapping
+        The other causes with their scores.
+    named : ScoredAlternative
+    free : collection of str
+        Causes of free forms, which have to be better than the named one.
+    """
+    equal = [
+        cause
+        for cause, other in scored.items()
+        if other.score > named.score - (0.0 if cause in free else EQUIVALENCE_MARGIN)
+    ]
+    return tuple(sorted(equal, key=lambda cause: (-scored[cause].score, cause)))
 
 
 def _list_screened(

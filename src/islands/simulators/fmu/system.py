@@ -104,9 +104,11 @@ def _check_target(equation: Equation, system: OdeSystem) -> None:
         )
     if equation.target == OUTPUT and not equation.is_derivative:
         return
-    outputs = set(system.of_fmu) - set(states)
-    for name in outputs.intersection(_find_fmu_values(equation.expression)):
-        raise ModelError(f"{equation.place}: {FMU.name}({name}) is possible in the equation of output only")
+    for name in _find_fmu_values(equation.expression):
+        if name in system.of_fmu and name not in states:
+            raise ModelError(
+                f"{equation.place}: {FMU.name}({name}) is possible in the equation of output only"
+            )
 
 
 def _find_fmu_values(expression: Expression) -> list[str]:
