@@ -38,6 +38,7 @@ _STABLE_AFTER = 10.0
 _API_HEAD_START = 2.0
 
 #: Seconds until the first heartbeat of a child: Ray may be read from a slow disk, a database may be locked.
+#: Also the longest time without a heartbeat of a child that reads pages of its memory from a disk.
 _STARTUP_TIMEOUT = 120.0
 
 #: Seconds that the children have to end by themselves.
@@ -45,6 +46,9 @@ _SHUTDOWN_GRACE = 15.0
 
 #: Number of exits with the same error at the start, without any longer run, that end the supervisor.
 _MOST_FAILURES = 5
+
+#: Letter of Linux for a process that waits for a disk and cannot be interrupted.
+_WAITS_FOR_DISK = "D"
 
 #: Option of Linux's prctl: the signal that a process receives when its parent ends.
 _PR_SET_PDEATHSIG = 1
@@ -63,8 +67,8 @@ class Role:
     name : str
     command : sequence of str
     patience : float
-        Seconds without a heartbeat after which the process counts as hanging. Before the first heartbeat it
-        is starting, which may take longer.
+        Seconds without a heartbeat after which the process counts as hanging. It may take longer while it is
+        starting, before the first heartbeat, or reads pages of its memory from a disk.
     orphaned : signal
         Signal that the process receives if the supervisor ends.
     needs : tuple of str
@@ -77,6 +81,10 @@ class Role:
         File descriptor from which heartbeats are read; -1 if the process does not run.
     last_heartbeat : float, optional
         Time of the last heartbeat; None before the first one.
+    last_active : float
+        Time of the last heartbeat, or of a later check that has found it reading pages from a disk.
+    page_faults : str
+        Number of pages that it had read then.
     is_killed : bool
         Whether the process is killed because it hangs. One that waits for a disk ends after that.
     started_at, start_at : float
@@ -102,6 +110,8 @@ class Role:
     process: "subprocess.Popen[bytes] | None" = None
     pipe: int = -1
     last_heartbeat: float | None = None
+    last_active: float = 0.0
+    page_faults: str = ""
     is_killed: bool = False
     started_at: float = 0.0
     start_at: float = 0.0
@@ -179,13 +189,9 @@ def _check_role(
         return 0
     _read_heartbeats(role, now)
     if role.process.poll() is None:
-        since, timeout = (
-            (role.started_at, _STARTUP_TIMEOUT)
-            if role.last_heartbeat is None
-            else (role.last_heartbeat, role.patience)
-        )
-        if now - since > timeout and not role.is_killed:
-            _print(log, f"{role.name} has sent no heartbeat for {now - since:.1f} s: it is started again")
+        if _is_hanging(role, now) and not role.is_killed:
+            silent = now - (role.last_heartbeat or role.started_at)
+            _print(log, f"{role.name} has sent no heartbeat for {silent:.1f} s: it is started again")
             role.process.kill()
             role.is_killed = True
         return 0
@@ -234,7 +240,32 @@ def _set_parent_death_signal(number: signal.Signals) -> None:
 def _read_heartbeats(role: Role, now: float) -> None:
     with suppress(BlockingIOError):
         if os.read(role.pipe, 4096):
-            role.last_heartbeat = now
+            role.last_heartbeat = role.last_active = now
+            role.page_faults, _ = _read_state(role)
+
+
+def _is_hanging(role: Role, now: float) -> bool:
+    """Return whether a process is silent for longer than it may be.
+
+    A thread that waits for a page, for example of a library that is imported from a busy disk, holds the lock
+    of the interpreter. No other thread sends a heartbeat meanwhile.
+    """
+    if role.last_heartbeat is None:
+        return now - role.started_at > _STARTUP_TIMEOUT
+    if now - role.last_active > role.patience:
+        page_faults, state = _read_state(role)
+        if page_faults != role.page_faults or state == _WAITS_FOR_DISK:
+            role.last_active, role.page_faults = now, page_faults
+    return now - role.last_active > role.patience or now - role.last_heartbeat > _STARTUP_TIMEOUT
+
+
+def _read_state(role: Role) -> tuple[str, str]:
+    """Return how many pages a process has read from a disk, and its state; both empty without /proc."""
+    assert role.process is not None
+    with suppress(OSError):
+        fields = Path(f"/proc/{role.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return fields[9], fields[0]
+    return "", ""
 
 
 def _handle_exit(role: Role, now: float) -> None:

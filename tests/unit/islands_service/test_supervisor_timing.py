@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -21,15 +22,30 @@ while True:
     os.write(int(os.environ["ISLANDS_LIFELINE"]), b".")
     time.sleep(0.005)
 """
+#: Reads pages of a file from the disk, as of a library under memory pressure, until the file is deleted.
+READING = """
+import mmap, os, signal, sys
+os.write(int(os.environ["ISLANDS_LIFELINE"]), b".")
+place = 0
+while os.path.exists(sys.argv[1]):
+    with open(sys.argv[1], "rb") as file:
+        os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as pages:
+            pages[place]
+        place = (place + 1_000_000) % 8_000_000
+signal.pause()
+"""
 ONE_HEARTBEAT = f"import os; os.write(int(os.environ['ISLANDS_LIFELINE']), b'.'); {SILENT}"
 
 
 class ControlledRole:
     """A role that is checked at times chosen by the test."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, script: str, patience: float) -> None:
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, script: str, patience: float, *arguments: str
+    ) -> None:
         self.now, self.log = 1000.0, io.StringIO()
-        self.role = Role("api", [sys.executable, "-S", "-E", "-c", script], patience)
+        self.role = Role("api", [sys.executable, "-S", "-E", "-c", script, *arguments], patience)
         monkeypatch.setattr(supervisor, "monotonic", lambda: self.now)
         self.check()
 
@@ -76,8 +92,8 @@ def start_role(monkeypatch: pytest.MonkeyPatch) -> Iterator[StartRole]:
     """Start a role; its process is killed after the test."""
     made: list[ControlledRole] = []
 
-    def start(script: str, patience: float = 60.0) -> ControlledRole:
-        made.append(ControlledRole(monkeypatch, script, patience))
+    def start(script: str, patience: float = 60.0, *arguments: str) -> ControlledRole:
+        made.append(ControlledRole(monkeypatch, script, patience, *arguments))
         return made[-1]
 
     yield start
@@ -126,6 +142,59 @@ def test_role_without_heartbeats_is_killed_after_its_timeout(start_role: StartRo
     role.ended(0.1)
     assert process.returncode == -signal.SIGKILL
     assert "api has sent no heartbeat for 5.1 s: it is started again" in role.log.getvalue()
+
+
+def stat(pid: int) -> list[str]:
+    """Return the fields of the state of a process, from its state letter on."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+
+
+def wait_for_page_faults(pid: int) -> None:
+    """Wait until a process has read a page from a disk."""
+    before = stat(pid)[9]
+    eventually(lambda: stat(pid)[9] != before, seconds=15.0)
+
+
+def test_silent_role_that_reads_pages_from_a_disk_is_killed_after_they_are_read(
+    start_role: StartRole, tmp_path: Path
+) -> None:
+    """The thread that waits for a page of a library has the lock of the interpreter."""
+    role = start_reader(start_role, tmp_path)
+    process = role.role.process
+    assert process is not None
+    for _ in range(3):
+        role.check(5.1)
+        assert role.log.getvalue() == ""
+        wait_for_page_faults(process.pid)
+    (tmp_path / "pages").unlink()
+    eventually(lambda: stat(process.pid)[0] == "S")
+    role.check(5.1)  # the pages that it has read meanwhile
+    role.check(5.1)
+    role.ended(0.1)
+    assert "api has sent no heartbeat for 25.5 s: it is started again" in role.log.getvalue()
+
+
+def test_role_that_reads_pages_for_minutes_is_killed(start_role: StartRole, tmp_path: Path) -> None:
+    role = start_reader(start_role, tmp_path)
+    role.check(supervisor._STARTUP_TIMEOUT + 0.1)
+    role.ended(0.1)
+    assert "api has sent no heartbeat for 120.1 s" in role.log.getvalue()
+
+
+def start_reader(start_role: StartRole, folder: Path) -> ControlledRole:
+    """Start a role that reads pages from a disk; it has sent a heartbeat before."""
+    file = folder / "pages"
+    file.write_bytes(os.urandom(8_000_001))
+    with file.open("rb") as written:
+        os.fsync(written.fileno())
+    role = start_role(READING, 5.0, str(file))
+    role.wait_for_heartbeat()
+    assert role.role.process is not None
+    try:
+        wait_for_page_faults(role.role.process.pid)
+    except AssertionError:
+        pytest.skip("the temporary folder is not on a disk")
+    return role
 
 
 def test_silence_is_reported_once_until_the_process_is_gone(
