@@ -23,6 +23,14 @@ settings.load_profile("fast")
 DATABASES = ("sqlite", pytest.param("postgresql", marks=pytest.mark.ci))
 
 
+@pytest.fixture
+def toy_class(monkeypatch):
+    """Add the toy class of models to the table."""
+    from support.gain_scheduled import add_class
+
+    add_class(monkeypatch)
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Mark the tests that start PostgreSQL as ci."""

@@ -18,10 +18,7 @@ from support.equation_programs import OCTAVE, extend, run_c, run_matlab
 from support.gain_scheduled import TRUE, GainScheduledModel, add_class, make_record
 from support.undrawn import undrawn_figures
 
-
-@pytest.fixture(autouse=True)
-def known_class(monkeypatch):
-    add_class(monkeypatch)
+pytestmark = pytest.mark.usefixtures("toy_class")
 
 
 @pytest.fixture(scope="module")

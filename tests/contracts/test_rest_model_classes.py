@@ -12,16 +12,11 @@ from islands_service.coordinator.identification_job import run_identification_jo
 from islands_service.domain.job import REPORT, JobState
 from islands_service.figure_worker import read_search_result, render_figures, render_model_figures
 from islands_service.store.blobs import Blobs
-from support.gain_scheduled import TRUE, GainScheduledModel, add_class, make_record
+from support.gain_scheduled import TRUE, GainScheduledModel, make_record
 from support.job_runs import make_run
 from support.stores import LONG, taken
 
-pytestmark = pytest.mark.ci
-
-
-@pytest.fixture(autouse=True)
-def known_class(monkeypatch):
-    add_class(monkeypatch)
+pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("toy_class")]
 
 
 @pytest.fixture

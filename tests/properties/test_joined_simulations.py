@@ -18,6 +18,8 @@ from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LinearSpec
 from support.simulated_records import SAMPLES, made, names
 
+pytestmark = pytest.mark.usefixtures("toy_class")
+
 #: First sample of every recording, and the sample after the last.
 EDGES = (0, 250, 330, SAMPLES)
 

@@ -16,6 +16,7 @@ from islands.simulators import (
     linear,
     narx,
     output_equation,
+    parametric,
     python_function,
     recorded_output,
     saved_extension,
@@ -28,12 +29,15 @@ from islands.simulators.ode import simulator as ode
 from islands.simulators.specification.table import SIMULATORS, PhysicalSpec
 from support.simulated_records import made, names
 
+pytestmark = pytest.mark.usefixtures("toy_class")
+
 #: Classes of the simulators that are not physical systems; those of "held" and "terms" are
 #: inside an extension.
 CLASSES = {
     "ode": ode.OdeSimulator,
     "linear": linear.LinearSimulator,
     "model": narx.NarxSimulator,
+    "class": parametric.ParametricSimulator,
     "column": recorded_output.RecordedOutput,
     "fmu": fmu.FmuSimulator,
     "python": python_function.PythonFunctionSimulator,
@@ -52,7 +56,6 @@ SHARED_MODULES = {
     "interface",
     "mapped_input",
     "model_form",
-    "parametric",  # of classes of models, which `tests/acceptance` adds
     "second_order",
 }
 

@@ -1,5 +1,6 @@
 """A specification of every simulator, each with a short record that the simulator could have produced."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.export.fmu.compiler import find_compiler
+from islands.io.models import model_json
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec, ProgramSpec
 from islands.simulators.specification.equations import OdeSpec
@@ -25,6 +27,7 @@ from islands.simulators.specification.table import (
     ModelSpec,
     PhysicalSpec,
 )
+from support.gain_scheduled import GainScheduledModel
 from support.oscillator_fmus import write_oscillator
 from support.repository import ROOT
 
@@ -54,6 +57,11 @@ MODEL = {
     ],
 }
 
+#: Model of a class that is not NARX; the fixture ``toy_class`` adds the class.
+OF_CLASS = GainScheduledModel(
+    parameters=(0.9, 0.8, 0.001, 0.1), input_names=("u_V",), output_name="y_um", dt=DT
+)
+
 MODEL_SPEC = ModelSpec(kind="model", model=MODEL, name="m")
 
 PROGRAM_SPEC = ProgramSpec(kind="python", path=str(PROGRAM), function="force", parameters={"c": 0.1})
@@ -74,7 +82,11 @@ class SpecAndRecord:
 
 def names() -> list[str]:
     """Return the names of all specifications, which are made on demand; an FMU requires a C compiler."""
-    return [name for name in (*SIMULATORS, "held", "terms", "extended") if name != "fmu" or find_compiler()]
+    return [
+        name
+        for name in (*SIMULATORS, "class", "held", "terms", "extended")
+        if name != "fmu" or find_compiler()
+    ]
 
 
 def wave(samples: int = SAMPLES, dt: float = DT) -> NDArray[np.float64]:
@@ -120,6 +132,7 @@ def made() -> Mapping[str, SpecAndRecord]:
     oscillation = simulate_oscillator(u, 0.5, 4.0, 200.0)
     position = simulate_oscillator(u, 2.0, 6.0, 0.0)
     level = 5.0 + scipy.signal.lfilter([0.02], [1, -0.98], np.abs(u) / 10)
+    lagged = scipy.signal.lfilter([0.0, 0.08], [1, -0.9], u) + 0.01 * rng.standard_normal(u.size)
     plain = recorded(u, 0.8 * u + 0.01 * rng.standard_normal(u.size))
     oscillator = recorded(u, oscillation, units=("N", "m"))
     spring = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})
@@ -152,6 +165,9 @@ def made() -> Mapping[str, SpecAndRecord]:
             plain,
         ),
         "model": SpecAndRecord(MODEL_SPEC, plain),
+        "class": SpecAndRecord(
+            ModelSpec(kind="model", model=json.loads(model_json(OF_CLASS)), name="lag"), recorded(u, lagged)
+        ),
         "column": SpecAndRecord(ColumnSpec(kind="column", column="theirs"), plain, {"theirs": 0.8 * u}),
         "python": SpecAndRecord(PROGRAM_SPEC, plain),
         "held": SpecAndRecord(

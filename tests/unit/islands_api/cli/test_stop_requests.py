@@ -9,6 +9,15 @@ import typer
 from islands.progress import StoppedError
 from islands_api.cli.stop_requests import Terminated, raise_on_signals, stop_requests
 
+
+@pytest.fixture(autouse=True)
+def default_interrupt():
+    """Interrupts are handled as in a terminal, even if the tests run in the background of a shell."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 
 

@@ -1,7 +1,7 @@
 """Findings of a diagnosis: the causes that a record cannot distinguish from a named one."""
 
-from islands.discrepancy.inference.confidence import ScoredAlternative
-from islands.discrepancy.inference.finding import list_equivalents
+from islands.diagnosis.inference.confidence import ScoredAlternative
+from islands.diagnosis.inference.finding import list_equivalents
 
 NAMED = ScoredAlternative(100.0, None)
 
