@@ -189,7 +189,7 @@ class Block:
         return [name for channel, name in enumerate(self.signals) if channel not in read]
 
     @cached_property
-    def lags(self) -> set[tuple[str, int]]:
+    def samples_read(self) -> set[tuple[str, int]]:
         """Samples that the equations read: signal and lag."""
         return {
             (self.signals[channel], lag - self.leads[channel])
@@ -201,7 +201,7 @@ class Block:
     @cached_property
     def depths(self) -> tuple[int, ...]:
         """Number of past samples of each signal; at least one of each output and state."""
-        read = self.lags
+        read = self.samples_read
         return tuple(
             max([int(channel < self.computed), *(lag for name_read, lag in read if name_read == name)])
             for channel, name in enumerate(self.signals)
@@ -210,7 +210,7 @@ class Block:
     @property
     def feedthrough(self) -> tuple[bool, ...]:
         """Whether an equation reads sample k of each input."""
-        read = self.lags
+        read = self.samples_read
         return tuple((name, 0) in read for name in self.signals[self.computed :])
 
     @property

@@ -162,11 +162,11 @@ class Model:
         parameters = self.theta or (None,) * self.size
         errors = self.standard_errors or (None,) * self.size
         return {
-            "inputs": self.input_names,
+            "inputs": list(self.input_names),
             "output": self.output_name,
             "dt": self.dt,
             "average": self.average,
-            "preprocessing": self.preprocessing,
+            "preprocessing": None if self.preprocessing is None else self.preprocessing.as_document(),
             "equation": equation(self),
             "latex": latex_equation(self),
             "terms": [

@@ -5,7 +5,7 @@ service work with them. Add it to ``islands.io.models.MODEL_CLASSES``.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, ClassVar, Self
@@ -19,6 +19,7 @@ from islands.expressions.printing import (
     LatexSignals,
     MathmlSignals,
     PlainSignals,
+    Printer,
     latex_number,
     mathml_number,
 )
@@ -157,7 +158,7 @@ class ParametricModel(ABC):
             maximum_lag=self.maximum_lag,
             dt=None if self.dt is None else float(self.dt),
             values=describe_values(self),
-            texts=tuple(self.equation().line.splitlines()),
+            texts=tuple(self._write_lines(self.signals)),
         )
 
     def _parse(self, text: str) -> Expression:
@@ -166,46 +167,45 @@ class ParametricModel(ABC):
     def equation(self) -> EquationText:
         """Return the equations as text, with the values of the parameters."""
         output, *inputs = signal_names(self)
-        named = (output, *self.states, *inputs)
-        numbers = {
-            name: f"{value:.{_DIGITS}g}" for name, value in zip(self.names, self.parameters, strict=True)
-        }
-        bracketed = {name: f"({number})" if number[0] == "-" else number for name, number in numbers.items()}
-        lines: list[str] = []
-        of_record: list[str] = []
-        rows, elements = [], []
-        mathml = MathmlSignals(self.signals, {name: mathml_number(each) for name, each in numbers.items()})
-        latex = LatexSignals(self.signals, {name: latex_number(each) for name, each in bracketed.items()})
-        for place, right in self._list_equations():
-            left = Lagged(place, 0)
-            sides = [printer.write(each) for printer in (latex, mathml) for each in (left, right)]
-            rows.append(f"{sides[0]} = {sides[1]}")
-            elements.append(f'<math display="block"><mrow>{sides[2]}<mo>=</mo>{sides[3]}</mrow></math>')
-            for found, signals in ((lines, self.signals), (of_record, named)):
-                plain = PlainSignals(signals, bracketed)
-                found.append(f"{plain.write(left)} = {plain.write(right)}")
         statement = describe_signals(self)
-        elements += [f'<math display="block">{row}</math>' for row in mathml_statement(statement)]
+        line = "\n".join(self._write_lines(self.signals))
+        rows = self._write(LatexSignals(self.signals, self._numbers(latex_number)), " = ")
         rows += [latex_statement(statement)] if statement else []
-        line = "\n".join(lines)
+        sides = self._write(MathmlSignals(self.signals, self._numbers(mathml_number)), "<mo>=</mo>")
+        elements = [f"<mrow>{each}</mrow>" for each in sides] + mathml_statement(statement)
         return EquationText(
             line=line,
             plain=f"{line}\nwhere {statement}" if statement else line,
-            named="\n".join(of_record),
+            named="\n".join(self._write_lines((output, *self.states, *inputs))),
             terms=self.names,
             latex=rows[0] if len(rows) == 1 else _gather(rows),
-            mathml="\n".join(elements),
+            mathml="\n".join(f'<math display="block">{each}</math>' for each in elements),
         )
 
-    def _list_equations(self) -> list[tuple[int, Expression]]:
-        """Return the channel and the right side of each equation, in the columns of the record."""
+    def _write_lines(self, signals: Sequence[str]) -> list[str]:
+        """Return the equations as plain text with the given names of the signals."""
+        return self._write(PlainSignals(signals, self._numbers(str)), " = ")
+
+    def _numbers(self, write: Callable[[str], str]) -> dict[str, str]:
+        """Return the text of each parameter by name, in brackets if it is negative."""
+        numbers = [f"{value:.{_DIGITS}g}" for value in self.parameters]
+        return {
+            name: f"({write(number)})" if number[0] == "-" and write is not mathml_number else write(number)
+            for name, number in zip(self.names, numbers, strict=True)
+        }
+
+    def _write(self, printer: Printer, equals: str) -> list[str]:
+        """Return the equations as a printer writes them, with the signals of the record at sample k."""
         sides, leads = self.right_sides(), self.leads
 
         def delay(leaf: Lagged) -> Expression:
             return Lagged(leaf.channel, leaf.lag - leads[leaf.channel])
 
-        names = ("y", *self.states)
-        return [(place, replace_leaves(self._parse(sides[name]), delay)) for place, name in enumerate(names)]
+        return [
+            f"{printer.write(Lagged(place, 0))}{equals}"
+            f"{printer.write(replace_leaves(self._parse(sides[name]), delay))}"
+            for place, name in enumerate(("y", *self.states))
+        ]
 
     def document(self) -> dict[str, Any]:
         """Return the model as JSON values."""

@@ -64,7 +64,7 @@ def _write_model(block: Block, u: str, measured: str) -> str:
     for place, name in enumerate(states, start=block.outputs):
         each += [f"{name}_{back} = {name}_{back - 1};" for back in range(block.depths[place], 0, -1)]
     lines += _loop(str(lag), each)
-    if any(name == "u" for name, _ in block.lags):
+    if any(name == "u" for name, _ in block.samples_read):
         lines.insert(0, f"const double *const u = {u};")
     return define_functions(block) + _write(lines)
 
