@@ -6,13 +6,13 @@ import sys
 import structlog
 
 from islands.errors import IslandsError, SettingsError
+from islands.processes.settings import freeze_garbage_collector, raise_file_limit
 from islands_api.server.asgi import HTTPServer, make_server_config
 from islands_api.server.listener import open_listener
 from islands_api.web.app import create_app
 from islands_api.web.auth import make_verifier
 from islands_service.liveness import FAILED, MISCONFIGURED, UNAVAILABLE
 from islands_service.logging_config import configure_logs
-from islands_service.process.settings import freeze_garbage_collector, raise_file_limit
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.store.backends.cached_blobs import open_blobs

@@ -2,10 +2,8 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from importlib.util import find_spec
 from types import MappingProxyType
 
-from islands.distribution import describe_missing_extra
 from islands.evolution.engine import Engine, SerialEngine
 from islands.progress import ProgressCallback
 
@@ -55,22 +53,3 @@ EngineFactory = Callable[[str | None, ProgressCallback], AbstractContextManager[
 
 #: Engines by name.
 ENGINES: Mapping[str, EngineFactory] = MappingProxyType({"serial": serial_engine, "ray": ray_engine})
-
-
-def has_ray() -> bool:
-    """Return whether Ray is installed."""
-    return find_spec("ray") is not None
-
-
-def serial_notice() -> str:
-    """Return the notice of a command that runs several islands on one core, since Ray is not installed."""
-    return f"engine: serial, on one core; {describe_missing_extra('a search on all cores', 'ray')}"
-
-
-def default_engine(islands: int, address: str | None = None) -> str:
-    """Return the name of the engine of a search for which none is chosen; all give the same result.
-
-    It is Ray for several islands and with the address of a cluster. Ray starts in three seconds, and one
-    island does not need it. Without Ray, it is the serial engine unless an address is given.
-    """
-    return "ray" if address or (islands > 1 and has_ray()) else "serial"

@@ -158,7 +158,7 @@ def test_self_test_reports_detection_limits_and_false_alarms(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     tested = partial(quick_self_test if quick else self_test, effects=effects, clean_surrogates=clean)
-    monkeypatch.setattr("islands_api.cli.commands.diagnose.self_test", tested)
+    monkeypatch.setattr("islands.cli.commands.diagnose.self_test", tested)
     out = f"self-test-{clean}-{quick}"
     printed, document = run_self_test(offset_record, out, "--workers", 1)
     assert [effect["name"] for effect in document["effects"]] == ["offset"]

@@ -15,12 +15,12 @@ from typing import NamedTuple
 import pytest
 
 import islands
+from islands.cli.app import EXTRAS as COMMAND_EXTRAS
+from islands.cli.engines import serial_notice
 from islands.errors import IslandsError
 from islands.facade.engine_choice import open_engine
 from islands.simulators.fmu.fmi_description import import_fmpy
-from islands_api.cli.app import EXTRAS as COMMAND_EXTRAS
 from islands_api.web.auth import make_verifier
-from islands_service.engines import serial_notice
 from islands_service.settings import ServiceSettings
 from islands_service.store.backends.connections import make_engine
 from islands_service.store.backends.object_store import ObjectStore

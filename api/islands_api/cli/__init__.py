@@ -1,4 +1,4 @@
-"""Command line ``islands``: one file per command. Read `islands_api.cli.app` first."""
+"""Command line ``islands``: commands of a service, one file each. Read `islands_api.cli.app` first."""
 
 from islands_api.cli.app import main
 

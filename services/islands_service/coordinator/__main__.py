@@ -8,6 +8,7 @@ import sys
 from functools import partial
 
 from islands.errors import IslandsError
+from islands.processes.settings import limit_threads
 from islands_service.coordinator.coordinator import Coordinator
 from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.coordinator.process_restart import restart_process
@@ -20,8 +21,7 @@ from islands_service.liveness import (
     watch_supervisor,
 )
 from islands_service.logging_config import configure_logs
-from islands_service.process.metrics import serve_metrics
-from islands_service.process.settings import limit_threads
+from islands_service.metrics import serve_metrics
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import service_settings
 from islands_service.store.database import DatabaseDamagedError, StoreError

@@ -287,7 +287,7 @@ class Coordinator:
 
     def _connect(self) -> None:
         from islands.facade.warm_up import warm_up  # noqa: PLC0415
-        from islands_service.process.settings import freeze_garbage_collector  # noqa: PLC0415
+        from islands.processes.settings import freeze_garbage_collector  # noqa: PLC0415
         from islands_service.runtime.cluster import cluster  # noqa: PLC0415
 
         self._ray.enter_context(cluster(self._find_address()))

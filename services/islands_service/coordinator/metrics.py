@@ -2,7 +2,7 @@
 
 from prometheus_client import Counter, Gauge, Histogram
 
-from islands_service.process.metrics import (
+from islands_service.metrics import (
     WRITE_BUCKETS,
     make_commit_histogram,
     make_object_observer,

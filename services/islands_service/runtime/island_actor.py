@@ -14,7 +14,7 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.facade.warm_up import warm_up
-from islands_service.process.settings import freeze_garbage_collector
+from islands.processes.settings import freeze_garbage_collector
 from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack_emigrants, unpack_island
 
 

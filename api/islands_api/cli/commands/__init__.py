@@ -1,1 +1,1 @@
-"""Commands, one file each; the table of commands is in `islands_api.cli.app`."""
+"""Commands of a service, one file each; their table is in `islands_api.cli.app`."""

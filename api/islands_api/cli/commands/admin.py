@@ -11,7 +11,7 @@ import typer
 from rich.table import Column, Table
 from rich.text import Text
 
-from islands_api.cli.console import errors, output
+from islands.cli.console import errors, output
 from islands_api.cli.service.admin_job_commands import jobs
 from islands_api.cli.service.owner_commands import owners
 from islands_api.cli.service.store_options import Database, DataDir, open_store

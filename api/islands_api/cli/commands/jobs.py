@@ -7,13 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
+from islands.cli import options
+from islands.cli.console import errors, output
+from islands.cli.output_folder import check_folder
+from islands.cli.record_options import with_reading_options
+from islands.cli.search_options import DEFAULTS, SearchOptions, Seed, with_search_options
 from islands.errors import SettingsError
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands_api.cli import options
-from islands_api.cli.console import errors, output
-from islands_api.cli.output_folder import check_folder
-from islands_api.cli.record_options import with_reading_options
-from islands_api.cli.search_options import DEFAULTS, SearchOptions, Seed, with_search_options
 from islands_api.cli.service import job_views as views
 from islands_api.cli.service.client_options import LOCAL, ApiKey, Json, Url, open_client, read_pages
 from islands_api.client import Client, JobFailedError

@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
+from islands.cli.console import errors
 from islands.distribution import describe_missing_extra, list_missing_packages
 from islands.errors import SettingsError
-from islands_api.cli.console import errors
 from islands_api.cli.service.store_options import refuse_password
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.supervisor import Role, folder_lock, supervise

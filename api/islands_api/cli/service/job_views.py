@@ -11,11 +11,11 @@ from typing import Any
 import typer
 from rich.table import Table
 
+from islands.cli.console import output, progress
 from islands.io.models import narx_from_json
 from islands.io.result_text.model_table import LEGEND, MARK
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.simulators.specification.table import EXTENDED_FILE
-from islands_api.cli.console import output, progress
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
 from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, RUN_TIME, TERMINAL, JobState

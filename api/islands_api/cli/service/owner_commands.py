@@ -8,7 +8,7 @@ import typer
 from rich.table import Column, Table
 from rich.text import Text
 
-from islands_api.cli.console import output
+from islands.cli.console import output
 from islands_api.cli.service.store_options import COMMAND_LINE, Database, DataDir, open_store
 from islands_service.domain.owner import DEFAULT_WEIGHT, QUOTA_NAMES, Owner
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from islands.errors import SettingsError
+from islands.processes.pool import process_pool
 from islands.progress import StoppedError
 from islands.reproduction import tasks
 from islands.reproduction.tasks import ReproductionOptions, Task, run_tasks
-from islands_service.process.pool import process_pool
 
 
 def count_and_divide(folder: str, number: int) -> dict:

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 import typer
 
+from islands.cli.commands.identify import identify
+from islands.cli.search_options import SETTINGS
 from islands_api.cli.commands import jobs as command
-from islands_api.cli.commands.identify import identify
-from islands_api.cli.search_options import SETTINGS
 from islands_service.domain.job import DISCREPANCY, EXTENDED, REPORT, JobOutcome, JobState, Submission
 from islands_service.domain.job_spec import Identification
 from islands_service.store.blobs import Blobs

@@ -1,1 +1,0 @@
-"""Commands that try islands out: a demonstration, records of examples, simulated systems."""

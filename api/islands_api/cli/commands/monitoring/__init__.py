@@ -1,1 +1,0 @@
-"""Command that follows a simulation from record to record."""

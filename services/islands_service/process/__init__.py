@@ -1,1 +1,0 @@
-"""A process of the service: its settings and its metrics."""

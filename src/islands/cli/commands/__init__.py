@@ -1,0 +1,1 @@
+"""Commands, one file each; their table is in `islands.cli.app`."""

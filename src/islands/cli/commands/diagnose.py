@@ -1,0 +1,246 @@
+"""``islands diagnose``: errors of a simulation on a record, their causes, and the gain of a correction."""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any
+
+import typer
+
+from islands.cli import options
+from islands.cli.console import compile_kernels, output, progress
+from islands.cli.output_folder import check_folder
+from islands.cli.record_options import with_reading_options
+from islands.cli.recordings import Recordings
+from islands.cli.runs.diagnosis_fits import explain_continuation, keep_fits, say_to_continue, write_fits
+from islands.cli.runs.plan import (
+    PLAN,
+    PlanOptions,
+    read_input,
+    show_plan,
+    with_plan_options,
+    write_plan,
+)
+from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
+from islands.data.dataset import Dataset
+from islands.data.split import hold_out
+from islands.diagnosis.calibration.fit_journal import FitJournal
+from islands.diagnosis.detectability import SelfTest, self_test
+from islands.diagnosis.documents.result_text import summarise_self_test
+from islands.diagnosis.findings import ResidualFormula
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.interim_findings import InterimFindings
+from islands.diagnosis.planning.experiment_plan import plan_experiment
+from islands.diagnosis.procedure import diagnose as run_diagnosis
+from islands.diagnosis.result import Diagnosis
+from islands.errors import SettingsError
+from islands.facade.explain_residual import FORMULA, explain_residual
+from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, REPORT_FILE, DiagnosisResult
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.result_text.text_layout import wrap
+from islands.processes.pool import process_pool
+from islands.progress import Steps, StoppedError
+from islands.simulators.interface import Simulator
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import ColumnSpec, innermost, parse_spec
+
+#: Name of a step without which a diagnosis is complete.
+SELF_TEST = "self-test"
+
+#: Options of a diagnosis.
+NO_PLAN = PlanOptions()
+
+
+@with_plan_options
+@with_reading_options
+def diagnose(
+    inputs: options.Inputs,
+    out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
+    simulated: options.Simulated,
+    records: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="RECORD...", help="Recordings of one system, as for fit; one for --plan."),
+    ] = None,
+    output_column: Annotated[
+        str | None, typer.Option("--output", help="Output column; not needed for --plan.")
+    ] = None,
+    channels: options.Channels = None,
+    tolerance: options.Tolerances = None,
+    dt: options.SamplingTime = None,
+    rows: options.Rows = None,
+    validation: options.HeldOut = None,
+    reading: ReadingOptions = DEFAULT_READING,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
+    tested: Annotated[
+        bool,
+        typer.Option("--self-test", help="Estimate which effects this record can reveal; takes minutes."),
+    ] = False,
+    planning: PlanOptions = NO_PLAN,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", min=1, help="Largest number of processes; by default one for each core."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+) -> None:
+    """Find the errors of a simulation on recordings, name their causes, measure the gain of correction."""
+    if planning.plan:
+        if validation:
+            raise SettingsError("--validation is for a diagnosis: leave it out of a plan")
+        check_folder(out, force, PLAN)
+        compile_kernels()
+        columns_of_input = [options.single_input(options.columns(inputs)), *(channels or [])]
+        data = read_input(records or [], columns_of_input, output_column, dt, rows, reading, planning)
+        tolerances = options.tolerances(tolerance or [])
+        _plan(data, simulated, tolerances, planning, out, seed, workers)
+        return
+    planning.check_unused()
+    if not records or output_column is None:
+        raise SettingsError("a diagnosis needs a record and --output: give both, or --plan before any data")
+    check_folder(out, force, DIAGNOSIS_FILE)
+    compile_kernels()
+    with progress("diagnose") as show:
+        show("reading", 0.0)
+        spec = parse_spec(simulated)
+        inner = innermost(spec)
+        column = inner.column if isinstance(inner, ColumnSpec) else None
+        data, columns = _read_record(
+            *(records, validation, options.columns(inputs), channels or [], column),
+            *(output_column, dt, rows, reading),
+        )
+        simulator = make_simulator(spec, data, columns)
+        tolerances = options.tolerances(tolerance or [])
+        began = perf_counter()
+        run = partial(run_diagnosis, data, simulator, tolerances, seed, show)
+        diagnosis, fits, before = _diagnose_until_stopped(run, out, seed, workers)
+        with stop_requests(before) as stop:
+            steps = Steps(show, stop)
+            show(FORMULA, 0.8)
+            formula = _find_formula(diagnosis, seed, steps)
+            wall = perf_counter() - began
+            limits = None
+            if tested and diagnosis.verdict != Verdict.GROSS_ERROR:
+                limits = _run_self_test(diagnosis, simulator, tolerances, seed, workers, steps)
+            show(REPORT_FILE, 0.9)
+            found = DiagnosisResult.from_diagnosis(diagnosis, formula, limits, wall)
+            found.save(out, ", ".join(path.name for path in records), steps)
+            if steps.left_out:
+                write_fits(out, fits)
+    for paragraph in found.summary.splitlines():
+        output.print("\n".join(wrap(paragraph, "    ")), markup=False)
+    if limits is not None:
+        output.print(summarise_self_test(limits), markup=False)
+    output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
+    stop.end(out, (*diagnosis.left_out, *steps.left_out), explain_continuation(out))
+
+
+def _plan(
+    data: Dataset,
+    simulated: str,
+    tolerances: Mapping[str, float],
+    planning: PlanOptions,
+    out: Path,
+    seed: int,
+    workers: int | None,
+) -> None:
+    """Compare the causes that an experiment can tell apart, write the plan and print it."""
+    simulator = make_simulator(parse_spec(simulated), data)
+    with progress("plan") as show, stop_requests() as stop:
+        steps = Steps(show, stop)
+        with process_pool(workers, check=partial(steps.check, "comparison of the causes")) as parallel:
+            plan = plan_experiment(
+                *(data, simulator, planning.noise_std, tolerances, planning.pair),
+                *(planning.limits, seed, parallel, steps),
+            )
+        show("figure", 1.0)
+        write_plan(plan, out)
+    show_plan(plan, out)
+    stop.end(out, plan.left_out, REPEAT)
+
+
+def _diagnose_until_stopped(
+    run: Callable[..., Diagnosis], out: Path, seed: int, workers: int | None
+) -> tuple[Diagnosis, FitJournal, StopRequests | None]:
+    """Run a diagnosis; if a signal ends it, return the findings so far, and the request to stop.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        The signal arrived before the first result.
+    """
+    interim = InterimFindings()
+    try:
+        with keep_fits(out) as fits, process_pool(workers) as parallel:
+            return run(fits.record(parallel), interim=interim), fits, None
+    except KeyboardInterrupt as interrupt:
+        with stop_requests(StopRequests(interrupt)) as stop:
+            found = interim.make_diagnosis(seed)
+        if found is None:
+            say_to_continue(out)
+            raise
+        return found, fits, stop
+
+
+def _find_formula(diagnosis: Diagnosis, seed: int, steps: Steps) -> ResidualFormula | None:
+    """Search for a formula of the residual, as an optional step."""
+    if diagnosis.left_out:
+        steps.skip(FORMULA)
+        return None
+    with suppress(StoppedError):
+        return explain_residual(diagnosis, seed, stop=partial(steps.skip, FORMULA))
+    return None
+
+
+def _run_self_test(
+    diagnosis: Diagnosis,
+    simulator: Simulator,
+    tolerance: Mapping[str, float],
+    seed: int,
+    workers: int | None,
+    steps: Steps,
+) -> SelfTest | None:
+    """Run the self-test, as an optional step, and show the remaining time."""
+    if steps.skip(SELF_TEST):
+        return None
+    steps.report(SELF_TEST, 0.0)
+    began = perf_counter()
+
+    def check() -> None:
+        if steps.skip(SELF_TEST):
+            raise StoppedError(SELF_TEST)
+
+    def update(message: str, fraction: float | None = None, /) -> None:
+        left = (perf_counter() - began) * (1 / fraction - 1) if fraction else 0.0
+        steps.report(f"{SELF_TEST}, {message}, {_format_duration(left)} left", fraction)
+
+    with suppress(StoppedError), process_pool(workers, check=check) as parallel:
+        return self_test(diagnosis, simulator, tolerance, seed, parallel, progress=update)
+    return None
+
+
+def _format_duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+
+
+def _read_record(
+    records: list[Path],
+    validation: Path | None,
+    inputs: list[str],
+    channels: list[str],
+    column: str | None,
+    output_column: str,
+    dt: float | None,
+    rows: str | None,
+    reading: ReadingOptions,
+) -> tuple[Dataset, Mapping[str, Any]]:
+    """Read the recordings, and separately the column of a simulation that was recorded in them."""
+    extra = [] if column is None else [column]
+    names = [options.single_input(inputs), *channels, *extra]
+    recordings = Recordings(records, names, output_column, dt, reading, resting_inputs=True)
+    whole = recordings.read(rows)
+    if validation is not None:
+        whole = hold_out(whole, replace(recordings, paths=[validation]).read())
+    kept = 1 + len(channels)
+    return whole.first_inputs(kept), {} if column is None else {column: whole.u[:, kept]}

@@ -1,0 +1,41 @@
+"""``islands examples``: records to try the commands on."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from islands.cli.console import output
+from islands.errors import SettingsError
+from islands.io.records import write_record
+from islands.systems.example_records import EXAMPLE_RECORDS
+
+examples = typer.Typer(
+    help="Records to try the commands on: list them, copy them.", no_args_is_help=True, add_completion=False
+)
+
+
+@examples.command("list")
+def list_examples() -> None:
+    """List the records."""
+    for name, example in EXAMPLE_RECORDS.items():
+        output.print(f"{name}.csv  {example.description}", markup=False)
+
+
+@examples.command()
+def copy(
+    folder: Annotated[
+        Path, typer.Argument(help="Folder for the files; the current one by default.")
+    ] = Path(),
+    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
+) -> None:
+    """Write the records as CSV into a folder."""
+    paths = {name: folder / f"{name}.csv" for name in EXAMPLE_RECORDS}
+    if not force and (present := [path for path in paths.values() if path.exists()]):
+        raise SettingsError(f"{present[0]} exists: give another folder, or --force to replace it")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, path in paths.items():
+        record = EXAMPLE_RECORDS[name].make()
+        write_record(record, path)
+        columns = f"--input {record.input_names[0]} --output {record.output_name}"
+        output.print(f"{path}: {EXAMPLE_RECORDS[name].description}\n  {columns}", markup=False)

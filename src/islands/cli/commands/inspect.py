@@ -1,0 +1,63 @@
+"""``islands inspect``: columns, sampling and facts of a file before a model is sought."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from islands.cli import options
+from islands.cli.console import errors
+from islands.cli.record_options import with_reading_options
+from islands.facade.inspect_record import inspect_record
+from islands.io.inspection_text import format_inspection
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.row_range import parse_rows
+
+
+@with_reading_options
+def inspect(
+    record: options.Record,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option("--input", help="Input column; by default chosen by name and prediction."),
+    ] = None,
+    output_column: Annotated[
+        str | None, typer.Option("--output", help="Output column; by default chosen likewise.")
+    ] = None,
+    dt: options.SamplingTime = None,
+    rows: options.Rows = None,
+    reading: ReadingOptions = DEFAULT_READING,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a JSON document (schema islands.inspection/1).")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder for inspection.json, inspection.txt and the overview figure."),
+    ] = None,
+) -> None:
+    """Describe a record: columns, sampling, dead time, noise, excitation, and the next command."""
+    found = inspect_record(
+        record, options.columns(inputs or []), output_column, dt, parse_rows(rows), reading
+    )
+    document = json.dumps(found.as_document(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    text = format_inspection(found)
+    if out is not None:
+        _write(out, document, text)
+        if found.record is not None:
+            # Imported here, because it loads matplotlib.
+            from islands.figures.overview import draw_overview  # noqa: PLC0415
+            from islands.figures.style import save  # noqa: PLC0415
+            from islands.figures.themes import THEMES  # noqa: PLC0415
+
+            for theme in THEMES:
+                suffix = "" if theme == "light" else f"-{theme}"
+                save(draw_overview(found.record, found.facts, theme), out / f"overview{suffix}.svg")
+        errors.print(f"{out}: inspection.json, inspection.txt, overview.svg", markup=False)
+    typer.echo(document if as_json else text, nl=False)
+
+
+def _write(folder: Path, document: str, text: str) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "inspection.json").write_text(document, encoding="utf-8")
+    (folder / "inspection.txt").write_text(text, encoding="utf-8")

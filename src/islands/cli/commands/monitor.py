@@ -1,0 +1,249 @@
+"""``islands monitor``: states of the effects of a simulation from record to record, and alarms."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import sleep
+from time import time as read_clock
+from typing import Annotated, Any
+
+import typer
+
+from islands.cli import options
+from islands.cli.console import compile_kernels, errors, output
+from islands.cli.output_folder import check_folder
+from islands.cli.record_options import with_reading_options
+from islands.cli.recordings import Recordings
+from islands.cli.watched_folder import WatchedFolder, find_time, hash_file
+from islands.data.dataset import Dataset
+from islands.diagnosis.documents.monitor_json import monitor_json
+from islands.diagnosis.documents.monitor_state import (
+    RejectedRecord,
+    SavedMonitor,
+    read_monitor,
+    write_monitor,
+)
+from islands.diagnosis.documents.monitor_text import describe_alarm_text, describe_last_record
+from islands.diagnosis.monitoring.alarm_rate import DEFAULT_RATE
+from islands.diagnosis.monitoring.record_follower import TRAINING
+from islands.errors import IslandsError, SettingsError
+from islands.facade.record_monitor import (
+    create_monitor,
+    monitor_record,
+    parse_monitored,
+    reject_record,
+)
+from islands.figures.monitored_states import draw_monitored_states
+from islands.figures.style import save
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.table import ColumnSpec, ExtendedSpec, LocalSpec, innermost
+
+#: File of the state, from which the monitor continues.
+STATE = "state.json"
+
+#: File of the states and alarms, for other programs.
+RESULT = "monitor.json"
+
+#: File of the figure.
+FIGURE = "monitor.svg"
+
+#: Exit code of a run that raised an alarm.
+ALARM_EXIT = 3
+
+#: Seconds between two looks at the folder.
+POLL = 1.0
+
+
+@with_reading_options
+def monitor(
+    folder: Annotated[Path, typer.Argument(help="Folder into which records are written, one file each.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder for states, alarms and figure.")],
+    simulated: Annotated[
+        str | None,
+        typer.Option(
+            "--simulation",
+            help="extended.json or folder of a diagnosis, or a simulation as for diagnose; not needed to "
+            "continue.",
+        ),
+    ] = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option("--input", help="Input column; by default that of the extended simulation."),
+    ] = None,
+    output_column: Annotated[
+        str | None, typer.Option("--output", help="Output column; by default that of the simulation.")
+    ] = None,
+    channels: options.Channels = None,
+    tolerance: options.Tolerances = None,
+    false_alarms: Annotated[
+        str,
+        typer.Option(
+            "--false-alarms", help="Rate of false alarms: 1 per month, 0.1/week, 1 per 720 records."
+        ),
+    ] = DEFAULT_RATE,
+    interval: Annotated[
+        float | None,
+        typer.Option(
+            "--interval",
+            min=0.0,
+            help="Seconds from one record to the next; by default by the times in the file names, or the "
+            "duration of the first record.",
+        ),
+    ] = None,
+    training: Annotated[
+        int, typer.Option("--training", help="Number of first records that are the undisturbed state.")
+    ] = TRAINING,
+    follow: Annotated[bool, typer.Option("--follow", help="Wait for further records, until Ctrl-C.")] = False,
+    settle: Annotated[
+        float,
+        typer.Option("--settle", min=0.0, help="Seconds without a change after which a file is complete."),
+    ] = 2.0,
+    dt: options.SamplingTime = None,
+    reading: ReadingOptions = DEFAULT_READING,
+    force: Annotated[bool, typer.Option("--force", help="Start again, without the states in --out.")] = False,
+) -> None:
+    """Follow a simulation over the records of a folder, and raise an alarm when an effect has changed.
+
+    Exit code 3 if this run has raised an alarm. Run it again to continue with further records.
+    """
+    check_folder(out, force=True)
+    watched = WatchedFolder(folder, settle)
+    known = read_monitor(out / STATE) if (out / STATE).exists() and not force else None
+    if simulated is not None:
+        spec = parse_monitored(simulated)
+    elif known is not None:
+        spec = known.simulation
+    else:
+        raise SettingsError("a new monitor needs --simulation: extended.json or the folder of a diagnosis")
+    driving = [*options.columns(inputs or []), *(channels or [])]
+    columns = _find_columns(spec, known, driving, output_column)
+    reader = _Reader(*columns, spec, dt, reading)
+    settings = {
+        "false_alarms": false_alarms,
+        "interval": interval or watched.interval,
+        "training": training,
+        "tolerance": options.tolerances(tolerance or []),
+    }
+    out.mkdir(parents=True, exist_ok=True)
+    compile_kernels()
+    run = _Run(out, reader, spec, settings, known)
+    try:
+        while True:
+            for path in watched.take_complete(read_clock()):
+                run.analyse(path)
+            if not follow and not watched.has_unfinished:
+                break
+            sleep(POLL)
+    finally:
+        run.write_result()
+    if run.saved is None:
+        raise SettingsError(f"{folder} has no record that can be monitored")
+    if run.alarms:
+        raise typer.Exit(ALARM_EXIT)
+
+
+@dataclass(frozen=True, slots=True)
+class _Reader:
+    """Columns of the records, and how files are read."""
+
+    inputs: list[str]
+    output: str
+    spec: LocalSpec
+    dt: float | None
+    reading: ReadingOptions
+
+    def read(self, path: Path) -> tuple[Dataset, Mapping[str, Any]]:
+        """Return a record, and the column of a simulation that was recorded in it."""
+        inner = innermost(self.spec)
+        extra = [inner.column] if isinstance(inner, ColumnSpec) else []
+        names = [*self.inputs, *extra]
+        whole = Recordings([path], names, self.output, self.dt, self.reading, resting_inputs=True).read()
+        kept = len(self.inputs)
+        return whole.first_inputs(kept), dict.fromkeys(extra, whole.u[:, -1])
+
+
+class _Run:
+    """One run of the command: the monitor, and the number of alarms that this run has raised."""
+
+    def __init__(
+        self,
+        out: Path,
+        reader: _Reader,
+        spec: LocalSpec,
+        settings: dict[str, Any],
+        saved: SavedMonitor | None,
+    ) -> None:
+        self.saved, self.alarms = saved, 0
+        self._out, self._reader, self._spec, self._settings = out, reader, spec, settings
+        self._rejected: list[RejectedRecord] = []
+
+    def analyse(self, path: Path) -> None:
+        """Analyse a file, and write the state; report a file that cannot be used, and continue."""
+        sha256 = hash_file(path)
+        if self.saved is not None and self.saved.knows(path.name, sha256):
+            return
+        try:
+            record, columns = self._reader.read(path)
+            record = replace(record, sha256=sha256)
+            monitor = self.saved or self._create(record, columns)
+            before = len(monitor.state.alarms)
+            monitor = monitor_record(monitor, record, path.name, find_time(path.name), columns)
+        except (IslandsError, OSError) as error:
+            self._reject(path.name, sha256, str(error))
+            return
+        for each in self._rejected:
+            monitor = reject_record(monitor, each.name, each.sha256, each.reason)
+        self._rejected.clear()
+        self._keep(monitor)
+        output.print(describe_last_record(monitor.state), markup=False)
+        for alarm in monitor.state.alarms[before:]:
+            self.alarms += 1
+            output.print(describe_alarm_text(monitor.state, alarm), markup=False)
+            self.write_result()
+
+    def _create(self, record: Dataset, columns: Mapping[str, Any]) -> SavedMonitor:
+        monitor = create_monitor(record, self._spec, columns=columns, **self._settings)
+        per_alarm = 1.0 / monitor.state.settings.false_alarms
+        output.print(
+            f"false alarms: {monitor.false_alarms}, with a record every {monitor.interval:g} s one in "
+            f"{per_alarm:.0f} records",
+            markup=False,
+        )
+        return monitor
+
+    def write_result(self) -> None:
+        """Write states and alarms for other programs, and the figure."""
+        if self.saved is None:
+            return
+        (self._out / RESULT).write_text(monitor_json(self.saved), encoding="utf-8")
+        save(draw_monitored_states(self.saved.state), self._out / FIGURE)
+
+    def _reject(self, name: str, sha256: str, reason: str) -> None:
+        errors.print(f"{name}: skipped: {reason}", markup=False)
+        if self.saved is None:
+            self._rejected.append(RejectedRecord(name, sha256, reason))
+        else:
+            self._keep(reject_record(self.saved, name, sha256, reason))
+
+    def _keep(self, monitor: SavedMonitor) -> None:
+        write_monitor(monitor, self._out / STATE)
+        self.saved = monitor
+
+
+def _find_columns(
+    spec: LocalSpec, known: SavedMonitor | None, inputs: list[str], output_column: str | None
+) -> tuple[list[str], str]:
+    """Return the input columns and the output column: those given, or those of the simulation."""
+    if known is not None:
+        expected, expected_output = known.inputs, known.output
+    elif isinstance(spec, ExtendedSpec):
+        expected, expected_output = spec.inputs, spec.output
+    elif isinstance(spec, OdeSpec):
+        expected, expected_output = (spec.input, *spec.channels), spec.output
+    else:
+        expected, expected_output = (), ""
+    chosen, chosen_output = inputs or list(expected), output_column or expected_output
+    if not chosen or not chosen_output:
+        raise SettingsError("this simulation does not name its columns: give --input and --output")
+    return chosen, chosen_output

@@ -1,0 +1,248 @@
+"""``islands simulate``: prediction of a record by whatever `islands.load` opens."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from islands.cli import options
+from islands.cli.console import compile_kernels, output
+from islands.cli.record_options import with_reading_options
+from islands.data.coupled_record import CoupledRecord
+from islands.data.dataset import Dataset
+from islands.data.preprocessing import preprocess
+from islands.data.preprocessing_steps import DETREND
+from islands.data.signal_map import match_rate
+from islands.errors import SettingsError
+from islands.facade.coupled.result import FittedCoupledModel
+from islands.facade.load import load
+from islands.facade.results.fitted_model import FittedModel
+from islands.facade.results.model_simulation import SHOOTING
+from islands.facade.results.result import Result
+from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
+from islands.io.records import read_dataset, write_simulation
+from islands.io.records.reader import open_record
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.row_range import parse_rows
+from islands.io.records.table_reading import read_table
+from islands.io.records.writer import write_coupled_simulation
+from islands.models.coupled_equations import coupled_signals
+from islands.models.equations import named_signals
+from islands.simulation.coupled_free_run import match_coupled
+from islands.validation.metrics import metrics
+from islands.validation.prediction_bands import PredictionBand
+
+
+@dataclass(frozen=True, slots=True)
+class _Request:
+    """Options of the command: what is read, how it is simulated, and where the simulation is written."""
+
+    record: Path
+    mode: str
+    out: Path | None
+    inputs: list[str]
+    outputs: list[str]
+    dt: float | None
+    rows: slice | None
+    reading: ReadingOptions
+    detrend: str
+    shooting: int | None
+    warm_up: int | None
+    bands: float | None
+
+    def read(self, inputs: Sequence[str], output_name: str, missing_output: bool = False) -> Dataset:
+        """Read a record of one output; a given output column replaces that of the model."""
+        if len(self.outputs) > 1:
+            raise SettingsError(f"the model has one output, got {', '.join(self.outputs)}: give one --output")
+        name = self.outputs[0] if self.outputs else output_name
+        return read_dataset(
+            *(self.record, inputs, name, self.dt, self.rows),
+            missing_output=missing_output,
+            options=self.reading,
+        )
+
+    def refuse_detrend(self, model: str) -> None:
+        """Refuse ``--detrend`` for a model that states its signals."""
+        if self.detrend != "none":
+            raise SettingsError(f"{model} reads the record as measured: leave out --detrend")
+
+
+@with_reading_options
+def simulate(
+    model: options.ModelFile,
+    record: options.Record,
+    mode: Annotated[str, typer.Option("--mode", help="one-step, shooting or free-run.")] = "free-run",
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="CSV file for time and y_sim, with --bands also for y_low and y_high."),
+    ] = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option("--input", help="Input column; by default that of the model."),
+    ] = None,
+    output_columns: Annotated[
+        list[str] | None, typer.Option("--output", help="Output column; by default that of the model.")
+    ] = None,
+    dt: options.SamplingTime = None,
+    rows: options.Rows = None,
+    reading: ReadingOptions = DEFAULT_READING,
+    detrend: Annotated[
+        str,
+        typer.Option(
+            "--detrend",
+            help=f"{', '.join(DETREND)}: subtract means or a line; for models that state no preprocessing.",
+        ),
+    ] = "none",
+    shooting: Annotated[
+        int | None,
+        typer.Option(
+            "--shooting",
+            help=f"Steps of the model in a shooting interval; by default those of the result, or {SHOOTING}.",
+        ),
+    ] = None,
+    warm_up: Annotated[
+        int | None,
+        typer.Option(
+            "--warm-up",
+            help="Samples before the first prediction; by default those of the result, or the largest lag.",
+        ),
+    ] = None,
+    bands: Annotated[
+        float | None,
+        typer.Option(
+            "--bands",
+            help="Probability, as 0.9, of the prediction band of a free run; for models of a result folder.",
+        ),
+    ] = None,
+) -> None:
+    """Simulate a model on a record. A free run needs only the first samples of the output.
+
+    For a model of a result folder, the errors on the validation data are those of the result.
+    """
+    request = _Request(
+        *(record, mode, out, options.columns(inputs or []), options.columns(output_columns or []), dt),
+        *(parse_rows(rows), reading, detrend, shooting, warm_up, bands),
+    )
+    match load(model):
+        case Result() as result:
+            _simulate_model(result.best, request)
+        case FittedModel() as single:
+            _simulate_model(single, request)
+        case FittedCoupledModel() as coupled:
+            _simulate_outputs(coupled, request)
+        case SavedDiagnosis() as diagnosis:
+            _simulate_system(diagnosis.require_extension(), request)
+        case SavedSimulation() as simulation:
+            _simulate_system(simulation, request)
+
+
+def _simulate_model(found: FittedModel, request: _Request) -> None:
+    model, mode = found.model, request.mode
+    if request.bands is not None and mode != "free-run":
+        raise SettingsError("--bands are for free runs of models of a result folder")
+    recorded = request.read(request.inputs or model.column_names, model.output_name, missing_output=True)
+    for step in recorded.reading:
+        output.print(step, markup=False)
+    if model.preprocessing is not None:
+        request.refuse_detrend("a model that states its preprocessing")
+    data = match_rate(model, preprocess(recorded, detrend=request.detrend))
+    if statement := named_signals(model):
+        output.print(f"as in the model, {statement}", markup=False)
+    compile_kernels()
+    first = found.warm_up if request.warm_up is None else request.warm_up
+    band = None if request.bands is None else found.bands(data, request.bands, first)
+    simulation = found.simulate(data, mode, first, request.shooting)
+    line = f"{mode} after a warm-up of {first} samples: {simulation.outcome}"
+    _print_metrics(data, simulation.y, line, request.out, band)
+
+
+def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
+    """Simulate all outputs of a record from its first samples; print the errors and write the outputs."""
+    model, outputs = found.model, request.outputs
+    if request.mode != "free-run" or request.bands is not None:
+        raise SettingsError("a model of several outputs has free runs only: leave out --mode and --bands")
+    request.refuse_detrend("a model of several outputs")
+    if outputs and len(outputs) != len(model.output_names):
+        raise SettingsError(
+            f"the model has the outputs {', '.join(model.output_names)}: give as many --output, or none"
+        )
+    inputs = request.inputs or model.models[0].column_names[: len(model.input_names)]
+    table = open_record(request.record, request.reading)
+    recorded = CoupledRecord(
+        tuple(
+            read_table(
+                *(table, request.record.name, inputs, name, request.dt, request.rows),
+                missing_output=True,
+                options=request.reading,
+            )
+            for name in outputs or model.output_names
+        )
+    )
+    data = match_coupled(model, recorded.map(lambda each: match_rate(model, each)))
+    if statement := coupled_signals(model):
+        output.print(f"as in the model, {statement}", markup=False)
+    compile_kernels()
+    first = found.warm_up if request.warm_up is None else request.warm_up
+    simulation = found.simulate(data, first)
+    if request.out is not None:
+        write_coupled_simulation(data, simulation.y, request.out)
+        output.print(f"{request.out}: {data.samples} rows", markup=False)
+    output.print(f"free-run after a warm-up of {first} samples: {simulation.outcome}", markup=False)
+    for each, y in zip(data.records, simulation.y.T, strict=True):
+        errors = metrics(each.y, y)
+        output.print(
+            f"{each.output_name}: MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} "
+            f"{each.output_unit}".rstrip(),
+            markup=False,
+        )
+
+
+def _simulate_system(found: SavedSimulation, request: _Request) -> None:
+    """Simulate equations, an FMU or the result of a diagnosis; initial states are fitted to the record."""
+    if request.bands is not None:
+        raise SettingsError("--bands are for free runs of models of a result folder")
+    request.refuse_detrend("a simulation")
+    if request.mode != "free-run":
+        raise SettingsError(f"a simulation supports free runs only: --mode {request.mode} is for models")
+    driving, recorded = request.inputs or found.column_names, found.recorded_columns
+    whole = request.read([*driving, *recorded], found.output_name)
+    data = whole.first_inputs(len(driving))
+    compile_kernels()
+    y = found.simulate(data, dict.fromkeys(recorded, whole.u[:, -1])).y
+    _print_metrics(data, y, f"{request.mode}: with {', '.join(found.parts)}", request.out)
+
+
+def _print_metrics(
+    data: Dataset,
+    y: NDArray[np.float64],
+    line: str,
+    out: Path | None,
+    band: PredictionBand | None = None,
+) -> None:
+    if out is not None:
+        write_simulation(data, y, out, None if band is None else (band.lower, band.upper))
+        output.print(f"{out}: {data.samples} rows", markup=False)
+    errors = metrics(data.y, y)
+    output.print(line, markup=False)
+    output.print(
+        f"MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} {data.output_unit}  "
+        f"fit {errors.fit_percent:.3f} %",
+        markup=False,
+    )
+    if band is not None:
+        _print_band(data, band)
+
+
+def _print_band(data: Dataset, band: PredictionBand) -> None:
+    predicted = ~np.isnan(band.y)
+    half = 0.5 * float(np.median((band.upper - band.lower)[predicted]))
+    text = f"{100 * band.level:g} % band: median half-width {half:.6g} {data.output_unit}".rstrip()
+    known = predicted & ~np.isnan(data.y)
+    if known.any():
+        inside = (band.lower <= data.y) & (data.y <= band.upper)
+        text += f",\n  contains {100 * inside[known].mean():.1f} % of the measured samples"
+    output.print(text, markup=False)

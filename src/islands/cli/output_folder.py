@@ -1,0 +1,39 @@
+"""Output folder of a command: the check before the work and the message after it."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from islands.cli.console import output
+from islands.errors import SettingsError
+
+if TYPE_CHECKING:
+    from islands.facade.results.result import Result
+
+
+#: Files of a result in its folder.
+RESULT_FILES = "result.json, models/, figures/, summary.txt, method.txt"
+
+
+def check_folder(folder: Path, force: bool, result: str = "result.json") -> None:
+    """Check that a result can be written to a folder without overwriting another result.
+
+    Raises
+    ------
+    SettingsError
+        The folder contains a result and ``force`` is false, the path or a part of it is a file, or the folder
+        is not writable.
+    """
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not existing.is_dir():
+        raise SettingsError(f"--out {folder}: {existing} is a file, give a folder")
+    if not os.access(existing, os.W_OK):
+        raise SettingsError(f"--out {folder}: {existing} is not writable, give another folder")
+    if (folder / result).exists() and not force:
+        raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
+
+
+def show_result(result: "Result", folder: Path) -> None:
+    """Print the summary and the files of a result."""
+    output.print(str(result), markup=False)
+    output.print(f"{folder}/: {RESULT_FILES}", markup=False)

@@ -1,0 +1,291 @@
+"""Run of ``islands identify`` in its folder: record, search, checkpoints, result."""
+
+import json
+from dataclasses import asdict, dataclass
+from math import inf, isfinite
+from pathlib import Path
+from time import monotonic, perf_counter
+from typing import Any
+
+import islands
+from islands.cli.console import Display, compile_kernels, errors, output, print_message, progress
+from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
+from islands.cli.output_folder import show_result
+from islands.cli.recordings import Recordings
+from islands.cli.runs.timed_engine import TimedEngine
+from islands.cli.search_progress import search_progress
+from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
+from islands.data.compatibility import match_record
+from islands.data.preprocessing_steps import PreprocessingSteps
+from islands.data.signal_map import match_rate
+from islands.data.split import share_samples, split_data
+from islands.errors import ModelError, RecordError, SettingsError
+from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
+from islands.evolution.search_state import SearchState
+from islands.evolution.settings import Settings
+from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError, choice_from_document
+from islands.facade.automatic.preset_choice import choose_preset
+from islands.io.checkpoints import (
+    read_checkpoint,
+    state_document,
+    state_from_document,
+    write_checkpoint,
+    write_hall,
+)
+from islands.io.records import fingerprint
+from islands.io.records.reading_options import ReadingOptions
+from islands.progress import Steps
+from islands.validation.metrics import metrics
+
+#: File of the search state.
+CHECKPOINT = "checkpoint.json"
+
+#: File of the hall of fame.
+HALL = "hall.json"
+
+#: File of the metrics on the test data.
+TEST = "test.json"
+
+#: Least seconds between two checkpoints: the work that a crash may lose.
+CHECKPOINT_SECONDS = 10.0
+
+#: Largest fraction of the run time spent on checkpoints. One of a thousand islands takes half a minute.
+CHECKPOINT_FRACTION = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """Options of a run that do not change its result, except for ``wall_time``.
+
+    Attributes
+    ----------
+    engine : str, optional
+        Name of an engine; by default that of `default_engine`.
+    address : str, optional
+        Address of a Ray cluster.
+    wall_time : float, optional
+        Seconds after which the search stops.
+    verbose : bool
+        Whether the memory used by the caches is printed.
+    """
+
+    engine: str | None
+    address: str | None
+    wall_time: float | None
+    verbose: bool
+
+    def engine_for(self, islands: int) -> str:
+        """Return the name of the engine."""
+        return self.engine or default_engine(islands, self.address)
+
+
+def run(
+    run_options: RunOptions,
+    folder: Path,
+    job: dict[str, Any],
+    state: SearchState | None = None,
+    spent: float = 0.0,
+) -> None:
+    """Run a job in a folder, or resume it, and print the result.
+
+    Parameters
+    ----------
+    job : dict
+        Recordings, columns, preset, seed and changed settings.
+    state : SearchState, optional
+        State from which the search is resumed.
+    spent : float
+        Seconds that the search took to reach this state.
+    """
+    possible = _resolve_possible(job)
+    data, held_out, test_data = _read_data(job, max(each.maximum_lag for each in possible))
+    folder.mkdir(parents=True, exist_ok=True)
+    compile_kernels()
+    chosen = run_options.engine_for(possible[0].islands)
+    if run_options.engine is None and possible[0].islands > 1 and not has_ray():
+        print_message(serial_notice())
+    with (
+        progress("identify") as show,
+        # Ray installs a handler for SIGTERM when it starts, so it starts before our handlers are installed.
+        start_engine(chosen, run_options.address, print_message) as started,
+        stop_requests() as stop,
+    ):
+        until = inf if run_options.wall_time is None else monotonic() + run_options.wall_time
+        engine = TimedEngine(started, until)
+        if state is None:
+            # Delete the files of an earlier run.
+            for name in (CHECKPOINT, HALL, TEST):
+                (folder / name).unlink(missing_ok=True)
+        preset = job["preset"]
+        if preset == AUTO:
+            stored = job.get("choice")
+            preset = (
+                choice_from_document(stored)
+                if stored
+                else _choose_preset(data, held_out, job["changes"], show, stop, folder)
+            )
+            # Checkpoints contain the job, so a resumed run does not choose again.
+            job = {**job, "choice": preset.to_document()}
+        checkpoints = _CheckpointWriter(folder, job, show, state, spent)
+        arguments: dict[str, Any] = {"preset": preset, "seed": job["seed"], **job["changes"]}
+        began = perf_counter() - spent
+        try:
+            result = islands.identify(
+                data,
+                validation=held_out,
+                start=state,
+                progress=show,
+                on_epoch=checkpoints,
+                stop=stop,
+                engine=engine,
+                **arguments,
+            )
+        finally:
+            # Also after an engine failure, so that no finished epoch is lost.
+            checkpoints.write()
+        result = result.with_wall_time(perf_counter() - began)
+        show("figures", 1.0)
+        drawing = Steps(stop=stop)
+        result.save(folder, drawing)
+    if not stop() and result.search_result.search.ended_by == "stopped":
+        errors.print(f"stopped: the result is the best so far; continue with --resume {folder}", markup=False)
+        if run_options.wall_time is not None:
+            errors.print(
+                "a result limited by --wall-time is not reproducible: it depends on the speed of the run"
+            )
+    show_result(result, folder)
+    if run_options.verbose:
+        for name, (size, limit) in result.search_result.search.caches.items():
+            output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
+    if test_data is not None:
+        _evaluate_test(result, test_data, folder)
+    stop.end(folder, (*result.left_out, *drawing.left_out), f"continue with --resume {folder}")
+
+
+def _choose_preset(
+    data: islands.Dataset,
+    held_out: islands.Dataset | float,
+    changes: dict[str, Any],
+    show: Display,
+    stop: StopRequests,
+    folder: Path,
+) -> Choice:
+    """Choose the preset. If a stop is requested, save the models of the kinds that were fitted, and end."""
+    try:
+        return choose_preset(data, held_out, changes, show, stop)
+    except StoppedChoiceError as stopped:
+        result, drawing = islands.Result.from_search(stopped.found), Steps(stop=stop)
+        result.save(folder, drawing)
+        show_result(result, folder)
+        stop.end(folder, (*result.left_out, "the search", *drawing.left_out), REPEAT)
+        raise
+
+
+def _resolve_possible(job: dict[str, Any]) -> tuple[Settings, ...]:
+    """Return the settings of a job, or of every kind of record among which the preset auto chooses."""
+    if job["preset"] == AUTO:
+        return tuple(resolve_kinds(job["changes"]).values())
+    return (resolve_settings(job["preset"], job["changes"]),)
+
+
+def _evaluate_test(result: islands.Result, test_data: islands.Dataset, folder: Path) -> None:
+    """Simulate the recommended model on the test data; print and write the metrics."""
+    test_data = match_rate(result.best.model, test_data)
+    simulated = result.best.simulate(test_data)
+    errors_by_name = asdict(metrics(test_data.y, simulated.y)) if simulated.outcome else {}
+    numbers = {name: value if isfinite(value) else None for name, value in errors_by_name.items()}
+    document = {"outcome": str(simulated.outcome), **numbers}
+    (folder / TEST).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    text = f"test data, not used before: free run {simulated.outcome}"
+    if errors_by_name:
+        mape, r2, rmse = (errors_by_name[name] for name in ("mape", "r2", "rmse"))
+        text += f", MAPE {mape:.4f} %, R2 {r2:.5f}, RMSE {rmse:.6g} {test_data.output_unit}".rstrip()
+    output.print(text, markup=False)
+
+
+def _read_data(
+    job: dict[str, Any], lag: int
+) -> tuple[islands.Dataset, islands.Dataset | float, islands.Dataset | None]:
+    """Read the data for estimation, validation (or its fraction) and the final test."""
+    for name, known in job["sha256"].items():
+        if fingerprint(name) != known:
+            raise RecordError(f"{name} has changed since the run began: restore the file, or start a new run")
+    # Checkpoints of versions with one recording have its path under another name.
+    paths = [Path(name) for name in job.get("records") or [job["record"]]]
+    reading = ReadingOptions(**job.get("reading", {}))
+    steps = PreprocessingSteps(**job.get("preprocessing", {}))
+    recordings = Recordings(paths, job["inputs"], job["output"], job["dt"], reading, steps)
+    data = recordings.read(job["rows"])
+    held_out = recordings.read_held_out(job["validation"], job["rows"])
+    test_data: islands.Dataset | None = None
+    if job["test"] is not None:
+        given = recordings.read_held_out(job["test"], job["rows"], "--test")
+        if isinstance(given, float):
+            parts = islands.split(data, given)
+            data, test_data = parts.estimation, parts.validation
+        else:
+            test_data = given
+        _check_test(test_data, [data] if isinstance(held_out, float) else [data, held_out], lag)
+    # Check the validation data before the folder is made; the search repeats this.
+    split_data(data, held_out)
+    return data, held_out, test_data
+
+
+def _check_test(test_data: islands.Dataset, others: list[islands.Dataset], lag: int) -> None:
+    """Check that the test data overlaps no other data, has the same sampling time and is long enough."""
+    test_data = match_record(others[0], test_data, "the record", "the test data")
+    for other in others:
+        if share_samples(other, test_data):
+            raise SettingsError(
+                "--test has samples that are used for estimation or validation: exclude them by --rows and "
+                "--validation"
+            )
+    if test_data.samples <= lag:
+        raise RecordError(
+            f"the test data has {test_data.samples} samples, and the largest lag is {lag}: give more samples"
+        )
+
+
+class _CheckpointWriter:
+    """Search callback that shows the progress and writes checkpoints."""
+
+    def __init__(
+        self, folder: Path, job: dict[str, Any], show: Display, state: SearchState | None, spent: float
+    ) -> None:
+        self._folder, self._job = folder, job
+        self._show = search_progress(show)
+        self._next = -inf  # the first populations are written immediately
+        self._began = monotonic() - spent
+        self._state = state
+
+    def __call__(self, state: SearchState, settings: Settings) -> None:
+        self._state = state
+        self._show(state, settings)
+        if monotonic() > self._next:
+            self.write()
+
+    def write(self) -> None:
+        """Write a checkpoint of the last epoch, if an epoch has ended."""
+        if self._state is not None:
+            now = monotonic()
+            header = {"job": self._job, "wall_s": now - self._began, **state_document(self._state)}
+            write_hall(self._state.archipelago.hall_of_fame, self._folder / HALL)
+            write_checkpoint(self._state.archipelago, self._folder / CHECKPOINT, header)
+            took = monotonic() - now
+            self._next = now + took + max(CHECKPOINT_SECONDS, took / CHECKPOINT_FRACTION)
+
+
+def load_run(folder: Path) -> tuple[dict[str, Any], SearchState, float]:
+    """Read the checkpoint of a folder: the job, the search state, and the seconds spent.
+
+    Raises
+    ------
+    ModelError
+        The checkpoint is missing or damaged.
+    """
+    path = folder / CHECKPOINT
+    archipelago, header = read_checkpoint(path)
+    try:
+        return dict(header["job"]), state_from_document(archipelago, header), float(header["wall_s"])
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ModelError(f"{path} is not a checkpoint of islands identify: {error!r}") from error

@@ -1,0 +1,191 @@
+"""Run of ``islands diagnose --plan``: what an experiment could tell apart, and the decisive experiment."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from islands.cli.console import output
+from islands.cli.option_groups import group_options, make_option
+from islands.data.channel_names import parse_unit
+from islands.data.dataset import Dataset
+from islands.diagnosis.documents.plan_json import plan_document
+from islands.diagnosis.documents.plan_text import plan_text
+from islands.diagnosis.documents.result_json import as_json
+from islands.diagnosis.planning.experiment_plan import DecisiveLimits, ExperimentPlan
+from islands.diagnosis.planning.planned_input import InputForm, InputLimits, PlannedInput
+from islands.errors import SettingsError, lookup
+from islands.figures.separability import draw_separability
+from islands.figures.style import save
+from islands.io.records import read_dataset
+from islands.io.records.reading_options import ReadingOptions
+from islands.io.records.row_range import parse_rows
+from islands.io.records.writer import write_input
+
+#: Files of a plan.
+PLAN, MATRIX, EXPERIMENT = "plan.json", "plan.svg", "experiment.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class PlanOptions:
+    """Options of a plan; the names are those of the options, without the prefix ``plan_``.
+
+    Attributes
+    ----------
+    plan : bool
+        Whether an experiment is planned.
+    noise_std : float or None
+    separate : str or None
+    excitation : str or None
+    amplitude, rate, duration : float or None
+    """
+
+    plan: bool = False
+    noise_std: float | None = None
+    separate: str | None = None
+    excitation: str | None = None
+    amplitude: float | None = None
+    rate: float | None = None
+    duration: float | None = None
+
+    @property
+    def pair(self) -> tuple[str, ...]:
+        """Names of the causes to be separated."""
+        return tuple(name.strip() for name in (self.separate or "").split(",") if name.strip())
+
+    @property
+    def limits(self) -> DecisiveLimits:
+        """Limits of the decisive experiment."""
+        return DecisiveLimits(self.amplitude, self.rate, self.duration)
+
+    def check_unused(self) -> None:
+        """Raise `SettingsError` if an option of a plan is given without ``--plan``."""
+        for option in fields(self)[1:]:
+            if getattr(self, option.name) is not None:
+                raise SettingsError(f"--{option.name.replace('_', '-')} is for plans: add --plan")
+
+
+_HELP = {
+    "noise_std": "White noise of the output in its unit, for --plan; by default estimated, with its colour.",
+    "separate": "CAUSE,CAUSE: two causes that --plan separates; by default all that it can.",
+    "excitation": "Input for --plan, if no record: multisine:LOW:HIGH, sine:FREQUENCY (Hz), steps:HOLD (s).",
+    "amplitude": "Half of the range of inputs for --plan; by default that of the given input.",
+    "rate": "Largest rate of inputs for --plan, per second; by default that of the given input.",
+    "duration": "Duration of the decisive experiment in seconds; by default that of the given input.",
+}
+
+_TYPES: dict[str, Any] = {"separate": str | None, "excitation": str | None}
+
+
+def with_plan_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Replace the parameter ``planning`` of a command by the options of a plan."""
+    flag = typer.Option("--plan", help="Before any data: which causes this input could tell apart.")
+    declared = [make_option("plan_plan", Annotated[bool, flag], default=False)]
+    for name, text in _HELP.items():
+        option = typer.Option(f"--{name.replace('_', '-')}", help=text)
+        declared.append(make_option(f"plan_{name}", Annotated[_TYPES.get(name, float | None), option]))
+    return group_options(
+        command,
+        "planning",
+        declared,
+        lambda values: PlanOptions(**{name.removeprefix("plan_"): value for name, value in values.items()}),
+    )
+
+
+def read_input(
+    records: list[Path],
+    inputs: list[str],
+    output_column: str | None,
+    dt: float | None,
+    rows: str | None,
+    reading: ReadingOptions,
+    planning: PlanOptions,
+) -> Dataset:
+    """Read the planned input from a file, or make the described one.
+
+    Raises
+    ------
+    SettingsError
+        There is neither one file nor a description, or both.
+    """
+    if len(records) + (planning.excitation is not None) != 1:
+        raise SettingsError(
+            "a plan needs one input: give a file with an input column, or --excitation with --amplitude, "
+            "--duration and --dt"
+        )
+    if records:
+        return read_dataset(
+            *(records[0], inputs, output_column, dt, parse_rows(rows), True, reading, True),
+        )
+    return _make_described(inputs, output_column or "y", dt, planning)
+
+
+def _make_described(
+    inputs: list[str], output_column: str, dt: float | None, planning: PlanOptions
+) -> Dataset:
+    if dt is None or planning.amplitude is None or planning.duration is None:
+        raise SettingsError("--excitation also needs --amplitude, --duration and --dt")
+    if len(inputs) != 1:
+        raise SettingsError("--excitation describes the input alone: channels need a record")
+    limits = InputLimits(-planning.amplitude, planning.amplitude, planning.rate or np.inf)
+    samples = round(planning.duration / dt)
+    u = parse_excitation(planning.excitation or "").make(limits, dt, samples)
+    return Dataset(
+        u=u,
+        y=np.full(samples, np.nan),
+        dt=dt,
+        input_names=tuple(inputs),
+        output_name=output_column,
+        input_units=(parse_unit(inputs[0]),),
+        output_unit=parse_unit(output_column),
+    )
+
+
+def parse_excitation(text: str) -> PlannedInput:
+    """Read ``multisine:LOW:HIGH``, ``sine:FREQUENCY`` or ``steps:HOLD``.
+
+    Raises
+    ------
+    SettingsError
+        The text has another form.
+    """
+    name, *given = text.split(":")
+    form = lookup({str(each): each for each in InputForm}, name, "excitation")
+    try:
+        numbers = [float(number) for number in given]
+        if min(numbers) <= 0.0:
+            raise ValueError
+        match form, numbers:
+            case InputForm.MULTISINE, (low, high):
+                return PlannedInput(form, 1.0, high, low)
+            case InputForm.SINE, (frequency,):
+                return PlannedInput(form, 1.0, frequency)
+            case InputForm.STEPS, (hold,):
+                return PlannedInput(form, 1.0, 1.0 / hold)
+    except ValueError:
+        pass
+    raise SettingsError(
+        f"--excitation {text}: write multisine:LOW:HIGH or sine:FREQUENCY in Hz, or steps:HOLD in s, with "
+        "positive numbers"
+    )
+
+
+def write_plan(plan: ExperimentPlan, folder: Path) -> None:
+    """Write a plan into a folder. The document is written last: if it exists, the folder is complete."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in (PLAN, EXPERIMENT):
+        (folder / name).unlink(missing_ok=True)
+    save(draw_separability(plan.isolability), folder / MATRIX)
+    if plan.decisive is not None:
+        name = plan.record.input_names[0]
+        write_input(plan.decisive.u, plan.decisive.dt, name, folder / EXPERIMENT)
+    (folder / PLAN).write_text(as_json(plan_document(plan)))
+
+
+def show_plan(plan: ExperimentPlan, folder: Path) -> None:
+    """Print a plan and the files of its folder."""
+    output.print(plan_text(plan), markup=False)
+    output.print(f"{folder}/: {', '.join(path.name for path in sorted(folder.iterdir()))}", markup=False)

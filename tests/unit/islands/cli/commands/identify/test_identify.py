@@ -1,0 +1,289 @@
+"""``islands identify`` in this process: files of a run, test data, and options."""
+
+import json
+import shutil
+import signal
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from islands.cli.runs import identify as command
+from islands.data.dataset import Dataset
+from islands.expressions.parsing import parse
+from islands.io.checkpoints import read_checkpoint, write_hall
+from islands.io.records import write_record
+from islands.models.narx import make_model
+from islands.simulation.predictors import free_run
+from support.identify_runs import COLUMNS, DEEPEST, SMALL, STEPWISE, TWO, models, record, refused
+
+# Files of a run.
+
+
+@pytest.mark.ci
+def test_run_writes_a_result_and_a_checkpoint_only(run, with_figures, tmp_path):
+    code, out, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--seed", "4")
+    assert (code, error) == (0, "")
+    assert "out/: result.json, models/, figures/, summary.txt, method.txt" in out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "checkpoint.json",
+        "figures",
+        "hall.json",
+        "method.txt",
+        "models",
+        "result.json",
+        "summary.txt",
+    }
+    assert {"convergence.svg", "front.svg", "free-run.svg", "loop.svg", "hold.svg"} <= {
+        path.name for path in (tmp_path / "out/figures").iterdir()
+    }
+    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
+    assert (search["generations"], search["evaluations"]) == (3, 40)
+    feasible = sum(search["outcomes"].get(name, 0) for name in ("ok", "abandoned"))
+    assert search["feasible_share"] == feasible / 40
+    assert search["wall_s"] > 0
+    archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
+    assert archipelago.generation == 3
+    assert about["job"]["seed"] == archipelago.islands[0].seed == 4
+    assert [about["history"][at][0] for at in (0, -1)] == [0, 3]
+    assert search["ended_by"] == "generations"
+
+
+@pytest.mark.ci
+def test_stages_before_and_after_the_epochs_are_displayed(run, monkeypatch):
+    shown = []
+
+    @contextmanager
+    def bar(_title):
+        yield lambda message, *_fraction, **_lines: shown.append(message)
+
+    monkeypatch.setattr(command, "progress", bar)
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
+    stages = ("sampling rate", "swap search", "generation 3/3", "estimation of the final models", "figures")
+    first = [next(at for at, text in enumerate(shown) if text.startswith(stage)) for stage in stages]
+    assert first == sorted(first)
+
+
+@pytest.mark.ci
+def test_signal_handlers_are_restored_after_a_run(run):
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+@pytest.mark.ci
+def test_files_of_an_earlier_run_are_deleted(run, tmp_path):
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--test", "0.2")[0] == 0
+    assert (tmp_path / "out/test.json").exists()
+    assert (tmp_path / "out/hall.json").exists()
+    assert "--force" in refused(run("r.csv", *COLUMNS, *SMALL, "--out", "out"))
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--force")[0] == 0
+    assert not (tmp_path / "out/test.json").exists()
+    code, _, error = run(
+        "r.csv", *COLUMNS, *SMALL, "--out", "out", "--force", "--seed", "9", "--wall-time", "1e-9"
+    )
+    assert code == 0
+    assert error.startswith("stopped: the result is the best so far")
+    assert not (tmp_path / "out/hall.json").exists()
+    assert not (tmp_path / "out/checkpoint.json").exists()
+
+
+def test_hall_of_fame_of_all_islands_is_written_with_the_checkpoint(run, tmp_path):
+    assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 0
+    archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
+    assert len(archipelago.islands) == 2
+    write_hall(archipelago.hall_of_fame, tmp_path / "expected.json")
+    assert (tmp_path / "out/hall.json").read_bytes() == (tmp_path / "expected.json").read_bytes()
+    best = [min(entry.fitness for entry in island.hall_of_fame.entries) for island in archipelago.islands]
+    assert about["history"][-1][3] == best
+
+
+# Test data.
+
+
+@pytest.mark.ci
+def test_values_of_the_test_data_do_not_change_the_models(run, tmp_path):
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "one", "--test", "0.2")[0] == 0
+    spoilt = record()
+    y = spoilt.y.copy()
+    y[560:] = 5.0 + 0.01 * y[560:]
+    write_record(Dataset(spoilt.u, y, spoilt.dt, ("u_V",), "y_um"), "r.csv")
+    code, out, _ = run("r.csv", *COLUMNS, *SMALL, "--out", "other", "--test", "0.2")
+    assert code == 0
+    assert models(tmp_path / "one") == models(tmp_path / "other")
+    assert json.loads((tmp_path / "one/result.json").read_text())["record"]["samples"] == 560
+    good, bad = (json.loads((tmp_path / name / "test.json").read_text()) for name in ("one", "other"))
+    assert good["outcome"] == bad["outcome"] == "ok"
+    assert good["mape"] < 1.0 < bad["mape"]
+    assert f"not used before: free run ok, MAPE {bad['mape']:.4f} %" in out
+
+
+@pytest.mark.ci
+def test_test_data_is_a_file_or_rows_of_the_record(run, tmp_path):
+    write_record(record(seed=3), "t.csv")
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "file", "--test", "t.csv")[0] == 0
+    code, _, _ = run("r.csv", *COLUMNS, *SMALL, "--out", "rows", "--rows", "0:500", "--test", "500:700")
+    assert code == 0
+    found = [json.loads((tmp_path / name / "test.json").read_text()) for name in ("file", "rows")]
+    assert all(set(each) == {"outcome", "mape", "r2", "rmse", "fit_percent"} for each in found)
+    assert found[0] != found[1]
+
+
+def test_diverging_test_has_an_outcome_and_no_metrics(tmp_path, capsys):
+    class Diverging:
+        best = property(lambda self: self)
+
+        def simulate(self, test_data):
+            return free_run(self.model, test_data)
+
+    result = Diverging()
+    result.model = make_model([(parse("y(k-1)"), 2.0)])
+    command._evaluate_test(result, record(), tmp_path)
+    document = json.loads((tmp_path / "test.json").read_text())
+    assert list(document) == ["outcome"]
+    assert document["outcome"].startswith("diverged: |y| left")
+    assert "MAPE" not in capsys.readouterr().out
+    result.model = make_model([(parse("y(k-1)"), 1.0)])
+    still = record()
+    command._evaluate_test(result, Dataset(still.u, np.ones(700), 0.01), tmp_path)
+    document = json.loads((tmp_path / "test.json").read_text())
+    assert (document["mape"], document["rmse"]) == (None, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--test", "500:700"), "--test 500:700: give --rows"),
+        (("--rows", "0:600", "--test", "500:700"), "--test 500:700: give --rows"),
+        (
+            ("--rows", "0:400", "--validation", "400:600", "--test", "500:700"),
+            "samples that are used for estimation or validation",
+        ),
+        (("--rows", "0:400", "--validation", "300:600"), "--validation 300:600: give --rows"),
+        (("--validation", "r.csv"), "the validation data has samples that are used for estimation"),
+        (("--rows", "0:400", "--validation", "copy.csv"), "samples that are used for estimation"),
+        (("--test", "r.csv"), "samples that are used for estimation or validation"),
+        (("--rows", "100:700", "--test", "r.csv"), "samples that are used for estimation or validation"),
+        (("--test", "nowhere.csv"), "--test nowhere.csv: give a file that exists"),
+        (("--test", "1.5"), "lies between 0 and 1, got 1.5"),
+        (("--test", "slow.csv"), "time of 0.01 s, the test data of 0.05 s: resample"),
+        (
+            ("--rows", "0:660", "--test", "660:700", "--max-height", "12"),
+            f"the test data has 40 samples, and the largest lag is {DEEPEST}: give more samples",
+        ),
+    ],
+)
+def test_overlapping_or_unsuitable_test_data_is_rejected(run, tmp_path, options, message):
+    write_record(record(dt=0.05), "slow.csv")
+    shutil.copyfile("r.csv", "copy.csv")
+    assert message in refused(run("r.csv", *COLUMNS, *SMALL, "--out", "out", *options))
+    assert not (tmp_path / "out").exists()
+
+
+# Options.
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--population", "0"), "population is at least 1, got 0"),
+        (("--generations", "-1"), "generations is at least 0, got -1"),
+        (("--max-terms", "0"), "max_terms is at least 1, got 0"),
+        (("--max-height", "-2"), "max_height is at least 0, got -2"),
+        (("--shooting", "0"), "shooting is at least 1, got 0"),
+        (("--preset", "quick"), "unknown preset 'quick': take one of auto, paper-case1"),
+        (("--primitive", "mul", "--primitive", "gamma"), "unknown primitive 'gamma': take one of mul"),
+        (("--constraints", "physics"), "unknown constraints 'physics': take one of none, hysteresis"),
+        (("--validation", "nowhere.csv"), "--validation nowhere.csv: give a file that exists"),
+        (("--input", "u_mV"), "u_mV"),
+        (("--islands", "0"), "islands is at least 1, got 0"),
+        (("--topology", "mesh"), "unknown topology 'mesh': take one of isolated, ring"),
+        (("--topology", "ring:"), "topology 'ring:': a degree from 1 to 99 goes with random-regular alone"),
+        (("--islands", "2", "--topology", "1234567890>1"), "cannot read the edge '1234567890>1'"),
+        (("--migrate-every", "1234567890"), "cannot read migrate_every '1234567890'"),
+        (("--migrate-every", "5,"), "cannot read migrate_every '5,'"),
+        (("--migrants", "-1"), "cannot read migrants '-1'"),
+        (("--islands", "2", "--migrants", "301"), "301 individuals would arrive on an island of 200"),
+        (("--emigrants", "worst"), "unknown emigrants 'worst': take one of best"),
+        (("--replaced", "best"), "unknown replaced 'best': take one of worst"),
+        (("--character", "plain", "--character", "lazy"), "unknown character 'lazy': take one of plain"),
+        (("--max-evaluations", "-1"), "max_evaluations is at least 0, got -1"),
+        (("--target-error", "-0.1"), "target_error is a number and not negative, got -0.1"),
+        (("--target-error", "nan"), "target_error is a number and not negative, got nan"),
+    ],
+)
+def test_invalid_option_is_rejected_by_name_without_a_folder(run, tmp_path, options, message):
+    assert message in refused(run("r.csv", *COLUMNS, "--out", "out", *options))
+    assert not (tmp_path / "out").exists()
+
+
+def test_missing_arguments_are_named(run):
+    assert "give RECORD, --input, --output and --out, or --resume DIR" in refused(
+        run("r.csv", "--out", "out")
+    )
+    assert "there is no file nothing.csv" in refused(run("nothing.csv", *COLUMNS, "--out", "out")).replace(
+        str(command.Path.cwd()) + "/", ""
+    )
+
+
+def test_options_reach_the_settings(run, tmp_path):
+    text = "odd; [u(k-1)] >= 0"
+    own = ("--primitive", "mul", "--primitive", "phi1", "--constraints", text, "--preset", "hysteresis")
+    assert run("r.csv", *COLUMNS, *SMALL, *own, "--out", "out")[0] == 0
+    settings = json.loads((tmp_path / "out/result.json").read_text())["settings"]
+    assert settings["primitives"] == ["mul", "phi1"]
+    assert (settings["constraints"], settings["preset"]) == (text, "hysteresis")
+    assert (settings["population"], settings["generations"], settings["shooting"]) == (10, 3, 50)
+    assert (settings["max_terms"], settings["max_height"]) == (3, 3)
+
+
+@pytest.mark.ci
+def test_options_of_islands_reach_the_settings(run, tmp_path):
+    own = (
+        *("--islands", "3", "--topology", "random-regular:2", "--migrate-every", "1,2:5"),
+        *("--migrants", "2", "--emigrants", "front", "--replaced", "random"),
+        *("--character", "explorer", "--character", "pruner"),
+        *("--max-evaluations", "1000", "--target-error", "1e-9"),
+    )
+    assert run("r.csv", *COLUMNS, *SMALL, *own, "--engine", "serial", "--out", "out")[0] == 0
+    document = json.loads((tmp_path / "out/result.json").read_text())
+    assert (
+        document["settings"].items()
+        >= {
+            "islands": 3,
+            "topology": "random-regular:2",
+            "migrate_every": "1,2:5",
+            "migrants": "2",
+            "emigrants": "front",
+            "replaced": "random",
+            "characters": ["explorer", "pruner"],
+            "max_evaluations": 1000,
+            "target_error": 1e-9,
+        }.items()
+    )
+    assert document["search"]["evaluations"] == 3 * 40
+    # Schedules and profiles are read back from the checkpoint unchanged.
+    assert run("--resume", "out", "--engine", "serial")[0] == 0
+    assert json.loads((tmp_path / "out/result.json").read_text())["settings"] == document["settings"]
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("options", "ended_by", "generations"),
+    [
+        (("--max-evaluations", "20"), "evaluations", 1),
+        (("--max-evaluations", "21"), "evaluations", 2),
+        (("--target-error", "1e3"), "target error", 0),
+    ],
+)
+def test_budget_ends_a_run_and_is_named_in_the_result(run, tmp_path, options, ended_by, generations):
+    code, _, error = run("r.csv", *COLUMNS, *STEPWISE, *options, "--out", "out")
+    assert (code, error) == (0, "")
+    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
+    assert (search["ended_by"], search["generations"]) == (ended_by, generations)
+    # Resuming a run that has ended changes nothing.
+    before = models(tmp_path / "out")
+    assert run("--resume", "out")[0] == 0
+    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
+    assert (search["ended_by"], search["generations"]) == (ended_by, generations)
+    assert models(tmp_path / "out") == before

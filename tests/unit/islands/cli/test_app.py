@@ -1,0 +1,324 @@
+"""Command line in this process: parsing of options, output folders, and errors."""
+
+import json
+import os
+import shutil
+from contextlib import chdir
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import islands
+from islands.cli import options
+from islands.cli.output_folder import check_folder
+from islands.data.dataset import Dataset
+from islands.errors import IslandsError, SettingsError
+from islands.expressions.parsing import parse
+from islands.io.models import read_model, write_model
+from islands.io.records import write_record
+from islands.io.records.row_range import parse_rows
+from islands.models.narx import make_model
+from support.command_line import succeed
+from support.undrawn import undrawn_figures
+
+
+def record(samples=120, seed=0):
+    rng = np.random.default_rng(seed)
+    u, y = 0.1 * np.cumsum(rng.normal(size=samples)), np.zeros(samples)
+    for k in range(3, samples):
+        y[k] = y[k - 1] + 0.8 * (u[k - 1] - u[k - 2]) - 0.3 * y[k - 1] * abs(u[k - 1] - u[k - 2])
+    return Dataset(u, y + 0.001 * rng.normal(size=samples), 0.01, ("u_V",), "y_um")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def undrawn():
+    """Write empty figures; their content is tested elsewhere."""
+    with undrawn_figures():
+        yield
+
+
+@pytest.fixture
+def run(command_line):
+    """Run a command in a temporary folder; return exit code, standard output, standard error."""
+    return command_line
+
+
+def test_the_version_is_that_of_the_package(run):
+    assert run("--version")[:2] == (0, f"islands {islands.__version__}\n")
+
+
+FIT = ("fit", "r.csv", "--input", "u_V", "--output", "y_um", "--max-terms", "3", "--out", "out")
+
+
+@pytest.fixture(scope="module")
+def fit(tmp_path_factory):
+    """Folder with a record and the result of a fit, and the output of the command."""
+    folder = tmp_path_factory.mktemp("fit")
+    write_record(record(), folder / "r.csv")
+    with chdir(folder):
+        return folder, succeed(*FIT)
+
+
+@pytest.fixture
+def fitted(fit, run):
+    """Output of the fit; the test runs in a copy of its folder."""
+    folder, printed = fit
+    shutil.copytree(folder, Path.cwd(), dirs_exist_ok=True)
+    return printed
+
+
+# Options.
+
+
+@pytest.mark.parametrize(
+    ("texts", "names"),
+    [(["u_V"], ["u_V"]), (["a,b", "c"], ["a", "b", "c"]), (["a,,b,"], ["a", "b"]), ([""], [])],
+)
+def test_inputs_are_repeated_or_separated_by_commas(texts, names):
+    assert options.columns(texts) == names
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (None, None),
+        ("0:5000", slice(0, 5000)),
+        ("100:", slice(100, None)),
+        (":100", slice(None, 100)),
+        ("-200:", slice(-200, None)),
+    ],
+)
+def test_rows_are_start_and_stop(text, expected):
+    assert parse_rows(text) == expected
+
+
+@pytest.mark.parametrize("text", ["5", "a:b", "1:2:3", "", "1.5:3"])
+def test_malformed_rows_are_rejected(text):
+    with pytest.raises(SettingsError) as caught:
+        parse_rows(text)
+    assert str(caught.value) == f"cannot read the rows {text!r}: write START:STOP, for example 0:5000"
+
+
+# Output folders.
+
+
+def test_new_folder_and_folder_without_result_are_accepted(tmp_path):
+    check_folder(tmp_path, force=False)
+    check_folder(tmp_path / "new" / "deeper", force=False)
+    assert not (tmp_path / "new").exists()
+
+
+def test_result_is_replaced_only_with_force(tmp_path):
+    (tmp_path / "result.json").write_text("{}")
+    with pytest.raises(SettingsError, match="holds a result already: give another --out, or --force"):
+        check_folder(tmp_path, force=False)
+    check_folder(tmp_path, force=True)
+
+
+def test_folder_below_a_file_is_rejected(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    for path in (file, file / "out", file / "out" / "deeper"):
+        with pytest.raises(SettingsError) as caught:
+            check_folder(path, force=True)
+        assert str(caught.value) == f"--out {path}: {file} is a file, give a folder"
+
+
+def test_read_only_folder_is_rejected(tmp_path, monkeypatch):
+    # The user that runs the tests may have all permissions, so the check is replaced.
+    monkeypatch.setattr(os, "access", lambda path, _mode: Path(path) != tmp_path)
+    with pytest.raises(SettingsError, match=r"is not writable, give another folder"):
+        check_folder(tmp_path / "out", force=False)
+
+
+# Commands.
+
+
+def test_fit_prints_the_models_and_the_output_folder(fitted):
+    out = fitted
+    evaluations = json.loads(Path("out/result.json").read_text())["search"]["evaluations"]
+    method = Path("out/method.txt").read_text()
+    assert method.startswith("120 samples, 0.01 s: u_V to y_um\n")
+    assert f"{evaluations} models estimated: {evaluations} ok" in method
+    assert "out/: result.json, models/, figures/, summary.txt, method.txt" in out
+    assert Path("out/summary.txt").read_text() in out
+    assert json.loads(Path("out/result.json").read_text())["search"]["wall_s"] > 0.0
+
+
+@pytest.mark.ci
+def test_force_replaces_a_result_and_all_its_models(run, fitted):
+    assert len(list(Path("out/models").iterdir())) == 3
+    code, _, err = run(*FIT)
+    assert code == 2
+    assert "--force" in err
+    assert run(*FIT, "--force", "--max-terms", "1")[0] == 0
+    assert [path.name for path in Path("out/models").iterdir()] == ["01.json"]
+
+
+def test_simulate_reads_the_columns_of_the_model(run, fitted):
+    code, out, _ = run("simulate", "out/models/01.json", "r.csv", "--mode", "one-step", "--out", "s.csv")
+    assert code == 0
+    assert out.splitlines()[:2] == ["s.csv: 120 rows", "one-step after a warm-up of 3 samples: ok"]
+    assert "um  fit" in out
+    assert Path("s.csv").read_text().startswith("time,y_sim\n")
+    renamed = Dataset(record().u, record().y, 0.01, ("volt_V",), "way_um")
+    write_record(renamed, "other.csv")
+    assert run("simulate", "out/models/01.json", "other.csv")[0] == 2
+    columns = ("--input", "volt_V", "--output", "way_um")
+    assert run("simulate", "out/models/01.json", "other.csv", *columns)[0] == 0
+
+
+def test_simulate_writes_prediction_bands(run, fitted):
+    arguments = ("simulate", "out", "r.csv", "--out", "s.csv", "--bands")
+    code, out, _ = run(*arguments, "0.9")
+    assert code == 0
+    assert "90 % band: median half-width" in out
+    header, *rows = Path("s.csv").read_text().splitlines()
+    assert header == "time,y_sim,y_low,y_high"
+    numbers = [tuple(map(float, row.split(",")[1:])) for row in rows[3:]]
+    assert all(low <= simulated <= high for simulated, low, high in numbers)
+    for changes, reason in (
+        (("0.2",), "between 0.5 and 0.99"),
+        (("0.9", "--mode", "one-step"), "free runs of models of a result folder"),
+    ):
+        code, _, error = run(*arguments, *changes)
+        assert (code, reason in error) == (2, True)
+    shutil.copyfile("out/models/01.json", "model.json")
+    code, _, error = run("simulate", "model.json", "r.csv", "--bands", "0.9")
+    assert (code, "need a model of a result folder" in error) == (2, True)
+
+
+def test_simulate_prints_the_errors_that_the_result_reports(run, fitted):
+    result = json.loads(Path("out/result.json").read_text())
+    files = {f"out/models/{entry['rank']:02d}.json": entry for entry in result["models"]}
+    files["out"] = result["models"][result["recommended"]["rank"] - 1]
+    assert min(read_model(path).maximum_lag for path in Path("out/models").iterdir()) < 3
+    for path, entry in files.items():
+        for mode, name in (("free-run", "free_run"), ("shooting", "multiple_shooting")):
+            code, out, _ = run("simulate", path, "r.csv", "--rows", "90:120", "--mode", mode)
+            errors = entry["metrics"]["validation"][name]
+            assert code == 0
+            assert f"{mode} after a warm-up of {entry['warm_up']} samples: ok" in out
+            assert f"MAPE {errors['mape']:.4f} %  R2 {errors['r2']:.5f}  RMSE {errors['rmse']:.6g} um" in out
+
+
+def test_simulate_starts_after_the_given_warm_up_or_the_lags_of_a_single_file(run, fitted):
+    shutil.copyfile("out/models/01.json", "model.json")
+    lag = read_model("model.json").maximum_lag
+    assert f"after a warm-up of {lag} samples" in run("simulate", "model.json", "r.csv")[1]
+    assert "after a warm-up of 9 samples" in run("simulate", "out", "r.csv", "--warm-up", "9")[1]
+    assert "the warm-up has 0" in run("simulate", "out", "r.csv", "--warm-up", "0")[2]
+    Path("out/result.json").write_text("{}")
+    code, _, error = run("simulate", "out", "r.csv")
+    assert (code, "result.json holds no model" in error) == (2, True)
+
+
+@pytest.mark.parametrize("name", ["u_V", "u_V+1"])
+def test_simulate_averages_a_record_for_a_model_of_means(run, name):
+    model = make_model([(parse("u(k-1)"), 2.0)], (name,), "y_um", 0.04)
+    write_model(replace(model, average=4), "model.json")
+    write_record(record(), "r.csv")
+    code, out, _ = run("simulate", "model.json", "r.csv", "--out", "s.csv")
+    stated = "as in the model, k counts steps of 0.04 s: each value is the mean of 4 samples of the record"
+    assert (code, " ".join(out.split()).startswith(stated)) == (0, True)
+    time, simulated = np.loadtxt("s.csv", delimiter=",", skiprows=2, unpack=True)
+    means = 2.0 * record().u[:, 0].reshape(-1, 4).mean(axis=1)
+    assert simulated == pytest.approx(means[:-1] if name == "u_V" else means[1:])
+    assert time == pytest.approx(0.015 + 0.04 * np.arange(1, 30))
+
+
+def test_simulate_rejects_another_sampling_time(run):
+    write_record(Dataset(record().u, record().y, 0.0011, ("u_V",), "y_um"), "slow.csv")
+    code, _, err = run("simulate", "published:12", "slow.csv")
+    assert code == 2
+    assert "the model has a sampling time of 0.001 s, the record of 0.0011 s: resample the record" in err
+
+
+def test_systems_make_writes_into_a_folder_with_brackets(run):
+    Path("[red]").mkdir()
+    code, out, _ = run("systems", "make", "s1", "--out", "[red]/a[b].csv")
+    assert code == 0
+    assert out.startswith("[red]/a[b].csv: 500 samples, ")
+
+
+def test_help_lists_the_commands(run):
+    code, out, _ = run("--help")
+    assert code == 0
+    for name in ("fit", "simulate", "show", "demo", "systems"):
+        assert name in out
+
+
+def test_an_export_is_written_to_a_file(run, tmp_path):
+    for kind in ("c", "fmu"):
+        assert run("show", "published:12", "--format", kind, "--out", str(tmp_path / kind)) == (0, "", "")
+    assert (tmp_path / "c").read_text() == run("show", "published:12", "--format", "c")[1]
+    assert (tmp_path / "fmu").read_bytes().startswith(b"PK")
+
+
+# Errors: one line that says what to do, and no traceback.
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("show", "[/red]"), "there is no file or folder [/red]"),
+        (("show", "y[k-1].json"), "there is no file or folder y[k-1].json"),
+        (("show", "published:12", "--format", "[bold]"), "unknown format '[bold]'"),
+        (("show", "published:12", "--format", "fmu"), "the format fmu is not text: write a file with --out"),
+        (("simulate", "published:12", "nowhere.csv"), "there is no file nowhere.csv"),
+        (("systems", "make", "s1", "--out", "no/where.csv"), "cannot write no/where.csv: No such file"),
+    ],
+)
+def test_error_message_with_brackets_is_printed_verbatim(run, arguments, message):
+    code, out, err = run(*arguments)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("error: ")
+    assert message in err
+    assert "Traceback" not in err
+
+
+def test_model_is_shown_with_its_columns_in_80_columns(run):
+    lines = run("show", "published:12")[1].splitlines()
+    assert lines[0].startswith("y_um(k) =")
+    assert len(lines) == 7
+    assert max(map(len, lines)) <= 80
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "message"),
+    [
+        (IslandsError("take less"), 2, "error: take less"),
+        (PermissionError(13, "Permission denied", "out"), 2, "error: [Errno 13] Permission denied: 'out'"),
+        (OSError(28, "No space left on device"), 2, "error: [Errno 28] No space left on device"),
+    ],
+)
+def test_deliberate_error_is_printed_as_a_message(run, monkeypatch, error, code, message):
+    def stop(*_):
+        raise error
+
+    monkeypatch.setattr("islands.cli.commands.show.term_table", stop)
+    found, _, err = run("show", "published:12")
+    assert found == code
+    assert err.strip() == message
+
+
+def test_programming_error_is_not_hidden(run, monkeypatch):
+    def stop(*_):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("islands.cli.commands.show.term_table", stop)
+    with pytest.raises(ZeroDivisionError):
+        run("show", "published:12")
+
+
+def test_interrupt_exits_with_code_130(run, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("islands.cli.commands.show.term_table", stop)
+    code, _, err = run("show", "published:12")
+    assert code == 130
+    assert "Traceback" not in err

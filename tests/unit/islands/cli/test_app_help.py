@@ -1,0 +1,52 @@
+"""Help of the command line: it describes every command without importing it."""
+
+import inspect
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+
+import pytest
+from typer.main import get_command
+
+from islands.cli.app import EXTRAS
+from islands_api.cli.app import COMMANDS, app
+from support.repository import ROOT
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_description_of_a_command_is_in_its_help(name):
+    own = get_command(app).get_command(None, name).help
+    assert " ".join(inspect.cleandoc(own).partition("\n\n")[0].split()) == COMMANDS[name]
+
+
+def test_the_help_imports_no_command():
+    program = (
+        "import sys; from typer.testing import CliRunner; from islands_api.cli.app import app;"
+        "print('systems' in CliRunner().invoke(app, ['--help']).output);"
+        "print([name for name in sys.modules if '.cli.commands.' in name]);"
+        "print({'numpy', 'numba', 'ray', 'pydantic'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["True", "[]", "set()"]
+
+
+@pytest.mark.ci
+def test_every_package_of_an_extra_is_known():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    modules = {}
+    for module, distributions in packages_distributions().items():
+        for each in distributions:
+            modules.setdefault(each.lower().replace("_", "-"), set()).add(module)
+    for extra in ("ray", "service"):
+        for requirement in extras[extra]:
+            name = requirement.partition(">=")[0].lower()
+            assert modules[name] & set(EXTRAS), requirement
+
+
+def test_all_names_every_extra_of_users():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    (text,) = extras["all"]
+    assert text == f"islands-sysid[{','.join(sorted(set(extras) - {'all', 'server'}))}]"
+    assert set(extras["ray"]) < set(extras["service"])

@@ -1,0 +1,95 @@
+"""Files of a folder: only complete ones, each once, in the order of recording."""
+
+import os
+
+import pytest
+
+from islands.cli.watched_folder import WatchedFolder, find_time
+from islands.errors import SettingsError
+
+NOW = 1_800_000_000.0
+
+
+def write(path, text="x", age=60.0):
+    path.write_text(text)
+    os.utime(path, (NOW - age, NOW - age))
+    return path
+
+
+def names(watched, now=NOW):
+    return [path.name for path in watched.take_complete(now)]
+
+
+def test_files_come_in_the_order_of_recording_and_once(tmp_path):
+    for name in ("run10.csv", "run9.csv", "note.md", ".hidden.csv", "run11.csv.part"):
+        write(tmp_path / name)
+    watched = WatchedFolder(tmp_path, 2.0)
+    assert names(watched) == ["run9.csv", "run10.csv"]
+    assert names(watched) == []
+    assert not watched.has_unfinished
+
+
+def test_times_in_names_precede_numbers(tmp_path):
+    for name in ("b_2026-11-02T01-00.csv", "c_20261101_2300.csv", "a_2026-11-03.csv"):
+        write(tmp_path / name)
+    assert names(WatchedFolder(tmp_path, 2.0)) == [
+        "c_20261101_2300.csv",
+        "b_2026-11-02T01-00.csv",
+        "a_2026-11-03.csv",
+    ]
+
+
+def test_a_file_that_grows_is_not_read(tmp_path):
+    watched = WatchedFolder(tmp_path, 2.0)
+    path = write(tmp_path / "a.csv", "1", age=0.5)
+    assert names(watched) == []
+    assert watched.has_unfinished
+    path.write_text("12")
+    os.utime(path, (NOW - 0.5, NOW + 1.0))
+    assert names(watched, NOW + 1.9) == []
+    assert names(watched, NOW + 3.0) == []
+    assert names(watched, NOW + 4.0) == ["a.csv"]
+
+
+def test_a_file_with_an_old_time_that_still_grows_is_not_read(tmp_path):
+    """Some programs copy the time of modification before the content."""
+    watched = WatchedFolder(tmp_path, 2.0)
+    path = write(tmp_path / "a.csv", "1", age=1.0)
+    assert names(watched) == []
+    write(path, "12", age=100.0)
+    assert names(watched, NOW + 1.0) == []
+    assert names(watched, NOW + 3.0) == ["a.csv"]
+
+
+def test_a_file_that_is_written_again_is_a_new_one(tmp_path):
+    watched = WatchedFolder(tmp_path, 2.0)
+    path = write(tmp_path / "a.csv")
+    assert names(watched) == ["a.csv"]
+    write(path, "other", age=30.0)
+    assert names(watched, NOW + 1.0) == []
+    assert names(watched, NOW + 4.0) == ["a.csv"]
+
+
+def test_the_interval_is_that_of_the_names(tmp_path):
+    for hour in (1, 2, 3, 7):
+        write(tmp_path / f"2026-11-01T{hour:02d}-00.csv")
+    assert WatchedFolder(tmp_path, 2.0).interval == 3600.0
+
+
+@pytest.mark.parametrize(
+    ("name", "time"),
+    [
+        ("press_2026-11-23T01-30.csv", "2026-11-23T01:30:00"),
+        ("20261123_013005.csv", "2026-11-23T01:30:05"),
+        ("2026-11-23.csv", "2026-11-23T00:00:00"),
+        ("serial 20269999.csv", ""),
+        ("run7.csv", ""),
+    ],
+)
+def test_the_time_is_read_from_the_name(name, time):
+    assert find_time(name) == time
+
+
+def test_a_path_without_a_folder_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match="no folder"):
+        WatchedFolder(tmp_path / "none", 2.0)

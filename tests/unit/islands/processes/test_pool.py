@@ -1,0 +1,119 @@
+"""`process_pool`: results are those of `map`, in its order; errors and lost processes are reported."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from multiprocessing import active_children
+from pathlib import Path
+
+import pytest
+
+from islands import available_cpus
+from islands.processes.pool import ProcessPoolError, process_pool
+from islands.progress import StoppedError
+
+pytestmark = pytest.mark.ci
+
+
+def test_pool_evaluates_local_functions_in_other_processes_in_order() -> None:
+    factor = 3
+
+    def multiply(number: int) -> tuple[int, int]:
+        return factor * number, os.getpid()
+
+    with process_pool(2, start_after=0.0) as parallel_map:
+        products, processes = zip(*parallel_map(multiply, range(20)), strict=True)
+        again = [product for product, _ in parallel_map(multiply, [5])]
+    assert (list(products), again) == ([factor * number for number in range(20)], [15])
+    assert os.getpid() not in processes
+    assert len(set(processes)) <= 2
+
+
+def test_one_process_and_the_first_seconds_need_no_pool() -> None:
+    for workers in (1, 2):
+        with process_pool(workers, start_after=60.0) as parallel_map:
+            assert set(parallel_map(lambda _: os.getpid(), range(3))) == {os.getpid()}
+
+
+def test_quota_of_a_container_bounds_the_number_of_processes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cpu.max").write_text("100000 100000\n")
+    monkeypatch.setattr(available_cpus, "CGROUPS", tmp_path)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
+    with process_pool(start_after=0.0) as parallel_map:  # one core: no other process
+        assert set(parallel_map(lambda _: os.getpid(), range(3))) == {os.getpid()}
+
+
+def test_error_of_the_function_is_raised_and_ends_the_processes() -> None:
+    def fail(number: int) -> int:
+        if number == 3:
+            raise ZeroDivisionError(number)
+        return sum(iter(int, 1)) if number > 3 else number  # without an end
+
+    others = set(active_children())
+    with process_pool(2, start_after=0.0) as parallel_map:
+        results = parallel_map(fail, range(10))
+        assert next(results) == 0
+        processes = set(active_children()) - others
+        with pytest.raises(ZeroDivisionError):
+            list(results)
+    for process in processes:
+        process.join(10.0)
+    assert processes
+    assert not any(process.is_alive() for process in processes)
+
+
+def test_killed_process_is_an_error_that_says_what_to_do() -> None:
+    def end(_: int) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    with (
+        pytest.raises(ProcessPoolError, match="fewer --workers"),
+        process_pool(2, start_after=0.0) as parallel_map,
+    ):
+        list(parallel_map(end, range(2)))
+
+
+def test_results_may_contain_functions_without_a_name() -> None:
+    with process_pool(2, start_after=0.0) as parallel:
+        doubled = list(parallel(lambda factor: lambda value: factor * value, [1, 2, 3]))
+    assert [function(2) for function in doubled] == [2, 4, 6]
+
+
+def test_fork_server_starts_with_sigint_blocked_and_ends_at_an_error() -> None:
+    """Ctrl-C in a terminal reaches it while it imports, and would end it with a traceback."""
+    code = (
+        "import os; from multiprocessing import forkserver; from pathlib import Path\n"
+        "from islands.processes.pool import process_pool\n"
+        "try:\n"
+        "    with process_pool(2):\n"
+        "        server = forkserver._forkserver._forkserver_pid\n"
+        "        status = Path(f'/proc/{server}/status').read_text()\n"
+        "        raise KeyboardInterrupt\n"
+        "except KeyboardInterrupt:\n"
+        "    print(status.partition('SigBlk:')[2].split()[0], os.path.exists(f'/proc/{server}'))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, timeout=60, capture_output=True, text=True
+    )
+    blocked, is_alive = done.stdout.split()
+    assert int(blocked, 16) & 1 << signal.SIGINT - 1
+    assert is_alive == "False"
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_check_ends_a_map_while_its_functions_compute(workers: int) -> None:
+    checks: list[float] = []
+
+    def check() -> None:
+        checks.append(time.monotonic())
+        if len(checks) > 2:
+            raise StoppedError("the map")
+
+    began = time.monotonic()
+    with pytest.raises(StoppedError), process_pool(workers, start_after=0.0, check=check) as parallel:
+        list(parallel(time.sleep, [0.05, 0.05, 60.0]))
+    assert time.monotonic() - began < 30.0

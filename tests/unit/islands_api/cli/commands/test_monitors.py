@@ -1,0 +1,109 @@
+"""``islands monitors``: creation, records in the order of recording, views and exit codes."""
+
+import json
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from islands.cli.watched_folder import hash_file
+from islands.diagnosis.documents.monitor_json import monitor_document
+from islands.diagnosis.documents.monitor_state import monitor_to_json
+from islands.facade.record_monitor import reject_record
+from islands_api.cli.service import client_options
+from islands_api.web.auth import LOCAL_OWNER
+from islands_service.domain.job import MONITORING, JobOutcome, JobState, Submission
+from islands_service.domain.monitoring import MonitorStatus, MonitorUpdate, RecordEntry
+from support.monitor_updates import store_monitor
+from support.monitored_oscillator import follow, make_records
+from support.service import Service, csv
+from support.stores import claimed, taken
+
+Run = Callable[..., tuple[int, str, str]]
+
+CREATE = ("create", "--simulation", "bouc-wen-piezo", "--input", "u_V", "--output", "y_um")
+
+
+@pytest.fixture(scope="module")
+def service(serve: Any) -> Any:
+    with serve(rate=0) as running:
+        yield running
+
+
+@pytest.fixture
+def run(service: Service, monkeypatch: pytest.MonkeyPatch, command_line: Run) -> Run:
+    """Run ``islands monitors``; return exit code, standard output and error."""
+    monkeypatch.setenv("ISLANDS_URL", service.url)
+    monkeypatch.setattr(client_options, "RETRY_SECONDS", 0.2)
+    return partial(command_line, "monitors")
+
+
+@pytest.mark.ci
+def test_a_monitor_is_created_listed_shown_and_deleted(run: Run) -> None:
+    code, shown, _ = run(*CREATE, "--false-alarms", "1 per 720 records", "--name", "press 4", "--json")
+    made = json.loads(shown)
+    assert (code, made["spec"]["false_alarms"]) == (0, "1 per 720 records")
+    assert made["id"] in run("list")[1]
+    assert run("show", made["id"])[1] == f"monitor {made['id']} (press 4): waiting, records 0, alarms 0\n"
+    code, _, complaint = run("show", made["id"], "--out", "states")
+    assert code == 2
+    assert "waits for its first record" in complaint
+    assert run("delete", made["id"])[0] == 0
+    code, _, complaint = run("show", made["id"])
+    assert (code, "no monitor" in complaint) == (2, True)
+
+
+@pytest.mark.nightly
+def test_records_are_added_in_the_order_of_recording_and_once(
+    run: Run, service: Service, tmp_path: Path
+) -> None:
+    monitor = json.loads(run(*CREATE, "--json")[1])["id"]
+    names = ["press_2026-11-03T10-00.csv", "press_2026-11-03T09-00.csv"]
+    for samples, name in zip((200, 210), names, strict=True):
+        (tmp_path / name).write_bytes(csv(samples))
+    paths = [str(tmp_path / name) for name in names]
+    code, shown, _ = run("add", monitor, *paths, "--no-watch")
+    assert (code, shown.count("job ")) == (0, 2)
+    assert run("add", monitor, paths[1], "--no-watch")[1] == shown.splitlines(keepends=True)[0]
+    lease = claimed(service.store)
+    assert lease.job.kind == MONITORING
+    assert (lease.job.spec["name"], lease.job.spec["time"]) == (names[1], "2026-11-03T09:00:00")
+    service.store.jobs.cancel(LOCAL_OWNER, shown.split()[4].removesuffix(":"))
+    content = hash_file(Path(paths[1]))
+    document = json.dumps({"index": 0, "name": names[1], "sha256": content})
+    entry = RecordEntry(names[1], content, False, "{}", document)
+    update = MonitorUpdate(monitor, 0, MonitorStatus.ALARM, 1, 1, 0, "{}", "{}", entry, "{}")
+    summary = {"words": "ALARM: k changed", "alarms": 1}
+    service.store.leases.finish(
+        lease, JobOutcome(JobState.SUCCEEDED, {"record": {}}, summary=summary, monitor=update)
+    )
+    code, shown, complaint = run("add", monitor, paths[1])
+    assert (code, shown, complaint) == (0, "", "")
+
+
+@pytest.mark.ci
+def test_the_states_of_a_monitor_are_shown_and_downloaded(
+    run: Run, command_line: Run, service: Service, tmp_path: Path
+) -> None:
+    saved = reject_record(follow(make_records(1)), "short.csv", "", "it is too short")
+    monitor = json.loads(run(*CREATE, "--json")[1])["id"]
+    submission = Submission(LOCAL_OWNER, {}, MONITORING, priority=100, monitor=monitor)
+    job, _ = service.store.jobs.submit(submission)
+    texts = monitor_to_json(saved), json.dumps(monitor_document(saved))
+    summary = {"words": "record 0: normal", "alarms": 0}
+    outcome = JobOutcome(JobState.SUCCEEDED, {"record": {}}, summary=summary)
+    service.store.leases.finish(taken(service.store, job.id), outcome)
+    store_monitor(service.store, monitor, saved)
+    code, shown, _ = run("show", monitor, "--out", "states")
+    first, record, rejected = shown.splitlines()
+    assert (code, first) == (0, f"monitor {monitor}: training, records 1, alarms 0")
+    assert record.endswith("training 1 of 16")
+    assert rejected == "short.csv: rejected: it is too short"
+    assert (tmp_path / "states" / "state.json").read_text() == texts[0]
+    assert json.loads((tmp_path / "states" / "monitor.json").read_text()) == json.loads(texts[1])
+    code, shown, _ = command_line("jobs", "result", job.id, "--out", "record")
+    assert (code, shown) == (0, "record 0: normal\nrecord/: record.json\n")
+    assert json.loads((tmp_path / "record" / "record.json").read_text()) == {"record": {}}
+    assert "<svg" in (tmp_path / "states" / "monitor.svg").read_text()
