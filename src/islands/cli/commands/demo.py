@@ -1,7 +1,7 @@
 """``islands demo``: identification of the paper's case 1, compared with the paper's Table 1."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated
@@ -68,34 +68,33 @@ def demo(
     compile_kernels()
     if not has_ray():
         print_message(serial_notice())
-    with (
-        progress("demo") as show,
-        start_engine(default_engine(ISLANDS), None, print_message) as engine,
-        stop_requests() as stop,
-    ):
-        began = perf_counter()
-        found = islands.identify(
-            estimation,
-            validation=validation,
-            preset=PRESET,
-            islands=ISLANDS,
-            progress=show,
-            on_epoch=search_progress(show),
-            stop=stop,
-            engine=engine,
-        )
-        result = found.with_wall_time(perf_counter() - began)
-    # The figures take seconds: the equation is shown before.
-    output.print(str(result), markup=False)
-    with progress("demo") as show, stop_requests(stop) as stop:
-        show("figures", None)
-        drawing = Steps(stop=stop)
-        result.save(out, drawing)
-        models = dict[str, DynamicModel]()
-        with suppress(StoppedError):
-            models = _make_paper_models(records, Steps(show, stop))
-    output.print(f"{out}/: {RESULT_FILES}", markup=False)
-    stop.end(out, (*result.left_out, *drawing.left_out, _COMPARISON), "repeat the command")
+    with ExitStack() as handlers:
+        with progress("demo") as show, start_engine(default_engine(ISLANDS), None, print_message) as engine:
+            # As in `islands.cli.runs.identify`.
+            stop = handlers.enter_context(stop_requests())
+            began = perf_counter()
+            found = islands.identify(
+                estimation,
+                validation=validation,
+                preset=PRESET,
+                islands=ISLANDS,
+                progress=show,
+                on_epoch=search_progress(show),
+                stop=stop,
+                engine=engine,
+            )
+            result = found.with_wall_time(perf_counter() - began)
+        # The figures take seconds: the equation is shown before.
+        output.print(str(result), markup=False)
+        with progress("demo") as show:
+            show("figures", None)
+            drawing = Steps(stop=stop)
+            result.save(out, drawing)
+            models = dict[str, DynamicModel]()
+            with suppress(StoppedError):
+                models = _make_paper_models(records, Steps(show, stop))
+        output.print(f"{out}/: {RESULT_FILES}", markup=False)
+        stop.end(out, (*result.left_out, *drawing.left_out, _COMPARISON), "repeat the command")
 
     # All models start after the same warm-up.
     warm_up = result.best.warm_up

@@ -1,6 +1,7 @@
 """Several outputs on the command line: a coupled model is identified and fitted."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -76,31 +77,38 @@ def identify_several(
     """Identify several outputs by evolution, write the result and print it."""
     settings = resolve_settings(preset, changes)
     compile_kernels()
-    with (
-        progress("identify") as show,
-        # Ray installs a handler for SIGTERM when it starts, so it starts before our handlers are installed.
-        start_engine(run_options.engine_for(settings.islands), run_options.address, print_message) as engine,
-        stop_requests() as stop,
-    ):
-        identify_all = partial(
-            islands.identify_coupled,
-            data[0],
-            validation=data[1],
-            preset=preset,
-            seed=seed,
-            progress=show,
-            on_epoch=search_progress(show),
-            stop=stop,
-            engine=engine,
-            **coupled_options(dict(changes)),
-        )
-        keep_coupled(identify_all, folder, show, stop)
+    with ExitStack() as handlers:
+        with (
+            progress("identify") as show,
+            start_engine(
+                run_options.engine_for(settings.islands), run_options.address, print_message
+            ) as engine,
+        ):
+            # As in `islands.cli.runs.identify`.
+            stop = handlers.enter_context(stop_requests())
+            identify_all = partial(
+                islands.identify_coupled,
+                data[0],
+                validation=data[1],
+                preset=preset,
+                seed=seed,
+                progress=show,
+                on_epoch=search_progress(show),
+                stop=stop,
+                engine=engine,
+                **coupled_options(dict(changes)),
+            )
+            left_out = keep_coupled(identify_all, folder, show, stop)
+        stop.end(folder, left_out, REPEAT)
 
 
 def keep_coupled(
     search: Callable[[], "islands.CoupledResult"], folder: Path, show: Display, stop: StopRequests
-) -> None:
-    """Search several outputs, write the result and print it. A stopped search keeps its results so far."""
+) -> tuple[str, ...]:
+    """Search several outputs, write the result and print it; return the steps that were left out.
+
+    A stopped search keeps its results so far, and ends the command.
+    """
     drawing = Steps(stop=stop)
     try:
         result = search()
@@ -117,4 +125,4 @@ def keep_coupled(
     output.print(str(result), markup=False)
     files = "result.json, model.json, summary.txt, figures/, outputs/ (the result of each output)"
     output.print(f"{folder}/: {files}", markup=False)
-    stop.end(folder, (*result.left_out, *drawing.left_out), REPEAT)
+    return (*result.left_out, *drawing.left_out)

@@ -1,6 +1,7 @@
 """Run of ``islands identify`` in its folder: record, search, checkpoints, result."""
 
 import json
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from math import inf, isfinite
 from pathlib import Path
@@ -104,62 +105,66 @@ def run(
     chosen = run_options.engine_for(possible[0].islands)
     if run_options.engine is None and possible[0].islands > 1 and not has_ray():
         print_message(serial_notice())
-    with (
-        progress("identify") as show,
-        # Ray installs a handler for SIGTERM when it starts, so it starts before our handlers are installed.
-        start_engine(chosen, run_options.address, print_message) as started,
-        stop_requests() as stop,
-    ):
-        until = inf if run_options.wall_time is None else monotonic() + run_options.wall_time
-        engine = TimedEngine(started, until)
-        if state is None:
-            # Delete the files of an earlier run.
-            for name in (CHECKPOINT, HALL, TEST):
-                (folder / name).unlink(missing_ok=True)
-        preset = job["preset"]
-        if preset == AUTO:
-            stored = job.get("choice")
-            preset = (
-                choice_from_document(stored)
-                if stored
-                else _choose_preset(data, held_out, job["changes"], show, stop, folder)
-            )
-            # Checkpoints contain the job, so a resumed run does not choose again.
-            job = {**job, "choice": preset.to_document()}
-        checkpoints = _CheckpointWriter(folder, job, show, state, spent)
-        arguments: dict[str, Any] = {"preset": preset, "seed": job["seed"], **job["changes"]}
-        began = perf_counter() - spent
-        try:
-            result = islands.identify(
-                data,
-                validation=held_out,
-                start=state,
-                progress=show,
-                on_epoch=checkpoints,
-                stop=stop,
-                engine=engine,
-                **arguments,
-            )
-        finally:
-            # Also after an engine failure, so that no finished epoch is lost.
-            checkpoints.write()
-        result = result.with_wall_time(perf_counter() - began)
-        show("figures", 1.0)
-        drawing = Steps(stop=stop)
-        result.save(folder, drawing)
-    if not stop() and result.search_result.search.ended_by == "stopped":
-        errors.print(f"stopped: the result is the best so far; continue with --resume {folder}", markup=False)
-        if run_options.wall_time is not None:
+    with ExitStack() as handlers:
+        with (
+            progress("identify") as show,
+            start_engine(chosen, run_options.address, print_message) as started,
+        ):
+            # After the start of Ray, which installs a handler for SIGTERM, and until the command ends: a
+            # signal that arrives while Ray ends does not discard the result.
+            stop = handlers.enter_context(stop_requests())
+            until = inf if run_options.wall_time is None else monotonic() + run_options.wall_time
+            engine = TimedEngine(started, until)
+            if state is None:
+                # Delete the files of an earlier run.
+                for name in (CHECKPOINT, HALL, TEST):
+                    (folder / name).unlink(missing_ok=True)
+            preset = job["preset"]
+            if preset == AUTO:
+                stored = job.get("choice")
+                preset = (
+                    choice_from_document(stored)
+                    if stored
+                    else _choose_preset(data, held_out, job["changes"], show, stop, folder)
+                )
+                # Checkpoints contain the job, so a resumed run does not choose again.
+                job = {**job, "choice": preset.to_document()}
+            checkpoints = _CheckpointWriter(folder, job, show, state, spent)
+            arguments: dict[str, Any] = {"preset": preset, "seed": job["seed"], **job["changes"]}
+            began = perf_counter() - spent
+            try:
+                result = islands.identify(
+                    data,
+                    validation=held_out,
+                    start=state,
+                    progress=show,
+                    on_epoch=checkpoints,
+                    stop=stop,
+                    engine=engine,
+                    **arguments,
+                )
+            finally:
+                # Also after an engine failure, so that no finished epoch is lost.
+                checkpoints.write()
+            result = result.with_wall_time(perf_counter() - began)
+            show("figures", 1.0)
+            drawing = Steps(stop=stop)
+            result.save(folder, drawing)
+        if not stop() and result.search_result.search.ended_by == "stopped":
             errors.print(
-                "a result limited by --wall-time is not reproducible: it depends on the speed of the run"
+                f"stopped: the result is the best so far; continue with --resume {folder}", markup=False
             )
-    show_result(result, folder)
-    if run_options.verbose:
-        for name, (size, limit) in result.search_result.search.caches.items():
-            output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
-    if test_data is not None:
-        _evaluate_test(result, test_data, folder)
-    stop.end(folder, (*result.left_out, *drawing.left_out), f"continue with --resume {folder}")
+            if run_options.wall_time is not None:
+                errors.print(
+                    "a result limited by --wall-time is not reproducible: it depends on the speed of the run"
+                )
+        show_result(result, folder)
+        if run_options.verbose:
+            for name, (size, limit) in result.search_result.search.caches.items():
+                output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
+        if test_data is not None:
+            _evaluate_test(result, test_data, folder)
+        stop.end(folder, (*result.left_out, *drawing.left_out), f"continue with --resume {folder}")
 
 
 def _choose_preset(

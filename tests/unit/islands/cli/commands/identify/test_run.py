@@ -3,12 +3,13 @@
 import json
 import signal
 import sys
+from contextlib import contextmanager
 from math import inf
 
 import pytest
 
+from islands.cli.runs import coupled, timed_engine
 from islands.cli.runs import identify as command
-from islands.cli.runs import timed_engine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.history import HistoryPoint
@@ -81,6 +82,29 @@ def test_second_ctrl_c_interrupts_and_keeps_finished_epochs(run, interrupted, tm
     assert (tmp_path / "out/result.json").exists() == (code == 0)
     assert signal.getsignal(signal.SIGINT) is before
     assert read_checkpoint(tmp_path / "out/checkpoint.json")[0].generation == 1
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("outputs", ["y_um", "y_um,z_um"])
+def test_ctrl_c_while_the_engine_ends_keeps_the_result(run, monkeypatch, tmp_path, outputs):
+    """Ray takes a second to end."""
+
+    @contextmanager
+    def ending(_address, _tell):
+        yield SerialEngine()
+        signal.raise_signal(signal.SIGINT)
+
+    for module in (command, coupled):
+        monkeypatch.setattr(module, "ENGINES", {"serial": ending})
+    rows = [line.split(",") for line in (tmp_path / "r.csv").read_text().splitlines()]
+    delayed = ["z_um", "0", *(row[-1] for row in rows[1:])]
+    lines = [",".join((*row, value)) for row, value in zip(rows, delayed, strict=False)]
+    (tmp_path / "two.csv").write_text("\n".join(lines))
+    given = ("two.csv", "--input", "u_V", "--output", outputs, *SMALL, "--constraints", "none")
+    code, out, error = run(*given, "--out", "out")
+    assert (code, error) == (130, "stopped: out has the result so far, which is complete")
+    assert "out/: result.json" in out
+    assert (tmp_path / "out/result.json").exists()
 
 
 @pytest.mark.ci
