@@ -14,6 +14,7 @@ from islands.export import export, write_export
 from islands.simulation.predictors import free_run
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import parse_spec
+from support.command_line import succeed
 from support.equation_programs import OCTAVE, extend, run_c, run_matlab
 from support.gain_scheduled import TRUE, GainScheduledModel, add_class, make_record
 from support.undrawn import undrawn_figures
@@ -122,6 +123,16 @@ def test_a_damaged_file_names_the_class(record, tmp_path):
     file.write_text(file.read_text().replace('"slope"', '"tilt"'))
     with pytest.raises(ModelError, match=r"is not a model gain-scheduled.*slope"):
         islands.read_model(file)
+
+
+def test_the_command_fits_a_class(record, tmp_path):
+    islands.write_record(record, tmp_path / "oven.csv")
+    folder, columns = tmp_path / "out", ("--input", "u_V", "--output", "y_K")
+    with undrawn_figures():
+        text = succeed("fit", tmp_path / "oven.csv", *columns, "--model", "gain-scheduled", "--out", folder)
+    assert "slope = -0." in text
+    assert "RMSE 0.0" in succeed("simulate", folder, tmp_path / "oven.csv")
+    assert "x1(k)" in succeed("show", folder)
 
 
 @pytest.mark.ci

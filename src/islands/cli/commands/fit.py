@@ -22,6 +22,7 @@ from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.io.models import MODEL_CLASSES, NARX
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.models.candidate_library import LIBRARIES
 from islands.progress import Steps
@@ -47,6 +48,15 @@ def fit(
             "--validation", help="FILE, FRACTION of the record's end (default 0.25), or START:STOP."
         ),
     ] = None,
+    model: Annotated[
+        str,
+        typer.Option(
+            "--model",
+            help=f"Class of the models: {', '.join([NARX, *MODEL_CLASSES])}.",
+            # An option with one value is of no use.
+            hidden=not MODEL_CLASSES,
+        ),
+    ] = NARX,
     library: Annotated[
         str,
         typer.Option(
@@ -108,6 +118,7 @@ def fit(
     with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()
         given: dict[str, Any] = {
+            "model": model,
             "library": library,
             "degree": degree,
             "lags": lags,
@@ -124,6 +135,8 @@ def fit(
             "stop": stop,
         }
         if len(outputs) > 1:
+            if given.pop("model") != NARX:
+                raise SettingsError(f"--model {model} is for one output: leave it out")
             if dead_time:
                 raise SettingsError("--dead-time is for one output: leave it out")
             given["library"] = SEVERAL_OUTPUTS if library == AUTO else library

@@ -90,12 +90,12 @@ def test_ctrl_c_while_the_engine_ends_keeps_the_result(run, monkeypatch, tmp_pat
     """Ray takes a second to end."""
 
     @contextmanager
-    def ending(_address, _tell):
+    def ending(_name, _address, _tell):
         yield SerialEngine()
         signal.raise_signal(signal.SIGINT)
 
     for module in (command, coupled):
-        monkeypatch.setattr(module, "ENGINES", {"serial": ending})
+        monkeypatch.setattr(module, "start_engine", ending)
     rows = [line.split(",") for line in (tmp_path / "r.csv").read_text().splitlines()]
     delayed = ["z_um", "0", *(row[-1] for row in rows[1:])]
     lines = [",".join((*row, value)) for row, value in zip(rows, delayed, strict=False)]
