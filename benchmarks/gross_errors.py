@@ -28,14 +28,14 @@ from islands.diagnosis.gross_errors.channel_admission import admit_channels  # n
 from islands.diagnosis.gross_errors.closed_loop import find_closed_loop  # noqa: E402
 from islands.diagnosis.gross_errors.explanation import GrossError  # noqa: E402
 from islands.diagnosis.gross_errors.search import find_gross_errors  # noqa: E402
-from islands.performance.trials.cases import CASES, SimulatedCase  # noqa: E402
-from islands.performance.trials.injection.measurement import inject  # noqa: E402
 from islands.simulators.context import make_context  # noqa: E402
 from islands.simulators.extended import ExtendedSimulator  # noqa: E402
 from islands.simulators.interface import Simulator  # noqa: E402
 from islands.simulators.linear import estimate_linear  # noqa: E402
 from islands.simulators.specification.factory import make_simulator  # noqa: E402
 from islands.simulators.specification.table import PhysicalSpec  # noqa: E402
+from islands_measurements.blind_trials.cases import CASES, SimulatedCase  # noqa: E402
+from islands_measurements.blind_trials.injection.measurement import inject  # noqa: E402
 
 #: Place of the neighbour among the inputs of a record.
 NEIGHBOUR = 2

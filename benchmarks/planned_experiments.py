@@ -11,9 +11,9 @@ from islands.diagnosis.planning.experiment import Experiment, make_model
 from islands.diagnosis.planning.experiment_setup import make_experiment
 from islands.diagnosis.procedure import diagnose
 from islands.effects.interface.effect import Effect
-from islands.performance.trials.injection.noise import NOISES
 from islands.simulators.specification.factory import make_simulator
 from islands.systems.signals import sines
+from islands_measurements.blind_trials.injection.noise import NOISES
 
 ROOT = Path(__file__).resolve().parents[1]
 

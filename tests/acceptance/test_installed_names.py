@@ -32,7 +32,18 @@ BY_NAME = re.compile(
 EXEMPT = {"requirements.lock", "test_installed_names.py"}
 
 #: Folders with everything that a user or a developer reads or runs.
-FOLDERS = (".ci", "api", "benchmarks", "deploy", "docs", "examples", "services", "src", "tests")
+FOLDERS = (
+    ".ci",
+    "api",
+    "benchmarks",
+    "deploy",
+    "docs",
+    "examples",
+    "measurements",
+    "services",
+    "src",
+    "tests",
+)
 
 
 def files() -> Iterator[tuple[str, str]]:

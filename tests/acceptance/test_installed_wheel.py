@@ -19,6 +19,7 @@ DATA = {
     "islands": ("py.typed", "reports/templates/report.html", "reports/templates/diagnosis.html"),
     "islands_api": ("py.typed", "dashboard/index.html", "dashboard/islands.css", "dashboard/islands.js"),
     "islands_service": ("py.typed",),
+    "islands_measurements": ("py.typed",),
 }
 
 

@@ -160,7 +160,7 @@ def test_a_search_on_one_core_for_lack_of_ray_says_how_to_install_it():
 def test_every_message_names_an_extra_and_is_tested():
     named = {
         ast.literal_eval(node.args[1])
-        for folder in ("src", "services", "api")
+        for folder in ("src", "services", "measurements", "api")
         for path in (ROOT / folder).rglob("*.py")
         if "describe_missing_extra(" in (text := path.read_text())
         for node in ast.walk(ast.parse(text))

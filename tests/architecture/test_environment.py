@@ -16,7 +16,7 @@ NAMES = {"environ", "environb", "getenv", "getenvb"}
 
 SOURCES = sorted(
     path.relative_to(ROOT).as_posix()
-    for folder in ("services", "api")
+    for folder in ("services", "measurements", "api", "src/islands/cli", "src/islands/processes")
     for path in (ROOT / folder).rglob("*.py")
 )
 

@@ -33,7 +33,7 @@ PRONOUNS = {"it", "its", "so", "that", "they", "this", "these", "what", "who", "
 
 
 def written_files() -> list[str]:
-    folders = ("src", "services", "api", "docs", "tests", "examples", "benchmarks")
+    folders = ("src", "services", "measurements", "api", "docs", "tests", "examples", "benchmarks")
     suffixes = {".py", ".pyi", ".md", ".html", ".js", ".css"}
     found = [path for folder in folders for path in (ROOT / folder).rglob("*") if path.suffix in suffixes]
     return sorted(str(path.relative_to(ROOT)) for path in (*found, *ROOT.glob("*.md")))

@@ -11,7 +11,7 @@ import pytest
 
 from support.repository import ROOT
 
-FOLDERS = ("src", "services", "api")
+FOLDERS = ("src", "services", "measurements", "api")
 SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
 
 #: Class names that two modules use: the client and the OpenAPI document name them like the core does.
@@ -60,7 +60,9 @@ def test_no_module_has_a_catch_all_name() -> None:
         assert not {"utils", "helpers", "common", "misc"} & {path.stem, *path.parts}, path
 
 
-@pytest.mark.parametrize("package", ["api.islands_api", "services.islands_service"])
+@pytest.mark.parametrize(
+    "package", ["api.islands_api", "services.islands_service", "measurements.islands_measurements"]
+)
 def test_a_source_folder_is_not_importable_as_a_package(package: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", f"import {package}"], cwd=ROOT / "src", capture_output=True, check=False

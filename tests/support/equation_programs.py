@@ -19,12 +19,12 @@ from islands.effects.catalogue import CATALOGUE, catalogue_order
 from islands.effects.interface.effect import Effect, Site
 from islands.export.equations.equation_collection import collect_equations
 from islands.export.extension import export_extended
-from islands.performance.benchmark.compiled_c import compile_model
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.specification.table import LocalExtendedSpec
+from islands_measurements.benchmark.compiled_c import compile_model
 
 Array = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from typing import Any
 from support.repository import ROOT
 
 #: Folders of the sources, each with one package.
-FOLDERS = ("src", "services", "api")
+FOLDERS = ("src", "services", "measurements", "api")
 
 #: Position of the argument with the flags, by function.
 FLAGS = {"compile": 1, "search": 2, "match": 2, "fullmatch": 2, "findall": 2, "finditer": 2}

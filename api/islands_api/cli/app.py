@@ -1,12 +1,13 @@
-"""Command line ``islands``: the commands of the core and those of the service."""
+"""Command line ``islands``: the commands of the core, of the measurements and of the service."""
 
-from collections.abc import Mapping
 from types import MappingProxyType
 
 from islands.cli import app as core
+from islands_measurements.commands import COMMANDS as MEASUREMENTS
 
-#: Commands of a service and their descriptions; see `islands.cli.app.COMMANDS`.
-SERVICE_COMMANDS: Mapping[str, str] = MappingProxyType(
+#: Commands of a service; see `islands.cli.app.Command`.
+SERVICE_COMMANDS = core.make_commands(
+    "islands_api.cli.commands",
     {
         "serve": "Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next "
         "start.",
@@ -14,18 +15,20 @@ SERVICE_COMMANDS: Mapping[str, str] = MappingProxyType(
         "monitors": "Monitors of a service: create, add records, list, show, delete.",
         "keys": "API keys of a service: create, list, revoke.",
         "admin": "Operation of a service: audit, owners, jobs, backup, restore.",
-    }
+    },
 )
 
+_core = dict(core.COMMANDS)
+_systems = {"systems": _core.pop("systems")}
 
-#: All commands and their descriptions, in the order of the help.
-COMMANDS: Mapping[str, str] = MappingProxyType({**core.COMMANDS, **SERVICE_COMMANDS})
+#: All commands, in the order of the help, in which the measurements precede the systems.
+COMMANDS = MappingProxyType({**_core, **MEASUREMENTS, **_systems, **SERVICE_COMMANDS})
 
 
 class AllCommands(core.Commands):
-    """Group of the commands of the core and of the service."""
+    """Group of all commands."""
 
-    packages = MappingProxyType({**core.Commands.packages, "islands_api.cli.commands": SERVICE_COMMANDS})
+    table = COMMANDS
 
 
 app = core.make_app(AllCommands)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 from rich.markup import escape
@@ -18,10 +18,30 @@ from islands.distribution import describe_missing_extra, read_version
 from islands.errors import IslandsError, SettingsError, suggest
 from islands.processes.settings import limit_threads
 
-#: Commands that need no service, and their descriptions, in the order of the help. Each is a file of
-#: `islands.cli.commands` with a function or a group of the command's name. The help shows these descriptions,
-#: so that it does not import the commands.
-COMMANDS: Mapping[str, str] = MappingProxyType(
+
+class Command(NamedTuple):
+    """Command of a table.
+
+    Attributes
+    ----------
+    package : str
+        Package with a module of the command's name, which has a function or a group of this name.
+    description : str
+        Description in the help, which imports no command.
+    """
+
+    package: str
+    description: str
+
+
+def make_commands(package: str, descriptions: Mapping[str, str]) -> Mapping[str, Command]:
+    """Return the table of the commands of a package."""
+    return MappingProxyType({name: Command(package, text) for name, text in descriptions.items()})
+
+
+#: Commands that need no service, in the order of the help.
+COMMANDS = make_commands(
+    "islands.cli.commands",
     {
         "inspect": "Describe a record: columns, sampling, dead time, noise, excitation, and the next "
         "command.",
@@ -39,12 +59,8 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "demo": "Identify the record of the paper's case 1 and compare the models with those of the paper.",
         "reproduce": "Compute the tables and figures of the paper, and write them next to the published "
         "numbers.",
-        "bench": "Measure evaluations, kernels and whole searches on this machine, which should be otherwise "
-        "idle.",
-        "trials": "Inject effects into simulated records, diagnose them, and count how often they are found "
-        "and named.",
         "systems": "Simulated systems: list them, make records of them.",
-    }
+    },
 )
 
 #: Extra of ``pyproject.toml`` by the package that it installs.
@@ -60,21 +76,11 @@ EXTRAS: Mapping[str, str] = MappingProxyType(
 
 
 class Commands(TyperGroup):
-    """Group that imports a command on demand, so that ``islands jobs`` does not load the kernels.
+    """Group that imports a command on demand, so that ``islands jobs`` does not load the kernels."""
 
-    Attributes
-    ----------
-    packages : mapping
-        Commands and their descriptions by the package that contains their files.
-    """
-
-    packages: Mapping[str, Mapping[str, str]] = MappingProxyType({"islands.cli.commands": COMMANDS})
+    #: Commands by name, in the order of the help.
+    table: Mapping[str, Command] = COMMANDS
     _is_listing = False
-
-    @property
-    def descriptions(self) -> dict[str, str]:
-        """Descriptions of all commands, in the order of the help."""
-        return {name: text for commands in self.packages.values() for name, text in commands.items()}
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command. Report an error in one line; exit with code 2, or 130 or 143 after a signal."""
@@ -94,14 +100,13 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command of the arguments; for an unknown name, an error suggests similar ones."""
-        known = self.descriptions
-        if args[0] not in known and (similar := suggest(args[0], known)):
+        if args[0] not in self.table and (similar := suggest(args[0], self.table)):
             ctx.fail(f"No such command {args[0]!r}{similar}")
         return super().resolve_command(ctx, args)
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
         """Return the names in the order of the table."""
-        return list(self.descriptions)
+        return list(self.table)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
         """Return a command, or None if no command has the name.
@@ -111,11 +116,11 @@ class Commands(TyperGroup):
         SettingsError
             The packages of the command are not installed.
         """
-        package = next((each for each, commands in self.packages.items() if cmd_name in commands), None)
-        if package is None:
+        if cmd_name not in self.table:
             return None
+        package, description = self.table[cmd_name]
         if self._is_listing:
-            return TyperCommand(cmd_name, help=self.packages[package][cmd_name])
+            return TyperCommand(cmd_name, help=description)
         try:
             module = import_module(f"{package}.{cmd_name}")
         except ModuleNotFoundError as error:

@@ -29,9 +29,9 @@ from islands.diagnosis.surrogates import (
     make_surrogates,
 )
 from islands.effects.interface.effect import Effect, Signal, SimulationContext
-from islands.performance.trials.injection.measurement import inject
-from islands.performance.trials.trial import TOLERANCE
 from islands.simulators.recorded_output import RecordedOutput
+from islands_measurements.blind_trials.injection.measurement import inject
+from islands_measurements.blind_trials.trial import TOLERANCE
 from support.built_in_simulators import make_piezo
 
 SIMULATOR = make_piezo()

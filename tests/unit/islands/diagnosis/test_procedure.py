@@ -17,11 +17,11 @@ from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError, SettingsError
-from islands.performance.trials.injection.measurement import inject
-from islands.performance.trials.trial import TOLERANCE
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
+from islands_measurements.blind_trials.injection.measurement import inject
+from islands_measurements.blind_trials.trial import TOLERANCE
 from support.built_in_simulators import make_piezo
 
 

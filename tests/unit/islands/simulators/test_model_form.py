@@ -13,12 +13,12 @@ from islands.effects.model_form import CORE_SHAPE
 from islands.expressions.parsing import parse
 from islands.io.models import model_from_json
 from islands.models.narx import Model, make_model
-from islands.performance.trials.cases import CASES
-from islands.performance.trials.injection.measurement import FaultyRecord, inject
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.model_form import SLOPE
 from islands.simulators.narx import NarxSimulator
+from islands_measurements.blind_trials.cases import CASES
+from islands_measurements.blind_trials.injection.measurement import FaultyRecord, inject
 
 
 @pytest.fixture(scope="module")

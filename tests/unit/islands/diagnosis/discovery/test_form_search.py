@@ -14,9 +14,9 @@ from islands.effects.free_forms import FREE_FORMS
 from islands.effects.interface.context import SimulationContext
 from islands.figures.form_values import draw_free_forms
 from islands.kernels.curve import PLACES
-from islands.performance.trials.trial import Trial, run_trial
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput
+from islands_measurements.blind_trials.trial import Trial, run_trial
 from support.simulated_records import recorded, wave
 
 U = wave(2000) / 20.0

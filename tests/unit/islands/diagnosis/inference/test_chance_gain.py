@@ -14,10 +14,10 @@ from islands.diagnosis.inference.screening import bic_penalty, screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
-from islands.performance.trials.injection.noise import NOISES
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput
+from islands_measurements.blind_trials.injection.noise import NOISES
 from support.simulated_records import recorded, wave
 
 EFFECTS = [CATALOGUE[name] for name in ("linear-drift", "jump", "exponential-creep", "even-nonlinearity")]

@@ -1,0 +1,1 @@
+"""Measurements of the project: speed (`benchmark`) and detection rates (`blind_trials`)."""

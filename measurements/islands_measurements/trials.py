@@ -1,0 +1,186 @@
+"""``islands trials``: blind fault-injection trials of the discrepancy analysis."""
+
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from islands.cli.console import compile_kernels, output, progress
+from islands.cli.engines import ray_pool
+from islands.cli.stop_requests import stop_requests
+from islands.errors import SettingsError, lookup
+from islands.figures.confusion import draw_confusion
+from islands.figures.style import save
+from islands.progress import Steps, StoppedError
+from islands_measurements.blind_trials.cases import CASES, SimulatedCase
+from islands_measurements.blind_trials.injection.noise import NOISES
+from islands_measurements.blind_trials.scoring import (
+    Proportion,
+    ReliabilityBin,
+    Statistic,
+    confusion,
+    reliability,
+    score,
+)
+from islands_measurements.blind_trials.trial import Trial, TrialOutcome, run_trial
+
+#: Bands of the misfit of an effect, in standard deviations of the noise; used in turn.
+BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
+
+#: Band of effects that are injected together.
+COMBINED_BAND = BANDS[1]
+
+
+def trials(
+    cores: Annotated[
+        list[str] | None,
+        typer.Option("--core", help=f"Simulation; repeatable: {', '.join(CASES)}; the first by default."),
+    ] = None,
+    effects: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--effects",
+            help="Effects to inject; repeatable; by default, or by 'all', all that the analysis can name.",
+        ),
+    ] = None,
+    count: Annotated[int, typer.Option("--count", min=1, help="Trials of each effect.")] = 3,
+    noise: Annotated[
+        str, typer.Option("--noise", help=f"Kind of the measurement noise: {', '.join(NOISES)}.")
+    ] = "white",
+    clean: Annotated[int, typer.Option("--clean", min=0, help="Records without an effect.")] = 20,
+    pairs: Annotated[int, typer.Option("--pairs", min=0, help="Records with two effects.")] = 0,
+    triples: Annotated[int, typer.Option("--triples", min=0, help="Records with three effects.")] = 0,
+    open_set: Annotated[
+        int,
+        typer.Option("--open-set", min=0, help="Records of each cause that is not in the catalogue."),
+    ] = 2,
+    mixed: Annotated[
+        int,
+        typer.Option(
+            "--mixed", min=0, help="Records with an effect and a cause that is not in the catalogue."
+        ),
+    ] = 0,
+    variant: Annotated[
+        bool, typer.Option("--variant", help="Inject effects in other forms than those of the catalogue.")
+    ] = False,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            "--seconds", min=10.0, help="Length of a record; by default the usual length of its system."
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Largest number of trials that run in parallel.")
+    ] = None,
+    address: Annotated[str | None, typer.Option("--ray-address", help="HOST:PORT of a cluster.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", help="SVG file for the confusion matrix.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--json", help="JSON file for the outcomes.")] = None,
+) -> None:
+    """Inject effects into simulated records, diagnose them, and count how often they are found and named."""
+    cases = {name: lookup(CASES, name, "core") for name in cores or [next(iter(CASES))]}
+    lookup(NOISES, noise, "noise")
+    planned: list[Trial] = []
+    for core, simulated in cases.items():
+        names, rng = _select_effects(effects, simulated), np.random.default_rng(seed)
+
+        def trial(
+            injected: Sequence[str], turn: int, band: tuple[float, float] | None = None, core: str = core
+        ) -> Trial:
+            other_form = variant and band is not None
+            return Trial(tuple(injected), seed + turn, noise, band, other_form, seconds, core, oracle=True)
+
+        planned += [trial((name,), turn, BANDS[turn % len(BANDS)]) for name in names for turn in range(count)]
+        planned += [trial((), turn) for turn in range(clean)]
+        planned += [trial((name,), turn) for name in simulated.system.unknown for turn in range(open_set)]
+        for size, many in ((2, pairs), (3, triples)):
+            if many and len(names) < size:
+                raise SettingsError(f"{size} effects at once need {size} names: give more with --effects")
+            planned += [
+                trial([str(each) for each in rng.choice(names, size, replace=False)], turn, COMBINED_BAND)
+                for turn in range(many)
+            ]
+        planned += [
+            trial([str(rng.choice(each)) for each in (names, simulated.nameless)], turn, COMBINED_BAND)
+            for turn in range(mixed)
+        ]
+    compile_kernels()
+    found: list[TrialOutcome] = []
+    with progress("trials") as show, stop_requests() as stop:
+        steps = Steps(show, stop)
+        check = partial(steps.check, "the first trial")
+        with suppress(StoppedError), ray_pool(workers, address, check) as parallel_map:
+            for outcome in parallel_map(run_trial, planned):
+                found.append(outcome)
+                show(f"{len(found)} of {len(planned)}", len(found) / len(planned))
+        if not found:
+            check()
+    document: dict[str, Any] = {"cores": {}, "outcomes": [asdict(each) for each in found]}
+    for core, simulated in cases.items():
+        outcomes = [each for each in found if each.trial.core == core]
+        document["cores"][core] = _report_case(core, simulated, outcomes)
+        if figure is not None:
+            path = figure if len(cases) == 1 else figure.with_stem(f"{figure.stem}-{core}")
+            title = f"{core}, {noise} noise: injected and named effects"
+            save(draw_confusion(confusion(outcomes), simulated.nameable, title), path)
+    if out is not None:
+        out.write_text(json.dumps(document, indent=1))
+    left_out = [f"{len(planned) - len(found)} of {len(planned)} trials"] * (len(found) < len(planned))
+    stop.end(out, left_out, "repeat the command for all trials")
+
+
+def _report_case(core: str, simulated: SimulatedCase, outcomes: Sequence[TrialOutcome]) -> dict[str, Any]:
+    """Print the scores of one simulation and return them as a document."""
+    rows = score(outcomes, simulated.nameless, simulated.goals)
+    bins = reliability(outcomes)
+    output.print(_make_table(core, rows))
+    for each in bins:
+        output.print(_format_bin(each), markup=False)
+    wrong = {key: times for key, times in sorted(confusion(outcomes).items()) if key[0] != key[1]}
+    for (injected, named), times in islice(wrong.items(), 40):
+        output.print(f"{injected or 'nothing'} was named {named or 'nothing'}: {times}", markup=False)
+    shares = [{**asdict(each), "bounds": each.bounds} for each in rows if isinstance(each, Proportion)]
+    measures = [asdict(each) for each in rows if isinstance(each, Statistic) and each.of]
+    return {"shares": shares, "measures": measures, "reliability": [asdict(each) for each in bins]}
+
+
+def _select_effects(effects: list[str] | None, simulated: SimulatedCase) -> list[str]:
+    if not effects or effects == ["all"]:
+        return list(simulated.nameable)
+    for name in effects:
+        lookup(dict.fromkeys(simulated.system.known), name, "effect")
+    return effects
+
+
+def _make_table(title: str, rows: Sequence[Proportion | Statistic]) -> Table:
+    table = Table("", "trials", "", "95 %", "goal", "", title=title, title_justify="left")
+    for row in rows:
+        if row.of:
+            goal = "" if row.goal is None else f"{'<=' if row.most else '>='} {row.goal:g}"
+            kept = {True: "kept", False: "MISSED", None: ""}[row.kept]
+            table.add_row(row.name, f"{row.of}", *_format_value(row), goal, kept)
+    return table
+
+
+def _format_value(row: Proportion | Statistic) -> tuple[str, str]:
+    if isinstance(row, Statistic):
+        return f"{row.value:.3f}", ""
+    low, high = row.bounds
+    return f"{row.percent:.1f} %", f"{low:.1f} to {high:.1f}"
+
+
+def _format_bin(each: ReliabilityBin) -> str:
+    return (
+        f"confidence {each.low:g} to {each.high:g}: {each.count} names, said {100 * each.said:.0f} %, "
+        f"right {100 * each.right:.0f} %"
+    )

@@ -1,1 +1,0 @@
-"""Measurements of the project: speed (`benchmark`) and detection rates (`trials`)."""
