@@ -25,3 +25,8 @@ def _free_run(_shooting: int) -> int | None:
 FITNESSES: Mapping[str, ShootingInterval] = MappingProxyType(
     {"one-step": _one_step_ahead, "shooting": _shooting, "free-run": _free_run}
 )
+
+#: Kind of simulation whose error a fitness function is, an entry of `islands.validation.assessment.MODES`.
+FITNESS_MODES: Mapping[str, str] = MappingProxyType(
+    {"one-step": "one_step_ahead", "shooting": "multiple_shooting", "free-run": "free_run"}
+)

@@ -14,21 +14,18 @@ from islands.data.dataset import Dataset
 from islands.data.loops import has_loops
 from islands.data.split import Split
 from islands.estimation.structure_selection.certificate import Certificate
-from islands.evolution.fitness import FITNESSES
+from islands.evolution.fitness import FITNESS_MODES
 from islands.evolution.history import HistoryPoint
 from islands.models.equations import equation
 from islands.models.narx import Model
 from islands.progress import Steps
-from islands.validation.assessment import MODES, Assessment
+from islands.validation.assessment import Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
 from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import Recommendation, recommend, recommend_fittest
 
 #: Name of the step that makes the ensemble and the prediction bands.
 _BANDS = "prediction bands"
-
-#: Kind of simulation of each fitness function.
-_FITNESS_MODES = dict(zip(FITNESSES, MODES, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +146,7 @@ class SearchResult:
         """Rank of the recommended model, and the reasons."""
         unit = self.record.output_unit
         if self.settings.get("select") == "fitness":  # a setting of evolution only
-            mode = _FITNESS_MODES[self.settings["fitness"]]
+            mode = FITNESS_MODES[self.settings["fitness"]]
             return recommend_fittest(self.models, mode, self.requires_property_1, unit)
         sizes = [entry.model.size for entry in self.models]
         return recommend(sizes, self.models, self.requires_property_1, unit)

@@ -5,10 +5,11 @@ import math
 import pytest
 
 import islands
-from islands.expressions.derivatives import differentiate
+from islands.expressions.derivatives import _PARTIALS, differentiate
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Apply, Lagged
+from islands.expressions.tree import Apply, Lagged, walk
+from islands.models.regressor import canonical
 
 U, Y = 0.7, -1.3
 
@@ -45,6 +46,14 @@ def slopes(expression, u=U, y=Y):
 )
 def test_derivatives_are_exact(text, du, dy):
     assert slopes(parse(text)) == pytest.approx((du, dy), rel=1e-14)
+
+
+@pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))
+def test_canonical_form_of_each_primitive_has_exact_derivatives(entry):
+    """Those of a primitive without an entry are differences, with an error of 1e-10."""
+    _, form = canonical(Apply(entry, tuple(map(Lagged, range(entry.arity)))))
+    called = {part.primitive.name for part in walk(form) if isinstance(part, Apply)}
+    assert called - _PARTIALS.keys() == set()
 
 
 @pytest.mark.parametrize(
