@@ -142,7 +142,7 @@ def fit(
             given["library"] = SEVERAL_OUTPUTS if library == AUTO else library
             pair = couple_data(data, held_out, len(outputs), steps, names)
             fit_all = partial(islands.fit_coupled, pair[0], validation=pair[1], **coupled_options(given))
-            stop.end(out, keep_coupled(fit_all, out, show, stop), REPEAT)
+            stop.end(out, keep_coupled(fit_all, out, show, stop)[1], REPEAT)
             return
         result = islands.fit(data, validation=held_out, **given)
         result = result.with_wall_time(perf_counter() - began)

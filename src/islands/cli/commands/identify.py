@@ -13,11 +13,12 @@ from islands.cli.preprocessing_options import with_preprocessing_options
 from islands.cli.record_options import with_reading_options
 from islands.cli.recordings import Recordings, measured_names
 from islands.cli.runs.coupled import couple_data, identify_several, join_columns
-from islands.cli.runs.identify import RunOptions, load_run, run
+from islands.cli.runs.identify import RunOptions, load_run, read_parts, run
 from islands.cli.search_options import DEFAULTS, SearchOptions, with_search_options
+from islands.data.coupled_record import CoupledRecord
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError, lookup
-from islands.evolution.presets import AUTO
+from islands.evolution.presets import AUTO, resolve_settings
 from islands.io.records import fingerprint
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 
@@ -94,25 +95,27 @@ def identify(
         check_folder(out, force)
         names, output_column = join_columns(options.columns(inputs), outputs)
         if len(outputs) > 1:
-            if test is not None or wall_time is not None:
-                raise SettingsError("--test and --wall-time are for one output: leave them out")
-            recordings = Recordings(records, measured_names(names, steps), output_column, dt, reading)
-            data = couple_data(
-                recordings.read(rows), recordings.read_held_out(validation, rows), len(outputs), steps, names
-            )
+            if wall_time is not None:
+                raise SettingsError("--wall-time is for one output: leave it out")
             preset = COUPLED_PRESET if search.preset == AUTO else search.preset
-            identify_several(run_options, out, data, preset, search.seed, search.changes)
+            lag = resolve_settings(preset, search.changes).maximum_lag
+            recordings = Recordings(records, measured_names(names, steps), output_column, dt, reading)
+            data, held_out, test_data = read_parts(recordings, rows, validation, test, lag)
+            coupled = couple_data(data, held_out, len(outputs), steps, names)
+            tested = None
+            if test_data is not None:
+                _, tested = couple_data(data, test_data, len(outputs), steps, names)
+                assert isinstance(tested, CoupledRecord), "the test data are no fraction"
+            identify_several(run_options, out, coupled, preset, search.seed, search.changes, tested)
             return
         paths = [str(path.resolve()) for path in records]
-        held_out = {"validation": validation, "test": test}
+        given = {"validation": validation, "test": test}
         files = {
-            kind: str(Path(name).resolve())
-            for kind, name in held_out.items()
-            if name and Path(name).is_file()
+            kind: str(Path(name).resolve()) for kind, name in given.items() if name and Path(name).is_file()
         }
         job = {
             "records": paths,
-            **held_out,
+            **given,
             **files,
             "sha256": {path: fingerprint(path) for path in (*paths, *files.values())},
             "inputs": names,

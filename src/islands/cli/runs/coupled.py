@@ -1,5 +1,6 @@
 """Several outputs on the command line: a coupled model is identified and fitted."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
@@ -11,7 +12,7 @@ import islands
 from islands.cli.console import Display, compile_kernels, output, print_message, progress
 from islands.cli.engines import start_engine
 from islands.cli.recordings import advance_as_named
-from islands.cli.runs.identify import RunOptions
+from islands.cli.runs.identify import TEST, RunOptions, compute_errors
 from islands.cli.search_progress import search_progress
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands.data.averaging import AUTO
@@ -19,6 +20,7 @@ from islands.data.coupled_record import CoupledRecord, check_outputs, couple
 from islands.data.dataset import Dataset
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import PreprocessingSteps
+from islands.data.signal_map import match_rate
 from islands.evolution.presets import resolve_settings
 from islands.facade.coupled.identification import StoppedCouplingError
 from islands.facade.coupled.result import list_folders
@@ -73,8 +75,9 @@ def identify_several(
     preset: str,
     seed: int,
     changes: Mapping[str, Any],
+    test: CoupledRecord | None,
 ) -> None:
-    """Identify several outputs by evolution, write the result and print it."""
+    """Identify several outputs by evolution, write the result and its errors on the test data, print both."""
     settings = resolve_settings(preset, changes)
     compile_kernels()
     with ExitStack() as handlers:
@@ -98,14 +101,32 @@ def identify_several(
                 engine=engine,
                 **coupled_options(dict(changes)),
             )
-            left_out = keep_coupled(identify_all, folder, show, stop)
+            result, left_out = keep_coupled(identify_all, folder, show, stop)
+        (folder / TEST).unlink(missing_ok=True)  # of an earlier run
+        if test is not None:
+            _evaluate_test(result, test, folder)
         stop.end(folder, left_out, REPEAT)
+
+
+def _evaluate_test(result: "islands.CoupledResult", test: CoupledRecord, folder: Path) -> None:
+    """Simulate all outputs of the test data together; print and write the metrics of each."""
+    test = test.map(partial(match_rate, result.model))
+    simulated = result.simulate(test)
+    output.print(f"test data, not used before: free run {simulated.outcome}", markup=False)
+    outputs = []
+    for record, y in zip(test.records, simulated.y.T, strict=True):
+        numbers, text = compute_errors(record, y if simulated.outcome else None)
+        outputs.append({"name": record.output_name, **numbers})
+        if text:
+            output.print(f"  {record.output_name}{text.replace(',', ':', 1)}", markup=False)
+    document = {"outcome": str(simulated.outcome), "outputs": outputs}
+    (folder / TEST).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
 def keep_coupled(
     search: Callable[[], "islands.CoupledResult"], folder: Path, show: Display, stop: StopRequests
-) -> tuple[str, ...]:
-    """Search several outputs, write the result and print it; return the steps that were left out.
+) -> tuple["islands.CoupledResult", tuple[str, ...]]:
+    """Search several outputs, write the result and print it; return it and the steps that were left out.
 
     A stopped search keeps its results so far, and ends the command.
     """
@@ -125,4 +146,4 @@ def keep_coupled(
     output.print(str(result), markup=False)
     files = "result.json, model.json, summary.txt, figures/, outputs/ (the result of each output)"
     output.print(f"{folder}/: {files}", markup=False)
-    return (*result.left_out, *drawing.left_out)
+    return result, (*result.left_out, *drawing.left_out)

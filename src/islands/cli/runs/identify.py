@@ -8,6 +8,9 @@ from pathlib import Path
 from time import monotonic, perf_counter
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 import islands
 from islands.cli.console import Display, compile_kernels, errors, output, print_message, progress
 from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
@@ -197,15 +200,22 @@ def _evaluate_test(result: islands.Result, test_data: islands.Dataset, folder: P
     """Simulate the recommended model on the test data; print and write the metrics."""
     test_data = match_rate(result.best.model, test_data)
     simulated = result.best.simulate(test_data)
-    errors_by_name = asdict(metrics(test_data.y, simulated.y)) if simulated.outcome else {}
-    numbers = {name: value if isfinite(value) else None for name, value in errors_by_name.items()}
+    numbers, text = compute_errors(test_data, simulated.y if simulated.outcome else None)
     document = {"outcome": str(simulated.outcome), **numbers}
     (folder / TEST).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    text = f"test data, not used before: free run {simulated.outcome}"
-    if errors_by_name:
-        mape, r2, rmse = (errors_by_name[name] for name in ("mape", "r2", "rmse"))
-        text += f", MAPE {mape:.4f} %, R2 {r2:.5f}, RMSE {rmse:.6g} {test_data.output_unit}".rstrip()
-    output.print(text, markup=False)
+    output.print(f"test data, not used before: free run {simulated.outcome}{text}", markup=False)
+
+
+def compute_errors(
+    record: islands.Dataset, y: NDArray[np.float64] | None
+) -> tuple[dict[str, float | None], str]:
+    """Return the metrics of a simulation as JSON values and as text; both are empty if y is None."""
+    if y is None:
+        return {}, ""
+    found = metrics(record.y, y)
+    numbers = {name: value if isfinite(value) else None for name, value in asdict(found).items()}
+    text = f", MAPE {found.mape:.4f} %, R2 {found.r2:.5f}, RMSE {found.rmse:.6g} {record.output_unit}"
+    return numbers, text.rstrip()
 
 
 def _read_data(
@@ -220,11 +230,32 @@ def _read_data(
     reading = ReadingOptions(**job.get("reading", {}))
     steps = PreprocessingSteps(**job.get("preprocessing", {}))
     recordings = Recordings(paths, job["inputs"], job["output"], job["dt"], reading, steps)
-    data = recordings.read(job["rows"])
-    held_out = recordings.read_held_out(job["validation"], job["rows"])
+    return read_parts(recordings, job["rows"], job["validation"], job["test"], lag)
+
+
+def read_parts(
+    recordings: Recordings, rows: str | None, validation: str | None, test: str | None, lag: int
+) -> tuple[islands.Dataset, islands.Dataset | float, islands.Dataset | None]:
+    """Read the data for estimation, validation (or its fraction) and the final test.
+
+    Parameters
+    ----------
+    recordings : Recordings
+    rows, validation, test : str or None
+        Options of the command.
+    lag : int
+        Largest lag of the models.
+
+    Raises
+    ------
+    SettingsError, RecordError
+        A part shares samples with another one, or is too short.
+    """
+    data = recordings.read(rows)
+    held_out = recordings.read_held_out(validation, rows)
     test_data: islands.Dataset | None = None
-    if job["test"] is not None:
-        given = recordings.read_held_out(job["test"], job["rows"], "--test")
+    if test is not None:
+        given = recordings.read_held_out(test, rows, "--test")
         if isinstance(given, float):
             parts = islands.split(data, given)
             data, test_data = parts.estimation, parts.validation

@@ -9,6 +9,7 @@ import pytest
 import islands
 from islands.data.coupled_record import CoupledRecord
 from islands.simulation.coupled_free_run import coupled_free_run
+from islands.validation.metrics import metrics
 from support.command_line import fail, succeed
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.parsed_files import list_parsed
@@ -55,6 +56,20 @@ def test_a_fitted_model_is_simulated_and_shown(record, tmp_path, monkeypatch) ->
 
 
 @pytest.mark.ci
+def test_an_identified_model_has_its_errors_on_test_data(record, tmp_path) -> None:
+    folder = tmp_path / "result"
+    small = ("--generations", 1, "--population", 10, "--islands", 1, "--max-terms", 4, "--max-height", 2)
+    printed = succeed("identify", record, *COLUMNS, *small, "--test", 0.2, "--out", folder)
+    found = json.loads((folder / "test.json").read_text())
+    assert [entry["name"] for entry in found["outputs"]] == ["y1", "y2"]
+    assert f"y1: MAPE {found['outputs'][0]['mape']:.4f} %" in printed
+    data = CoupledRecord(tuple(islands.read_record(record, "u", name) for name in ("y1", "y2")))
+    test = data.map(lambda each: islands.split(each, 0.2).validation)
+    y = islands.load(folder).simulate(test).y
+    assert found["outputs"][1]["rmse"] == pytest.approx(metrics(test.records[1].y, y[:, 1]).rmse)
+
+
+@pytest.mark.ci
 def test_preprocessed_outputs_are_simulated_as_measured(record, tmp_path) -> None:
     folder, out = tmp_path / "result", tmp_path / "simulated.csv"
     with undrawn_figures():
@@ -89,7 +104,8 @@ def test_several_outputs_are_identified_by_evolution(record, tmp_path) -> None:
         ("fit", ("--output", "y1", "--output", "u"), "u is an input and an output"),
         ("fit", ("--output", "y1,y2", "--constraints", "gain = 2"), "are for one output"),
         ("fit", ("--output", "y1,y2", "--feedthrough", "yes"), "as u+1"),
-        ("identify", ("--output", "y1,y2", "--test", "0.2"), "are for one output"),
+        ("identify", ("--output", "y1,y2", "--wall-time", "9"), "is for one output"),
+        ("identify", ("--output", "y1,y2", "--test", "120:150"), "other samples for estimation"),
         ("identify", ("--output", "y1,y1"), "y1 is given twice"),
     ],
 )
