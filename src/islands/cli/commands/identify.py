@@ -102,10 +102,11 @@ def identify(
             recordings = Recordings(records, measured_names(names, steps), output_column, dt, reading)
             data, held_out, test_data = read_parts(recordings, rows, validation, test, lag)
             coupled = couple_data(data, held_out, len(outputs), steps, names)
-            tested = None
+            tested: CoupledRecord | None = None
             if test_data is not None:
-                _, tested = couple_data(data, test_data, len(outputs), steps, names)
-                assert isinstance(tested, CoupledRecord), "the test data are no fraction"
+                _, others = couple_data(data, test_data, len(outputs), steps, names)
+                assert isinstance(others, CoupledRecord), "the test data are no fraction"
+                tested = others
             identify_several(run_options, out, coupled, preset, search.seed, search.changes, tested)
             return
         paths = [str(path.resolve()) for path in records]
