@@ -4,9 +4,10 @@ import re
 from collections.abc import Sequence
 from html import escape, unescape
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from islands.data.channel_names import parse_channel_name
+from islands.data.signal_map import SignalReference
 from islands.expressions.parsing import parse
 from islands.expressions.printing import (
     MINUS,
@@ -20,17 +21,34 @@ from islands.expressions.printing import (
     plain_factor,
 )
 from islands.expressions.tree import Constant, Expression, Lagged, replace_leaves
+from islands.models.regressor import Regressor
 from islands.models.signal_statement import describe_signals
-
-if TYPE_CHECKING:
-    from islands.models.dynamic_model import DynamicModel
-    from islands.models.narx import Model
 
 #: Maximum number of visible characters of a row of MathML.
 _ROW_CHARACTERS = 80
 
 
-def equation(model: "Model", digits: int = 6) -> str:
+class NarxTerms(SignalReference, Protocol):
+    """Terms of an equation, and their parameters: what the text of a NARX model is written from."""
+
+    @property
+    def regressors(self) -> tuple[Regressor, ...]:
+        """Regressors."""
+
+    @property
+    def theta(self) -> tuple[float, ...] | None:
+        """One parameter per regressor. None before estimation."""
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs."""
+
+    @property
+    def leads(self) -> tuple[int, ...]:
+        """Number of samples that the output and each input are read early."""
+
+
+def equation(model: NarxTerms, digits: int = 6) -> str:
     """Write a model as one line: ``y(k) = 1*y(k-1) + 0.77*(u(k-1) - u(k-2))``.
 
     The parameters are rounded to ``digits`` significant digits. A model without parameters shows theta1 ...
@@ -39,13 +57,13 @@ def equation(model: "Model", digits: int = 6) -> str:
     return f"y(k) = {_join_terms(_plain_terms(model, digits))}"
 
 
-def plain_text(model: "Model") -> str:
+def plain_text(model: NarxTerms) -> str:
     """Write a model as one line; a second one states its signals, unless they are those of the record."""
     statement = describe_signals(model)
     return f"{equation(model)}\nwhere {statement}" if statement else equation(model)
 
 
-def _plain_terms(model: "Model", digits: int) -> list[str]:
+def _plain_terms(model: NarxTerms, digits: int) -> list[str]:
     parts = []
     for position, expression in enumerate(expressions_of_record(model)):
         weight = f"theta{position + 1}" if model.theta is None else f"{model.theta[position]:.{digits}g}"
@@ -54,7 +72,7 @@ def _plain_terms(model: "Model", digits: int) -> list[str]:
     return parts
 
 
-def expressions_of_record(model: "Model") -> list[Expression]:
+def expressions_of_record(model: NarxTerms) -> list[Expression]:
     """Return the expressions of the regressors in the columns of the record, without a lead."""
     leads = model.leads
     if not any(leads):
@@ -66,7 +84,7 @@ def _delay(expression: Expression, leads: Sequence[int]) -> Expression:
     return replace_leaves(expression, lambda leaf: Lagged(leaf.channel, leaf.lag - leads[leaf.channel]))
 
 
-def named_equation(model: "Model", digits: int = 6) -> str:
+def named_equation(model: NarxTerms, digits: int = 6) -> str:
     """Write a model as one line with the column names of its record: ``y_um(k) = 0.9*y_um(k-1) + u_V(k-1)``.
 
     The signals have the names of `signal_names`; a factor of 1 is left out. The text is for readers;
@@ -76,13 +94,13 @@ def named_equation(model: "Model", digits: int = 6) -> str:
     return _name_signals(f"y(k) = {_join_terms(terms)}", model)
 
 
-def signal_names(model: "DynamicModel") -> tuple[str, ...]:
+def signal_names(model: SignalReference) -> tuple[str, ...]:
     """Return the names of the output and of every input in the text of an equation.
 
     They are the columns of the record. A unit in brackets is left out (``flow`` for ``flow (l/s)``), unless
     two signals would have the same name. Other names are written in brackets: ``[flow 2]``.
     """
-    columns = (model.output_name, *model.column_names)
+    columns = (model.output_name, *(parse_channel_name(name).base for name in model.input_names))
     stems = [name if name.isidentifier() else parse_channel_name(name).stem for name in columns]
     return tuple(
         stem if stem.isidentifier() and stems.count(stem) == 1 else f"[{name}]"
@@ -90,12 +108,12 @@ def signal_names(model: "DynamicModel") -> tuple[str, ...]:
     )
 
 
-def named_term(model: "Model", position: int) -> str:
+def named_term(model: NarxTerms, position: int) -> str:
     """Write one regressor of a model with the column names of its record."""
     return _name_signals(plain_factor(expressions_of_record(model)[position], model.inputs), model)
 
 
-def named_statement(text: str, model: "Model") -> str:
+def named_statement(text: str, model: NarxTerms) -> str:
     """Write a statement about a model with the column names of its record.
 
     ``[u2(k-1)] >= 0`` becomes ``[flow(k-1)] >= 0``, and ``gain(u2) = 2`` becomes ``gain(flow) = 2``. An input
@@ -112,23 +130,23 @@ def named_statement(text: str, model: "Model") -> str:
     return re.sub(r"gain\(u(\d*)\)", name_gain, re.sub(r"\[([^\[\]]+)\]", name_term, text))
 
 
-def _name_signals(text: str, model: "Model") -> str:
+def _name_signals(text: str, model: NarxTerms) -> str:
     output, *inputs = signal_names(model)
     names = {"y": output, "u": inputs[0]} | {f"u{index}": name for index, name in enumerate(inputs, start=1)}
     return re.sub(r"\b(y|u\d*)\(k(?=[-)])", lambda leaf: f"{names[leaf[1]]}(k", text)
 
 
-def named_signals(model: "DynamicModel") -> str:
+def named_signals(model: SignalReference) -> str:
     """State which signals an equation reads, with the names of `signal_names`; see `describe_signals`."""
     return describe_signals(model, signal_names(model))
 
 
-def latex_equation(model: "Model", digits: int = 6, statement: str | None = None) -> str:
+def latex_equation(model: NarxTerms, digits: int = 6, statement: str | None = None) -> str:
     """Write a model as LaTeX without dollar signs: one line, and a second one for signals not of the record.
 
     Parameters
     ----------
-    model : Model
+    model : NarxTerms
     digits : int
         Significant digits of the parameters.
     statement : str, optional
@@ -160,7 +178,7 @@ def _join_terms(terms: Sequence[str]) -> str:
     return " + ".join(terms).replace("+ -", "- ")
 
 
-def mathml_equation(model: "Model", digits: int = 6, statement: str | None = None) -> str:
+def mathml_equation(model: NarxTerms, digits: int = 6, statement: str | None = None) -> str:
     """Write a model as a ``math`` element in ASCII that browsers render without a library.
 
     Browsers do not break the lines of an equation, so a long equation is a table of several rows. The last
@@ -168,7 +186,7 @@ def mathml_equation(model: "Model", digits: int = 6, statement: str | None = Non
 
     Parameters
     ----------
-    model : Model
+    model : NarxTerms
     digits : int
         Significant digits of the parameters.
     statement : str, optional
@@ -192,7 +210,7 @@ def mathml_statement(statement: str) -> list[str]:
     return [f"<mtext>{escape(line).encode('ascii', 'xmlcharrefreplace').decode()}</mtext>" for line in lines]
 
 
-def _mathml_terms(model: "Model", digits: int) -> list[str]:
+def _mathml_terms(model: NarxTerms, digits: int) -> list[str]:
     """Return the terms of the model, each with its sign."""
     parts = []
     for position, expression in enumerate(expressions_of_record(model)):

@@ -30,7 +30,7 @@ from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands.io.records.table_reading import read_table
 from islands.io.records.writer import write_coupled_simulation
-from islands.models.coupled_equations import coupled_signals
+from islands.models.coupled_narx import coupled_signals
 from islands.models.equations import named_signals
 from islands.simulation.coupled_free_run import match_coupled
 from islands.validation.metrics import metrics

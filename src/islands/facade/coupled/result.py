@@ -14,8 +14,7 @@ from islands.facade.results.result import Result
 from islands.io.models import model_json
 from islands.io.result_folder import record_document
 from islands.io.result_text.text_layout import term_table, wrap
-from islands.models.coupled_equations import coupled_equation, coupled_signals
-from islands.models.coupled_narx import CoupledModel
+from islands.models.coupled_narx import CoupledModel, coupled_equation, coupled_signals
 from islands.progress import Steps
 from islands.simulation.coupled_free_run import CoupledSimulation, coupled_free_run
 from islands.simulation.predictors import one_step_ahead
