@@ -1,4 +1,4 @@
-"""Regressors and NARX models, and their equations as text, LaTeX and MathML.
+"""Models of a record: the protocol and the block that all classes have in common, NARX and parametric models.
 
-Read `regressor` first, then `narx`.
+Read `dynamic_model` and `block` first, then `narx`.
 """
