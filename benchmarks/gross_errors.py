@@ -34,8 +34,8 @@ from islands.simulators.interface import Simulator  # noqa: E402
 from islands.simulators.linear import estimate_linear  # noqa: E402
 from islands.simulators.specification.factory import make_simulator  # noqa: E402
 from islands.simulators.specification.table import PhysicalSpec  # noqa: E402
-from islands_measurements.blind_trials.cases import CASES, SimulatedCase  # noqa: E402
-from islands_measurements.blind_trials.injection.measurement import inject  # noqa: E402
+from islands_measurements.detection.cases import CASES, SimulatedCase  # noqa: E402
+from islands_measurements.detection.injection.measurement import inject  # noqa: E402
 
 #: Place of the neighbour among the inputs of a record.
 NEIGHBOUR = 2

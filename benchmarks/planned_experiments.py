@@ -13,7 +13,7 @@ from islands.diagnosis.procedure import diagnose
 from islands.effects.interface.effect import Effect
 from islands.simulators.specification.factory import make_simulator
 from islands.systems.signals import sines
-from islands_measurements.blind_trials.injection.noise import NOISES
+from islands_measurements.detection.injection.noise import NOISES
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -23,7 +23,7 @@ from islands.diagnosis.planning.experiment import Experiment, ExperimentModel
 from islands.diagnosis.planning.noise_free_fit import NoiseFreeFit, fit_noise_free
 from islands.diagnosis.planning.response_dictionary import ResponseDictionary
 from islands.effects.interface.effect import Effect
-from islands_measurements.blind_trials.injection.noise import NOISES
+from islands_measurements.detection.injection.noise import NOISES
 
 #: Kinds of noise, and the number of records of each cause.
 KINDS, SEEDS = ("white", "ar", "slow-ar", "pink"), 5

@@ -31,7 +31,7 @@ from islands.diagnosis.planning.response_dictionary import ResponseDictionary
 from islands.diagnosis.planning.separation import require_detection
 from islands.diagnosis.procedure import diagnose
 from islands.simulators.specification.factory import make_simulator
-from islands_measurements.blind_trials.injection.noise import NOISES
+from islands_measurements.detection.injection.noise import NOISES
 
 #: Number of records of each cause.
 SEEDS = 10

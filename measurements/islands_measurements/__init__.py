@@ -1,1 +1,1 @@
-"""Measurements of the project: speed (`benchmark`) and detection rates (`blind_trials`)."""
+"""Measurements of the project: `speed`, and `detection` of injected faults by blind trials."""

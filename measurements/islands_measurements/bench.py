@@ -17,9 +17,9 @@ from islands.errors import IslandsError
 from islands.processes.blocked_signals import block_sigint
 from islands.processes.settings import THREADS
 from islands.progress import ProgressCallback
-from islands_measurements.benchmark.report import BenchmarkReport, check_goals, to_document
-from islands_measurements.benchmark.run import measure
-from islands_measurements.benchmark.scaling import save_scalings
+from islands_measurements.speed.report import BenchmarkReport, check_goals, to_document
+from islands_measurements.speed.run import measure
+from islands_measurements.speed.scaling import save_scalings
 
 
 def bench(

@@ -20,9 +20,9 @@ from islands.errors import SettingsError, lookup
 from islands.figures.confusion import draw_confusion
 from islands.figures.style import save
 from islands.progress import Steps, StoppedError
-from islands_measurements.blind_trials.cases import CASES, SimulatedCase
-from islands_measurements.blind_trials.injection.noise import NOISES
-from islands_measurements.blind_trials.scoring import (
+from islands_measurements.detection.cases import CASES, SimulatedCase
+from islands_measurements.detection.injection.noise import NOISES
+from islands_measurements.detection.scoring import (
     Proportion,
     ReliabilityBin,
     Statistic,
@@ -30,7 +30,7 @@ from islands_measurements.blind_trials.scoring import (
     reliability,
     score,
 )
-from islands_measurements.blind_trials.trial import Trial, TrialOutcome, run_trial
+from islands_measurements.detection.trial import Trial, TrialOutcome, run_trial
 
 #: Bands of the misfit of an effect, in standard deviations of the noise; used in turn.
 BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))

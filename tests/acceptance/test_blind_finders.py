@@ -10,9 +10,9 @@ from _pytest.mark import ParameterSet
 
 from acceptance import test_hidden as checks
 from islands.effects.catalogue import CATALOGUE
-from islands_measurements.blind_trials import trial as trials_module
-from islands_measurements.blind_trials.injection.piezo import PIEZO
-from islands_measurements.blind_trials.trial import Trial, TrialOutcome
+from islands_measurements.detection import trial as trials_module
+from islands_measurements.detection.injection.piezo import PIEZO
+from islands_measurements.detection.trial import Trial, TrialOutcome
 
 Finder = Callable[[Trial], TrialOutcome]
 

@@ -16,7 +16,7 @@ from islands.diagnosis.surrogates import SurrogateCase
 from islands.io.records import write_record
 from islands.parallel import ParallelMap
 from islands.simulators.interface import Simulator
-from islands_measurements.blind_trials.injection.measurement import inject
+from islands_measurements.detection.injection.measurement import inject
 from support.command_line import fail, succeed, write_offset
 from support.undrawn import undrawn_figures
 

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from islands.effects.catalogue import CATALOGUE
-from islands_measurements.blind_trials.cases import CASES
-from islands_measurements.blind_trials.injection.noise import NOISES
-from islands_measurements.blind_trials.trial import Trial, run_trial
+from islands_measurements.detection.cases import CASES
+from islands_measurements.detection.injection.noise import NOISES
+from islands_measurements.detection.trial import Trial, run_trial
 from support.command_line import fail, succeed
 from support.undrawn import undrawn_figures
 

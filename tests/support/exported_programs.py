@@ -11,7 +11,7 @@ from fmpy.validation import validate_fmu
 
 from islands.export import export, write_export
 from islands.export.fmu.compiler import find_compiler
-from islands_measurements.benchmark.compiled_c import compile_model
+from islands_measurements.speed.compiled_c import compile_model
 from support.equation_programs import OCTAVE_FILES
 
 OCTAVE = shutil.which("octave-cli")

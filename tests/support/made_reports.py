@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-from islands_measurements.benchmark.comparison import Comparison
-from islands_measurements.benchmark.full_runs import Run
-from islands_measurements.benchmark.machine import Machine
-from islands_measurements.benchmark.report import BenchmarkReport
-from islands_measurements.benchmark.scaling import Scaling, against_islands
+from islands_measurements.speed.comparison import Comparison
+from islands_measurements.speed.full_runs import Run
+from islands_measurements.speed.machine import Machine
+from islands_measurements.speed.report import BenchmarkReport
+from islands_measurements.speed.scaling import Scaling, against_islands
 
 KINDS = ("poly", "general", "gp")
 POINTS = ((1.0, 2.0), (2.0, 3.0), (4.0, 5.0))

@@ -30,8 +30,8 @@ from islands.diagnosis.surrogates import (
 )
 from islands.effects.interface.effect import Effect, Signal, SimulationContext
 from islands.simulators.recorded_output import RecordedOutput
-from islands_measurements.blind_trials.injection.measurement import inject
-from islands_measurements.blind_trials.trial import TOLERANCE
+from islands_measurements.detection.injection.measurement import inject
+from islands_measurements.detection.trial import TOLERANCE
 from support.built_in_simulators import make_piezo
 
 SIMULATOR = make_piezo()

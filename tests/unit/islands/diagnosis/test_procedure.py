@@ -20,8 +20,8 @@ from islands.errors import RecordError, SettingsError
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
-from islands_measurements.blind_trials.injection.measurement import inject
-from islands_measurements.blind_trials.trial import TOLERANCE
+from islands_measurements.detection.injection.measurement import inject
+from islands_measurements.detection.trial import TOLERANCE
 from support.built_in_simulators import make_piezo
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from islands.figures.confusion import draw_confusion
 from islands.figures.style import FRAME, RESIDUAL, SIMULATED, save
-from islands_measurements.blind_trials.injection.piezo import PIEZO
+from islands_measurements.detection.injection.piezo import PIEZO
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,7 @@ from islands.diagnosis.calibration.noise_model import (
     fit_noise,
     take_fractional_difference,
 )
-from islands_measurements.blind_trials.injection.noise import NOISES
+from islands_measurements.detection.injection.noise import NOISES
 
 
 @pytest.mark.parametrize("poles", [(), (0.9,), (0.6, 0.3), (0.95, -0.4)])

@@ -16,7 +16,7 @@ from islands.figures.form_values import draw_free_forms
 from islands.kernels.curve import PLACES
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput
-from islands_measurements.blind_trials.trial import Trial, run_trial
+from islands_measurements.detection.trial import Trial, run_trial
 from support.simulated_records import recorded, wave
 
 U = wave(2000) / 20.0

@@ -1,0 +1,195 @@
+"""Scores of trials: counts, bounds and targets."""
+
+import pytest
+
+from islands_measurements.detection.scoring import (
+    Proportion,
+    Statistic,
+    calibration_error,
+    confusion,
+    reliability,
+    score,
+)
+from islands_measurements.detection.targets import EXACT, IDENTIFIED
+from islands_measurements.detection.trial import Trial, TrialOutcome
+
+
+def outcome(
+    injected: tuple[str, ...], named: tuple[str, ...], misfit: float = 1.5, **options: object
+) -> TrialOutcome:
+    verdict = options.pop("verdict", "named" if named else "nothing")
+    sets = options.pop("equivalents", ((),) * len(named))
+    confidence, gain = options.pop("confidence", 0.9), options.pop("gain_share", None)
+    form = options.pop("form", False)
+    assert not options
+    return TrialOutcome(
+        Trial(injected, 1), misfit, str(verdict), named, (), sets, named[:1], confidence, gain, form
+    )  # type: ignore[arg-type]
+
+
+def counted(*outcomes: TrialOutcome) -> dict[str, tuple[int, int]]:
+    rows = score(outcomes, ["ripple"])
+    return {row.name: (row.count, row.of) for row in rows if isinstance(row, Proportion)}
+
+
+def measured(*outcomes: TrialOutcome) -> dict[str, Statistic]:
+    return {row.name: row for row in score(outcomes, ["ripple"]) if isinstance(row, Statistic)}
+
+
+def test_every_outcome_is_counted_in_its_scores() -> None:
+    found = counted(
+        outcome(("delay",), ("delay",)),
+        outcome(("delay",), ("jump",), equivalents=(("delay",),)),
+        outcome(("jump",), ()),
+        outcome(("jump",), (), misfit=0.5),
+        outcome(("jump",), ("jump",), misfit=0.5),
+        outcome(("jump",), (), misfit=0.1),
+        outcome(("jump",), ("offset",), misfit=0.1),
+        outcome(("jump",), (), misfit=0.01),
+        outcome((), ()),
+        outcome((), ("offset",)),
+        outcome(("delay", "jump"), ("jump", "delay")),
+        outcome(("delay", "jump"), ("jump",)),
+        outcome(("ripple",), ("jump",)),
+        outcome(("ripple",), (), verdict="unknown"),
+        outcome(("ripple", "jump"), ("jump",)),
+    )
+    assert found == {
+        "detected, misfit 0.05 to 0.2 sigma": (1, 2),
+        "detected, misfit 0.2 to 1 sigma": (1, 2),
+        "detected, misfit > 1 sigma": (2, 3),
+        "named first, where detected": (2, 3),
+        "among the first three, where detected": (2, 3),
+        "family, where detected": (2, 3),
+        "truth within the reported set": (3, 3),
+        "false names on clean records": (1, 2),
+        "pairs exact": (1, 2),
+        "triples exact": (0, 0),
+        "unknown causes silently misnamed": (1, 2),
+        "unknown causes misnamed with a confidence above 0.9": (0, 2),
+        "known cause named, next to an unknown one": (1, 1),
+        "known cause and an equation or a family, next to an unknown one": (0, 1),
+        "wrong name next to an unknown cause": (0, 1),
+    }
+
+
+def test_a_model_form_error_is_neither_a_name_nor_a_detection() -> None:
+    found = counted(
+        outcome((), (), verdict="named", form=True),
+        outcome(("jump",), (), verdict="named", form=True),
+        outcome(("jump",), ("jump",), form=True),
+        outcome(("delay", "jump"), ("jump", "delay"), form=True),
+        outcome(("ripple",), (), verdict="named", form=True),
+    )
+    assert found["false names on clean records"] == (0, 1)
+    assert found["detected, misfit > 1 sigma"] == (1, 2)
+    assert found["named first, where detected"] == (1, 1)
+    assert found["pairs exact"] == (1, 1)
+    assert found["unknown causes silently misnamed"] == (0, 1)
+
+
+def test_the_set_size_is_averaged_over_named_outcomes() -> None:
+    found = measured(
+        outcome(("delay",), ("delay",)),
+        outcome(("delay",), ("jump",), equivalents=(("delay", "viscous"),)),
+        outcome(("jump",), (), verdict="unknown"),
+    )["names in the reported set, mean"]
+    assert (found.value, found.of) == (2.0, 2)
+
+
+def test_oracle_ratios_are_taken_over_detected_faults() -> None:
+    found = measured(
+        *(outcome(("delay",), ("delay",), gain_share=share / 10) for share in range(11)),
+        outcome(("delay",), ("delay",)),
+        outcome(("delay",), (), gain_share=0.0),
+        outcome(("delay",), ("delay",), misfit=0.1, gain_share=0.0),
+    )
+    median, tenth = (
+        found["share of the oracle's gain, median"],
+        found["share of the oracle's gain, 10th percentile"],
+    )
+    assert (median.value, median.of, tenth.value) == (0.5, 11, pytest.approx(0.1))
+    assert median.kept is False
+
+
+def test_confidences_are_compared_with_frequencies() -> None:
+    """Three of four names with confidence 0.95 and one of two with 0.55 are right; false names are wrong."""
+    outcomes = [
+        *[outcome(("delay",), ("delay",), confidence=0.95)] * 3,
+        outcome((), ("offset",), confidence=0.95),
+        outcome(("delay",), ("delay",), confidence=0.55),
+        outcome(("delay",), ("jump",), confidence=0.55),
+        outcome(("delay",), (), verdict="unknown"),
+        outcome(("ripple",), ("missing-term",), verdict="discovered", confidence=1.0),
+        outcome(("ripple",), ("jump",), confidence=0.95),
+    ]
+    bins = reliability(outcomes[:-1])
+    assert [(each.low, each.count, each.right) for each in bins] == [(0.5, 2, 0.5), (0.9, 4, 0.75)]
+    assert [each.said for each in bins] == pytest.approx([0.55, 0.95])
+    assert calibration_error(bins) == pytest.approx((2 * 0.05 + 4 * 0.2) / 6)
+    row = measured(*outcomes)["calibration error of the confidence"]
+    assert (row.value, row.of) == (pytest.approx((2 * 0.05 + 5 * 0.35) / 7), 7)
+    misnamed = counted(*outcomes)["unknown causes misnamed with a confidence above 0.9"]
+    assert misnamed == (1, 2)
+    assert row.kept is False
+
+
+def test_mixed_records_count_the_known_cause_and_the_equation() -> None:
+    found = counted(
+        outcome(("jump", "ripple"), ("missing-term", "jump"), verdict="discovered"),
+        outcome(("jump", "ripple"), ("jump", "stiffness-curve"), verdict="family"),
+        outcome(("jump", "ripple"), ("jump", "delay"), verdict="named"),
+        outcome(("jump", "ripple"), (), verdict="unknown"),
+        outcome(("ripple",), ("jump",), verdict="named"),
+    )
+    assert found["known cause named, next to an unknown one"] == (3, 4)
+    assert found["known cause and an equation or a family, next to an unknown one"] == (2, 4)
+    assert found["wrong name next to an unknown cause"] == (1, 4)
+    assert found["unknown causes silently misnamed"] == (1, 1)
+
+
+def test_full_confidence_is_in_the_last_bin() -> None:
+    (only,) = reliability([outcome(("delay",), ("delay",), confidence=1.0)])
+    assert (only.low, only.high, only.right) == (0.9, 1.0, 1.0)
+
+
+def test_targets_depend_on_the_kind_of_simulation() -> None:
+    outcomes = [outcome(("delay",), (name,)) for name in ["delay"] * 9 + ["jump"]]
+    kept = [
+        {row.name: row.kept for row in score(outcomes, [], goals)}["named first, where detected"]
+        for goals in (EXACT, IDENTIFIED)
+    ]
+    assert kept == [False, True]
+
+
+def test_targets_are_undecided_without_trials() -> None:
+    assert {row.kept for row in score([], [])} == {None}
+
+
+def test_bounds_are_the_clopper_pearson_interval() -> None:
+    """0 of 300 gives an upper bound of 1.2 %; 97 of 100 gives 91.5 to 99.4 %."""
+    assert Proportion("", 0, 300).bounds == pytest.approx((0.0, 1.2221), abs=1e-3)
+    assert Proportion("", 97, 100).bounds == pytest.approx((91.482, 99.377), abs=1e-2)
+    assert Proportion("", 5, 5).bounds[1] == 100.0
+
+
+@pytest.mark.parametrize(
+    ("count", "goal", "most", "kept"),
+    [(97, 97.0, False, True), (96, 97.0, False, False), (1, 1.0, True, True), (2, 1.0, True, False)],
+)
+def test_a_target_is_met_or_missed(count: int, goal: float, most: bool, kept: bool) -> None:
+    assert Proportion("", count, 100, goal, most).kept is kept
+    assert Statistic("", count, 100, goal, most).kept is kept
+
+
+def test_the_confusion_counts_pairs_of_fault_and_name() -> None:
+    found = confusion(
+        [
+            outcome(("delay",), ("jump",)),
+            outcome(("delay",), ("jump",)),
+            outcome((), ()),
+            outcome(("ripple",), (), verdict="unknown"),
+            outcome(("delay", "jump"), ("jump",)),
+        ]
+    )
+    assert found == {("delay", "jump"): 2, ("", ""): 1, ("ripple", "unknown"): 1}
