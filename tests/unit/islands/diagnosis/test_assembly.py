@@ -6,6 +6,7 @@ from scipy.signal import lfilter
 
 import islands
 from islands.diagnosis.inference.verdict import Verdict
+from islands.effects.catalogue import CATALOGUE
 from support.simulated_records import recorded
 
 
@@ -20,11 +21,11 @@ def test_names_are_withdrawn_that_slow_noise_hides_in_the_rmse() -> None:
     noise *= np.std(theirs) / np.std(noise)
     law = 0.3 * np.abs(theirs) * theirs
     record = recorded(u, theirs + noise + np.where(np.arange(2000) < 1500, law, 0.0))
-    found = islands.diagnose(record, "column:theirs", columns={"theirs": theirs})
+    few = [CATALOGUE[name] for name in ("sensor-gain", "cubic-stiffness", "viscous", "quadratic-drag")]
+    options = {"columns": {"theirs": theirs}, "effects": few}
+    found = islands.diagnose(record, "column:theirs", **options)
     assert found.verdict == Verdict.UNKNOWN
-    everywhere = islands.diagnose(
-        recorded(u, theirs + noise + law), "column:theirs", columns={"theirs": theirs}
-    )
+    everywhere = islands.diagnose(recorded(u, theirs + noise + law), "column:theirs", **options)
     assert everywhere.verdict not in (Verdict.UNKNOWN, Verdict.NOTHING)
 
 

@@ -83,7 +83,7 @@ def test_clean_recordings_have_no_discrepancy() -> None:
 def test_many_short_recordings_are_diagnosed() -> None:
     rng = np.random.default_rng(6)
     recordings = []
-    for _ in range(40):
+    for _ in range(15):
         u = np.cumsum(rng.standard_normal(30))
         recordings.append(Dataset(u=u, y=u + 0.3 + 0.05 * rng.standard_normal(30), dt=DT))
     record = islands.join(tuple(recordings))

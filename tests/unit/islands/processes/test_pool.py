@@ -5,16 +5,28 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from multiprocessing import active_children
 from pathlib import Path
 
 import pytest
 
 from islands import available_cpus
+from islands.processes import pool
 from islands.processes.pool import ProcessPoolError, process_pool
 from islands.progress import StoppedError
 
 pytestmark = pytest.mark.ci
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _light_processes() -> Iterator[None]:
+    """Let the fork server import nothing in advance: the functions need no module of the library."""
+    pool._end_server()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pool, "_PRELOADED", [])
+        yield
+    pool._end_server()
 
 
 def test_pool_evaluates_local_functions_in_other_processes_in_order() -> None:
@@ -26,6 +38,9 @@ def test_pool_evaluates_local_functions_in_other_processes_in_order() -> None:
     with process_pool(2, start_after=0.0) as parallel_map:
         products, processes = zip(*parallel_map(multiply, range(20)), strict=True)
         again = [product for product, _ in parallel_map(multiply, [5])]
+        # Results may contain functions without a name.
+        doubled = list(parallel_map(lambda factor: lambda value: factor * value, [1, 2, 3]))
+    assert [function(2) for function in doubled] == [2, 4, 6]
     assert (list(products), again) == ([factor * number for number in range(20)], [15])
     assert os.getpid() not in processes
     assert len(set(processes)) <= 2
@@ -75,12 +90,6 @@ def test_killed_process_is_an_error_that_says_what_to_do() -> None:
         process_pool(2, start_after=0.0) as parallel_map,
     ):
         list(parallel_map(end, range(2)))
-
-
-def test_results_may_contain_functions_without_a_name() -> None:
-    with process_pool(2, start_after=0.0) as parallel:
-        doubled = list(parallel(lambda factor: lambda value: factor * value, [1, 2, 3]))
-    assert [function(2) for function in doubled] == [2, 4, 6]
 
 
 def test_fork_server_starts_with_sigint_blocked_and_ends_at_an_error() -> None:

@@ -35,7 +35,8 @@ def record(tmp_path_factory):
 @pytest.mark.ci
 def test_a_fitted_model_is_simulated_and_shown(record, tmp_path, monkeypatch) -> None:
     folder = tmp_path / "result"
-    printed = succeed("fit", record, *COLUMNS, *SMALL, "--out", folder)
+    with undrawn_figures():
+        printed = succeed("fit", record, *COLUMNS, *SMALL, "--out", folder)
     assert "* y2(k-1)" in printed
     assert json.loads((folder / "result.json").read_text())["schema"] == "islands.coupled-result/1"
     out = tmp_path / "simulated.csv"

@@ -16,6 +16,7 @@ from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.documents.extension_json import extended_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
+from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError
 from islands.export import write_export
 from islands.export.fmu.compiler import find_compiler
@@ -187,9 +188,11 @@ def test_a_hidden_effect_is_named_and_a_clean_record_has_none(tmp_path: Path) ->
     path.write_text(f'file = "{oscillator()}"\n[parameters]\n{tolerances}\n')
     simulator = make_simulator(f"fmu:{path}", clean)
     assert simulator.tolerances == {"m": 0.05, "c": 0.05, "k": 0.05}
-    assert islands.diagnose(clean, simulator).verdict == Verdict.NOTHING
+    names = ("output-saturation", "offset", "delay", "even-nonlinearity", "coulomb-friction", "viscous")
+    effects = [CATALOGUE[name] for name in names]
+    assert islands.diagnose(clean, simulator, effects=effects).verdict == Verdict.NOTHING
     limited = replace(clean, y=np.clip(oscillation(250).y, -0.15, 0.15) + clean.y - oscillation(250).y)
-    found = islands.diagnose(limited, f"fmu:{path}")
+    found = islands.diagnose(limited, f"fmu:{path}", effects=effects)
     assert found.verdict == Verdict.NAMED
     assert [each.name for each in found.effects] == ["output-saturation"]
     document = extended_document(found.best, limited)

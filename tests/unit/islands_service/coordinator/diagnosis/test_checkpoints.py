@@ -14,10 +14,12 @@ import pytest
 from sqlalchemy import update
 
 from islands.diagnosis.inference import noise_floor
+from islands.effects.catalogue import CATALOGUE
 from islands.evolution import engine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.search_state import SearchState
 from islands.facade import explain_residual
+from islands_service.coordinator.diagnosis import job as diagnosis_job
 from islands_service.coordinator.diagnosis import progress as diagnosis_progress
 from islands_service.coordinator.diagnosis.checkpoints import (
     DIFFERENT,
@@ -75,6 +77,11 @@ class Work:
 
 RUN_EPOCH = engine.run_epoch
 
+#: Effects that are searched for, some of each kind of fit; a checkpoint is written after each fit.
+EFFECTS = tuple(
+    CATALOGUE[name] for name in ("absolute-value-sensor", "even-nonlinearity", "offset", "viscous", "delay")
+)
+
 
 @contextmanager
 def cheap_analysis() -> Iterator[None]:
@@ -83,6 +90,7 @@ def cheap_analysis() -> Iterator[None]:
         patch.setattr(noise_floor, "RANDOM_FEATURES", 20)
         patch.setattr(noise_floor, "SURROGATES", 1)
         patch.setattr(explain_residual, "SEARCH", MappingProxyType({**explain_residual.SEARCH, **SEARCH}))
+        patch.setattr(diagnosis_job, "diagnose", partial(diagnosis_job.diagnose, catalogue=EFFECTS))
         patch.setattr(diagnosis_progress, "REPORT_EVERY", -1.0)
         patch.setattr(diagnosis_progress, "CHECKPOINT_SHARE", 1e9)
         yield
