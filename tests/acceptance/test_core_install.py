@@ -106,7 +106,9 @@ def test_a_simulation_is_diagnosed(folder):
     [
         (("serve",), "islands serve needs the extra 'service'"),
         (("keys", "list"), "islands keys needs the extra 'service'"),
-        (("trials", "--count", 1), "islands trials needs the extra 'ray'"),
+        pytest.param(
+            *(("trials", "--count", 1), "islands trials needs the extra 'ray'"), marks=pytest.mark.nightly
+        ),
         (
             ("identify", "record.csv", *COLUMNS, *SEARCH, "--engine", "ray", "--out", "never"),
             "islands identify needs the extra 'ray'",

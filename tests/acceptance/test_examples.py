@@ -43,9 +43,9 @@ def run(path: Path, *arguments: object, **environment: str) -> str:
     return done.stdout
 
 
-#: Examples of the nightly level: those that take five seconds of CPU and more, except the first one, the one
-#: with a service, and the one that the test of a temporary folder runs.
-SLOW = ("02_", "03_", "04_", "05_", "06_", "07_", "08_", "09_", "10_")
+#: Examples of the nightly level: those that take five seconds of CPU and more, and the one that the test of a
+#: temporary folder runs.
+SLOW = ("01_", "02_", "03_", "04_", "05_", "06_", "07_", "08_", "09_", "10_")
 
 
 @pytest.mark.ci
