@@ -11,8 +11,9 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from islands.cli.console import compile_kernels, output, progress
+from islands.cli.console import output
 from islands.cli.output_folder import check_folder
+from islands.cli.progress_display import compile_kernels, progress
 from islands.errors import IslandsError
 from islands.processes.blocked_signals import block_sigint
 from islands.processes.settings import THREADS

@@ -13,8 +13,9 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from islands.cli.console import compile_kernels, output, progress
+from islands.cli.console import output
 from islands.cli.engines import ray_pool
+from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.stop_requests import stop_requests
 from islands.errors import SettingsError, lookup
 from islands.figures.confusion import draw_confusion

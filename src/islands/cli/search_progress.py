@@ -5,7 +5,7 @@ from itertools import takewhile
 from math import inf
 from time import monotonic
 
-from islands.cli.console import Display
+from islands.cli.progress_display import Display
 from islands.evolution.history import HistoryPoint
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings

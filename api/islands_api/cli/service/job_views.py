@@ -11,7 +11,8 @@ from typing import Any
 import typer
 from rich.table import Table
 
-from islands.cli.console import output, progress
+from islands.cli.console import output
+from islands.cli.progress_display import progress
 from islands.io.models import narx_from_json
 from islands.io.result_text.model_table import LEGEND, MARK
 from islands.io.result_text.text_layout import term_table, wrap

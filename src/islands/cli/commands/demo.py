@@ -10,9 +10,10 @@ import typer
 from rich.table import Table
 
 import islands
-from islands.cli.console import compile_kernels, output, print_message, progress
+from islands.cli.console import output, print_message
 from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
 from islands.cli.output_folder import RESULT_FILES, check_folder
+from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.search_progress import search_progress
 from islands.cli.stop_requests import stop_requests
 from islands.data.dataset import Dataset

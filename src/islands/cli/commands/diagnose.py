@@ -11,8 +11,9 @@ from typing import Annotated, Any
 import typer
 
 from islands.cli import options
-from islands.cli.console import compile_kernels, output, progress
+from islands.cli.console import output
 from islands.cli.output_folder import check_folder
+from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.record_options import with_reading_options
 from islands.cli.recordings import Recordings
 from islands.cli.runs.diagnosis_fits import explain_continuation, keep_fits, say_to_continue, write_fits

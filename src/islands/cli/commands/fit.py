@@ -9,9 +9,9 @@ import typer
 
 import islands
 from islands.cli import options
-from islands.cli.console import compile_kernels, progress
 from islands.cli.output_folder import check_folder, show_result
 from islands.cli.preprocessing_options import with_preprocessing_options
+from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.record_options import with_reading_options
 from islands.cli.recordings import Recordings, measured_names
 from islands.cli.runs.coupled import couple_data, coupled_options, join_columns, keep_coupled

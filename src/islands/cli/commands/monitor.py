@@ -10,8 +10,9 @@ from typing import Annotated, Any
 import typer
 
 from islands.cli import options
-from islands.cli.console import compile_kernels, errors, output
+from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
+from islands.cli.progress_display import compile_kernels
 from islands.cli.record_options import with_reading_options
 from islands.cli.recordings import Recordings
 from islands.cli.watched_folder import WatchedFolder, find_time, hash_file

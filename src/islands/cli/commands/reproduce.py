@@ -13,9 +13,10 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from islands.cli.console import compile_kernels, errors, output, progress
+from islands.cli.console import errors, output
 from islands.cli.engines import has_ray, ray_pool
 from islands.cli.output_folder import check_folder
+from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.stop_requests import INTERRUPTED, TERMINATED, stop_requests
 from islands.errors import SettingsError, lookup
 from islands.parallel import ParallelMap

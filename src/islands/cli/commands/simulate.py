@@ -10,7 +10,8 @@ import typer
 from numpy.typing import NDArray
 
 from islands.cli import options
-from islands.cli.console import compile_kernels, output
+from islands.cli.console import output
+from islands.cli.progress_display import compile_kernels
 from islands.cli.record_options import with_reading_options
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import islands
-from islands.cli.console import Display, compile_kernels, output, print_message, progress
+from islands.cli.console import output, print_message
 from islands.cli.engines import start_engine
+from islands.cli.progress_display import Display, compile_kernels, progress
 from islands.cli.recordings import advance_as_named
 from islands.cli.runs.identify import TEST, RunOptions, compute_errors
 from islands.cli.search_progress import search_progress

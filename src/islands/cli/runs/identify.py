@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import islands
-from islands.cli.console import Display, compile_kernels, errors, output, print_message, progress
+from islands.cli.console import errors, output, print_message
 from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
 from islands.cli.output_folder import show_result
+from islands.cli.progress_display import Display, compile_kernels, progress
 from islands.cli.recordings import Recordings
 from islands.cli.runs.timed_engine import TimedEngine
 from islands.cli.search_progress import search_progress

@@ -3,7 +3,7 @@
 import pytest
 from rich.progress import Progress
 
-from islands.cli.console import FractionColumn
+from islands.cli.progress_display import FractionColumn
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from math import inf
 import pytest
 from rich.console import Console
 
-from islands.cli import console
+from islands.cli import progress_display
 from islands.cli import search_progress as showing
 from islands.cli.search_progress import SHOWN_ISLANDS, search_progress
 from islands.evolution.archipelago import Archipelago, empty_archipelago
@@ -114,8 +114,8 @@ def test_first_of_equally_good_islands_are_listed(displayed):
 
 def test_lines_below_the_bar_are_verbatim_and_erased_at_the_end(monkeypatch):
     stream = StringIO()
-    monkeypatch.setattr(console, "errors", Console(file=stream, force_terminal=True, width=100))
-    with console.progress("identify") as show:
+    monkeypatch.setattr(progress_display, "errors", Console(file=stream, force_terminal=True, width=100))
+    with progress_display.progress("identify") as show:
         show("generation 3", 0.5, ["island 0 [red]", "island 1"])
     shown = stream.getvalue()
     for text in ("identify", "generation 3", "island 0 [red]", "island 1"):

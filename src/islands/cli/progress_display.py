@@ -1,0 +1,110 @@
+"""Progress of a command on the terminal: a bar, the time left, and lines below it."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from threading import Thread
+from typing import Protocol
+
+from rich.console import Group
+from rich.live import Live
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+)
+from rich.text import Text
+
+from islands.cli.console import errors
+from islands.cli.stop_requests import end_at_once
+
+#: Fraction from which the time left is estimated.
+MIN_FRACTION = 0.05
+
+
+#: Seconds between two checks whether another thread has ended.
+_JOIN_SECONDS = 0.1
+
+
+class Display(Protocol):
+    """Progress callback that can show lines below its bar."""
+
+    def __call__(self, message: str, fraction: float | None = None, /, lines: Sequence[str] = ()) -> None:
+        """Show a message next to the bar, the completed fraction, and lines below the bar."""
+        ...
+
+
+class FractionColumn(ProgressColumn):
+    """The completed fraction, and the time left if the rest takes as long in proportion."""
+
+    def render(self, task: Task) -> Text:
+        """Return the text; it is empty as long as the fraction is small."""
+        if task.completed < MIN_FRACTION or task.elapsed is None:
+            return Text()
+        left = task.elapsed * (1.0 - task.completed) / task.completed
+        duration = f"{left:.0f} s" if left < 100 else f"{left / 60:.0f} min"
+        return Text(f"{task.completed:.0%}, {duration} left")
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Display]:
+    """Show a progress bar during the context."""
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.fields[title]}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        FractionColumn(),
+        TextColumn("{task.description}"),
+    )
+    bar = Progress(*columns, console=errors)
+    task = bar.add_task("", total=1.0, title=title)
+    with Live(bar, console=errors, transient=True, refresh_per_second=10) as live:
+
+        def show(message: str, fraction: float | None = None, /, lines: Sequence[str] = ()) -> None:
+            bar.update(task, description=message, completed=fraction)
+            live.update(Group(bar, *(Text(line) for line in lines)))
+
+        yield show
+
+
+def compile_kernels() -> None:
+    """Compile the kernels if they are not in the cache, with a progress bar, and prepare for a long run."""
+    # Imported here because it loads most of the core: other commands must start fast.
+    from islands.facade.warm_up import warm_up  # noqa: PLC0415
+    from islands.processes.settings import freeze_garbage_collector  # noqa: PLC0415
+
+    with ExitStack() as stack:
+
+        def announce(line: str) -> None:
+            errors.print(line, markup=False)
+            stack.enter_context(progress("kernels"))("", 0.0)
+
+        freeze_garbage_collector()  # before the compilation, which makes many objects
+        try:
+            _call_in_thread(partial(warm_up, announce))
+        except KeyboardInterrupt as interrupt:
+            stack.close()
+            end_at_once(interrupt)
+
+
+def _call_in_thread(function: Callable[[], object]) -> None:
+    """Call a function in another thread, so that this one handles signals while a library does not return."""
+    raised: list[BaseException] = []
+
+    def call() -> None:
+        try:
+            function()
+        except BaseException as error:
+            raised.append(error)
+
+    thread = Thread(target=call, daemon=True)
+    thread.start()
+    while thread.is_alive():
+        thread.join(_JOIN_SECONDS)  # a signal that another thread receives does not end a longer wait
+    if raised:
+        raise raised[0]
