@@ -140,7 +140,10 @@ def fit(
     if model != NARX:
         given = library, degree, lags, delays, constraints, settings
         if given != (AUTO, None, None, None, None, FitSettings()):
-            raise SettingsError(f"library, constraints, max_terms and the like are not for the model {model}")
+            raise SettingsError(
+                f"library, max_terms and so on are settings of NARX models, not for the model {model}: "
+                "leave them out"
+            )
         found = fit_class(record, split, model, seed, Steps(progress, stop))
         return Result.from_search(replace(found, settings={**found.settings, "validation": held_out}))
     try:
