@@ -32,7 +32,8 @@ MAX_DAMPING_TRIALS = 6
 MIN_DECREASE = 0.02
 
 #: Number of samples from which simulations that may not be needed are computed in the same call as others.
-#: In shorter ones, the preparation of a simulation costs as much as what a common call saves.
+#: In shorter ones, the preparation of a simulation costs as much as what a common call saves, unless it fits
+#: states: that takes thirteen simulations, once for a point and its derivatives.
 MIN_BATCHED_SAMPLES = 800
 
 #: First and least damping, factor between the damping values of a step, and decrease after a step.
@@ -113,7 +114,8 @@ def minimise(
         a tenth of it.
     """
     problem = _make_problem(simulation, target, is_fixed)
-    is_batch = simulation.is_batch and target.y.size >= MIN_BATCHED_SAMPLES
+    is_costly = simulation.fits_states or target.y.size >= MIN_BATCHED_SAMPLES
+    is_batch = simulation.is_batch and is_costly
     # Residuals at the level of rounding cannot be fitted: the record may be an output of the simulation.
     error = np.finfo(float).eps * float(np.nanmax(np.abs(target.y)))
     rounding = np.count_nonzero(target.estimation_part) * error**2

@@ -172,12 +172,16 @@ class ShotSimulation:
         y = self._simulate(lanes, states)
         error = _sum_squares(measured - y)
         for _ in range(_ITERATIONS):
+            if not is_active.any():
+                break
             responses = self._respond(lanes, states, moves, y, is_active)
             inverse = _invert(responses)
             steps, promised = _find_steps(responses, inverse, measured - y)
             first, before, is_tried = states, error, is_active
             # Where a mass sticks the response is nonlinear, and a full step may increase the error.
             for length in _STEP_LENGTHS:
+                if not is_tried.any():
+                    break
                 trial = first + length * (steps @ moves)
                 output = self._simulate(lanes, trial, is_tried)
                 found = _sum_squares(measured - output)

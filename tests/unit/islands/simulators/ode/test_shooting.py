@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from islands.data.dataset import Dataset
 from islands.effects.catalogue import CATALOGUE
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.ode.interval_simulation import IntervalSimulation
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec
@@ -80,6 +82,23 @@ def test_shooting_fits_the_states_of_every_interval() -> None:
     assert np.std(found - position) < 0.25e-3
     jumps = np.abs(np.diff(found) - np.diff(position))
     assert set(np.flatnonzero(jumps > 1e-4) % 50) <= {49}
+
+
+def test_only_intervals_whose_states_change_are_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
+    simulate, asked = IntervalSimulation.simulate, []
+
+    def watch(simulation: IntervalSimulation, lanes: Any, states: Any, is_asked: Any) -> Any:
+        asked.append(int(np.count_nonzero(is_asked)))
+        return simulate(simulation, lanes, states, is_asked)
+
+    monkeypatch.setattr(IntervalSimulation, "simulate", watch)
+    record, _ = make_sticking_axis(0, samples=300)
+    truth = {"m": 2.0, "c": 6.0, "F": 4.0, "vs": 0.01}
+    simulator = make_simulator(PhysicalSpec(kind="rigid-axis", parameters=truth), record)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
+    simulation.simulate(simulation.nominal)
+    assert min(asked) > 0
+    assert min(asked) < max(asked)
 
 
 def make_sticking_axis(seed: int, samples: int = 1500) -> tuple[Dataset, float]:
