@@ -33,6 +33,8 @@ from islands.simulators.specification.table import (
 )
 from support.simulated_records import SpecAndRecord, made, names
 
+pytestmark = pytest.mark.usefixtures("toy_class")
+
 NAMES = names()
 
 #: Simulators whose effects are tested one by one at the fast level.
