@@ -96,6 +96,17 @@ def _measure(quick: bool, sending: Connection) -> None:
 
 
 def _print_report(report: BenchmarkReport) -> None:
+    _print_times(report)
+    _print_searches(report)
+    _print_goals(report)
+    output.print(
+        f"workload {report.workload[:12]}, {report.machine.processor}, {report.machine.cores} cores, "
+        f"C: {report.machine.compiler or 'no compiler called cc'}",
+        markup=False,
+    )
+
+
+def _print_times(report: BenchmarkReport) -> None:
     table = Table("ms of CPU per individual", *report.kinds, title=f"{report.samples} samples, medians")
     kinds = report.kinds
     rows: dict[str, Sequence[float | None]] = {
@@ -112,6 +123,9 @@ def _print_report(report: BenchmarkReport) -> None:
     for name, values in rows.items():
         table.add_row(name, *("-" if value is None else f"{value:.3f}" for value in values))
     output.print(table)
+
+
+def _print_searches(report: BenchmarkReport) -> None:
     runs = report.runs.values()
     table = Table("search of one island", *report.runs)
     table.add_row("individuals per second and core", *(f"{run.per_cpu_second:.0f}" for run in runs))
@@ -120,13 +134,11 @@ def _print_report(report: BenchmarkReport) -> None:
     for name in next(iter(runs)).caches:
         table.add_row(name.replace("_", " "), *(str(run.caches[name]) for run in runs))
     output.print(table)
+
+
+def _print_goals(report: BenchmarkReport) -> None:
     table = Table("goal", "wanted", "measured", "met")
     for goal in check_goals(report):
         met = {True: "[green]yes[/]", False: "[red]no[/]", None: "-"}[goal.met]
         table.add_row(goal.text, goal.wanted, goal.measured, met)
     output.print(table)
-    output.print(
-        f"workload {report.workload[:12]}, {report.machine.processor}, {report.machine.cores} cores, "
-        f"C: {report.machine.compiler or 'no compiler called cc'}",
-        markup=False,
-    )

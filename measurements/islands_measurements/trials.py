@@ -1,13 +1,13 @@
 """``islands trials``: blind fault-injection trials of the discrepancy analysis."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import typer
@@ -38,6 +38,17 @@ BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
 
 #: Band of effects that are injected together.
 COMBINED_BAND = BANDS[1]
+
+
+class _Counts(NamedTuple):
+    """Numbers of trials of a simulation: of each effect, without an effect, and of the other kinds."""
+
+    each: int
+    clean: int
+    open_set: int
+    pairs: int
+    triples: int
+    mixed: int
 
 
 def trials(
@@ -91,30 +102,14 @@ def trials(
     """Inject effects into simulated records, diagnose them, and count how often they are found and named."""
     cases = {name: lookup(CASES, name, "core") for name in cores or [next(iter(CASES))]}
     lookup(NOISES, noise, "noise")
-    planned: list[Trial] = []
-    for core, simulated in cases.items():
-        names, rng = _select_effects(effects, simulated), np.random.default_rng(seed)
-
-        def trial(
-            injected: Sequence[str], turn: int, band: tuple[float, float] | None = None, core: str = core
-        ) -> Trial:
-            other_form = variant and band is not None
-            return Trial(tuple(injected), seed + turn, noise, band, other_form, seconds, core, oracle=True)
-
-        planned += [trial((name,), turn, BANDS[turn % len(BANDS)]) for name in names for turn in range(count)]
-        planned += [trial((), turn) for turn in range(clean)]
-        planned += [trial((name,), turn) for name in simulated.system.unknown for turn in range(open_set)]
-        for size, many in ((2, pairs), (3, triples)):
-            if many and len(names) < size:
-                raise SettingsError(f"{size} effects at once need {size} names: give more with --effects")
-            planned += [
-                trial([str(each) for each in rng.choice(names, size, replace=False)], turn, COMBINED_BAND)
-                for turn in range(many)
-            ]
-        planned += [
-            trial([str(rng.choice(each)) for each in (names, simulated.nameless)], turn, COMBINED_BAND)
-            for turn in range(mixed)
-        ]
+    counts = _Counts(count, clean, open_set, pairs, triples, mixed)
+    planned = [
+        Trial(injected, seed + turn, noise, band, variant and band is not None, seconds, core, oracle=True)
+        for core, simulated in cases.items()
+        for injected, turn, band in _plan_injections(
+            simulated, _select_effects(effects, simulated), counts, np.random.default_rng(seed)
+        )
+    ]
     compile_kernels()
     found: list[TrialOutcome] = []
     with progress("trials") as show, stop_requests() as stop:
@@ -138,6 +133,27 @@ def trials(
         out.write_text(json.dumps(document, indent=1))
     left_out = [f"{len(planned) - len(found)} of {len(planned)} trials"] * (len(found) < len(planned))
     stop.end(out, left_out, "repeat the command for all trials")
+
+
+def _plan_injections(
+    simulated: SimulatedCase, names: Sequence[str], counts: _Counts, rng: np.random.Generator
+) -> Iterator[tuple[tuple[str, ...], int, tuple[float, float] | None]]:
+    """Yield the causes that each trial injects, its number, and the band of the misfit of its effects."""
+    for name in names:
+        for turn in range(counts.each):
+            yield (name,), turn, BANDS[turn % len(BANDS)]
+    for turn in range(counts.clean):
+        yield (), turn, None
+    for name in simulated.system.unknown:
+        for turn in range(counts.open_set):
+            yield (name,), turn, None
+    for size, many in ((2, counts.pairs), (3, counts.triples)):
+        if many and len(names) < size:
+            raise SettingsError(f"{size} effects at once need {size} names: give more with --effects")
+        for turn in range(many):
+            yield tuple(map(str, rng.choice(names, size, replace=False))), turn, COMBINED_BAND
+    for turn in range(counts.mixed):
+        yield tuple(str(rng.choice(each)) for each in (names, simulated.nameless)), turn, COMBINED_BAND
 
 
 def _report_case(core: str, simulated: SimulatedCase, outcomes: Sequence[TrialOutcome]) -> dict[str, Any]:

@@ -5,6 +5,8 @@ import subprocess
 import sys
 import sysconfig
 from collections import Counter, defaultdict
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,9 @@ SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*
 
 #: Class names that two modules use: the client and the OpenAPI document name them like the core does.
 SHARED_CLASS_NAMES = {"Event", "HistoryPoint", "Preview"}
+
+#: Lines of the body of a function, at most, without its docstring.
+MOST_LINES = 60
 
 #: Modules in a folder and its folders, at least. A smaller one hides its modules behind one more name.
 LEAST_MODULES = 3
@@ -43,7 +48,7 @@ def test_a_class_name_is_unique() -> None:
     """Searching for a class name must find one class only."""
     places: dict[str, set[Path]] = defaultdict(set)
     for path in SOURCES:
-        for node in ast.parse(path.read_text()).body:
+        for node in parse(path).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].add(path)
     assert {name for name, found in places.items() if len(found) > 1} == SHARED_CLASS_NAMES
@@ -53,6 +58,36 @@ def test_a_folder_has_several_modules() -> None:
     modules = [path for path in SOURCES if "__" not in path.stem]
     found = Counter(folder for path in modules for folder in path.parents)
     assert not [folder for folder in {path.parent for path in SOURCES} if found[folder] < LEAST_MODULES]
+
+
+def test_a_function_is_short() -> None:
+    long = [
+        f"{path.relative_to(ROOT)}: {function.name}"
+        for path in SOURCES
+        for function in functions(parse(path))
+        if count_body_lines(function) > MOST_LINES
+    ]
+    assert not long
+
+
+@cache
+def parse(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
+
+
+def functions(node: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    """Yield the functions of a tree, also those within others."""
+    for name in ("body", "orelse", "handlers", "finalbody", "cases"):
+        for inner in getattr(node, name, []):
+            if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield inner
+            yield from functions(inner)
+
+
+def count_body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Return the number of lines of a function behind its docstring."""
+    body = function.body[1:] if ast.get_docstring(function) else function.body
+    return (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
 
 
 def test_no_module_has_a_catch_all_name() -> None:

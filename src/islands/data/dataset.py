@@ -89,14 +89,7 @@ class Dataset:
         segments = tuple(int(length) for length in self.segments) or (len(y),)
         if not (np.isfinite(self.dt) and self.dt > 0):
             raise RecordError(f"the sampling time must be a positive number of seconds, got {self.dt}")
-        if sum(segments) != len(y) or min(segments) < 1:
-            raise RecordError(
-                f"the segments' lengths {segments} must be positive and sum to the {len(y)} samples"
-            )
-        if self.held_out and len(y) - self.held_out not in np.cumsum(segments)[:-1]:
-            raise RecordError(
-                f"segments of {segments} samples cannot be divided so that {self.held_out} are held out"
-            )
+        _check_segments(segments, len(y), self.held_out)
         recordings = tuple(self.recordings) or ("",)
         recordings *= len(segments) if len(recordings) == 1 else 1
         if len(recordings) != len(segments):
@@ -209,6 +202,15 @@ def _check_finite(
             f"output {output} is infinite at sample {np.argmax(np.isinf(y))}: repair or cut the record; NaN "
             "marks a missing value"
         )
+
+
+def _check_segments(segments: tuple[int, ...], samples: int, held_out: int) -> None:
+    if sum(segments) != samples or min(segments) < 1:
+        raise RecordError(
+            f"the segments' lengths {segments} must be positive and sum to the {samples} samples"
+        )
+    if held_out and samples - held_out not in np.cumsum(segments)[:-1]:
+        raise RecordError(f"segments of {segments} samples cannot be divided so that {held_out} are held out")
 
 
 def _number_names(names: tuple[str, ...], inputs: int) -> tuple[str, ...]:

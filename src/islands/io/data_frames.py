@@ -80,12 +80,7 @@ def as_record(
     SettingsError
         The arguments do not describe a record.
     """
-    if isinstance(y, str):
-        raise SettingsError("name the columns of a data frame: inputs=..., output=...")
-    if isinstance(data, str | Path):
-        raise SettingsError(f"a file is read by islands.read_record({str(data)!r}, inputs=..., output=...)")
-    if isinstance(y, Dataset | float):
-        raise SettingsError("the second argument is the output: give validation data as validation=...")
+    _check_kinds(data, y)
     if isinstance(data, Dataset):
         if y is not None or dt is not None or inputs or output is not None:
             raise SettingsError(
@@ -121,6 +116,15 @@ def as_record(
         for name, unit in zip(names, (*record.input_units, record.output_unit), strict=True)
     ]
     return replace(record, input_units=tuple(units[:-1]), output_unit=units[-1])
+
+
+def _check_kinds(data: Any, y: Any) -> None:
+    if isinstance(y, str):
+        raise SettingsError("name the columns of a data frame: inputs=..., output=...")
+    if isinstance(data, str | Path):
+        raise SettingsError(f"a file is read by islands.read_record({str(data)!r}, inputs=..., output=...)")
+    if isinstance(y, Dataset | float):
+        raise SettingsError("the second argument is the output: give validation data as validation=...")
 
 
 def _is_recording(data: Any) -> bool:

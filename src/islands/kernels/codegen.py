@@ -62,20 +62,13 @@ def generate_program(
         instructions += operation >= 0
         constants += operation == CONSTANT
 
-    last_use = np.full(count, -1, np.int64)
-    for index in range(count):
-        node = needed[index]
-        if nodes.operation[node] >= 0:
-            last_use[operand_index[nodes.first[node]]] = index
-            last_use[operand_index[nodes.second[node]]] = index
     factors = np.zeros((terms.size, MAX_FACTORS), np.int64)
     degree = np.empty(terms.size, np.int64)
     for term in range(terms.size):
         degree[term] = nodes.degree[terms[term]]
         for factor in range(degree[term]):
-            operand = operand_index[nodes.factors[terms[term], factor]]
-            factors[term, factor] = operand
-            last_use[operand] = count
+            factors[term, factor] = operand_index[nodes.factors[terms[term], factor]]
+    last_use = _find_last_uses(nodes, needed, operand_index, factors, degree)
 
     # A row is reused after the last read of its value. The target of an instruction never has the row of one
     # of its operands, because a row function may not overlap.
@@ -118,6 +111,21 @@ def generate_program(
     for index in range(count):
         operand_index[needed[index]] = -1
     return Program(code, addresses, operands, values, parameters, rows, factors, degree)
+
+
+@kernel
+def _find_last_uses(nodes, needed, operand_index, factors, degree):
+    """Return the index of the last node that reads each operand; a factor of a term is read at the end."""
+    last_use = np.full(needed.size, -1, np.int64)
+    for index in range(needed.size):
+        node = needed[index]
+        if nodes.operation[node] >= 0:
+            last_use[operand_index[nodes.first[node]]] = index
+            last_use[operand_index[nodes.second[node]]] = index
+    for term in range(degree.size):
+        for factor in range(degree[term]):
+            last_use[factors[term, factor]] = needed.size
+    return last_use
 
 
 @kernel

@@ -147,16 +147,7 @@ def add_equalities(
         is_free[j] = True
     for row in range(targets.size):
         coefficient, size = np.zeros(terms), np.zeros(terms)
-        rest, height = targets[row], abs(targets[row])
-        for j in range(terms):
-            p = reduction.pivot[j]
-            rest -= rows[row, j] * reduction.fixed[j]
-            height += abs(rows[row, j] * reduction.fixed[j])
-            if p != j:
-                coefficient[j], size[j] = rows[row, j], abs(rows[row, j])
-                if p >= 0:
-                    coefficient[j] -= reduction.share[j] * rows[row, p]
-                    size[j] += abs(reduction.share[j] * rows[row, p])
+        rest, height = _eliminate_groups(reduction, rows[row], targets[row], coefficient, size)
         for q in range(rank):
             weight = coefficient[row_pivot[q]]
             coefficient[row_pivot[q]] = 0.0
@@ -200,6 +191,28 @@ def add_equalities(
         row_fixed[:rank].copy(),
         free[: find_true(is_free, free)],
     ), True
+
+
+@kernel(_nrt=False)
+def _eliminate_groups(
+    reduction,
+    row,  # float64 [term]: coefficients of an equality
+    target,
+    coefficient,  # out, float64 [term]: coefficients in the parameters that the groups leave
+    size,  # out, float64 [term]: sums of the magnitudes of their summands
+):
+    """Eliminate the parameters of the groups from an equality; return its target and the same sum for it."""
+    rest, height = target, abs(target)
+    for j in range(row.size):
+        p = reduction.pivot[j]
+        rest -= row[j] * reduction.fixed[j]
+        height += abs(row[j] * reduction.fixed[j])
+        if p != j:
+            coefficient[j], size[j] = row[j], abs(row[j])
+            if p >= 0:
+                coefficient[j] -= reduction.share[j] * row[p]
+                size[j] += abs(reduction.share[j] * row[p])
+    return rest, height
 
 
 @kernel

@@ -164,20 +164,8 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
         own, added = simulator.parameters, parameters(context)[:-1]
         recordings = split_recordings(simulator, context)
 
-        def simulate(changes: Signal, shapes: Sequence[Mapping[str, float]]) -> Signal:
-            """Simulate with each change of the parameters and each shape, (simulations, fitted)."""
-            outputs = []
-            for each, part in recordings:
-                nominal = np.array([parameter.nominal for parameter in each.parameters])
-                runs = [
-                    SimulationRun(nominal + change, part.u, shape, ())
-                    for change, shape in zip(changes, shapes, strict=True)
-                ]
-                outputs.append(each.simulate_batch(runs, part))
-            return np.concatenate(outputs, axis=1)[:, :fitted]
-
         moved = np.vstack([np.zeros(len(own)), _STEP * np.diag([each.scale for each in own])])
-        at_rest, *changed = simulate(moved, [{}] * len(moved))
+        at_rest, *changed = _simulate_shapes(recordings, moved, [{}] * len(moved))[:, :fitted]
         known = [(output - at_rest) / _STEP for output in changed]
         u = context.u[:fitted]
         regression_slope = float(np.polyfit(u, at_rest, 1)[0])
@@ -185,7 +173,7 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
         for factor in _SLOPES:
             slope = factor * regression_slope
             shapes = [{SLOPE: slope, each.name: _STEP * each.scale} for each in added]
-            outputs = simulate(np.zeros((len(shapes), len(own))), shapes)
+            outputs = _simulate_shapes(recordings, np.zeros((len(shapes), len(own))), shapes)[:, :fitted]
             columns = known + [(output - at_rest) / _STEP for output in outputs]
             design = np.column_stack(columns)
             if not np.isfinite(design).all():
@@ -211,6 +199,23 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
         extra_degrees_of_freedom=_DEGREES_OF_FREEDOM - len(terms) - 1,
         is_applicable=lambda context: not context.has_resting_input,
     )
+
+
+def _simulate_shapes(
+    recordings: Sequence[tuple[Simulator, SimulationContext]],
+    changes: Signal,
+    shapes: Sequence[Mapping[str, float]],
+) -> Signal:
+    """Simulate with each change of the parameters and each shape, (simulations, samples)."""
+    outputs = []
+    for simulator, part in recordings:
+        nominal = np.array([parameter.nominal for parameter in simulator.parameters])
+        runs = [
+            SimulationRun(nominal + change, part.u, shape, ())
+            for change, shape in zip(changes, shapes, strict=True)
+        ]
+        outputs.append(simulator.simulate_batch(runs, part))
+    return np.concatenate(outputs, axis=1)
 
 
 def _insert_slope(expression: Expression, slope: float) -> Expression:

@@ -97,6 +97,13 @@ def demo(
         output.print(f"{out}/: {RESULT_FILES}", markup=False)
         stop.end(out, (*result.left_out, *drawing.left_out, _COMPARISON), "repeat the command")
 
+    _print_comparison(result, models, records)
+
+
+def _print_comparison(
+    result: islands.Result, models: Mapping[str, DynamicModel], records: Mapping[str, Dataset]
+) -> None:
+    """Print the errors of the paper's models and of the models found, by record."""
     # All models start after the same warm-up.
     warm_up = result.best.warm_up
     table = Table("model", "terms", "MAPE est. %", "MAPE val. %", "R2 est.", "R2 val.", title=_TITLE)
@@ -104,7 +111,7 @@ def demo(
         entry = PUBLISHED[number]
         table.add_row(f"({number}), Table 1", str(entry.model.size), *_format_cells(*entry.mape, *entry.r2))
     for name, model in models.items():
-        errors_by_part = [_compute_metrics(model, record, warm_up) for record in (estimation, validation)]
+        errors_by_part = [_compute_metrics(model, records[part], warm_up) for part in SELECTING]
         label = f"{name}, {_describe_origin(name)}"
         table.add_row(label, str(model.size), *_format_row(errors_by_part))
     for fitted in result.models:

@@ -155,13 +155,7 @@ def run(
             drawing = Steps(stop=stop)
             result.save(folder, drawing)
         if not stop() and result.search_result.search.ended_by == "stopped":
-            errors.print(
-                f"stopped: the result is the best so far; continue with --resume {folder}", markup=False
-            )
-            if run_options.wall_time is not None:
-                errors.print(
-                    "a result limited by --wall-time is not reproducible: it depends on the speed of the run"
-                )
+            _print_limit(run_options, folder)
         show_result(result, folder)
         if run_options.verbose:
             for name, (size, limit) in result.search_result.search.caches.items():
@@ -169,6 +163,15 @@ def run(
         if test_data is not None:
             _evaluate_test(result, test_data, folder)
         stop.end(folder, (*result.left_out, *drawing.left_out), f"continue with --resume {folder}")
+
+
+def _print_limit(run_options: RunOptions, folder: Path) -> None:
+    """Print that the search ended before its last generation."""
+    errors.print(f"stopped: the result is the best so far; continue with --resume {folder}", markup=False)
+    if run_options.wall_time is not None:
+        errors.print(
+            "a result limited by --wall-time is not reproducible: it depends on the speed of the run"
+        )
 
 
 def _choose_preset(

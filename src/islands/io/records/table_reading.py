@@ -1,6 +1,6 @@
 """Inputs and an output of an open table, with checks for all that would make an identification fail."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_inputs
 from islands.io.records.column_names import find_column, split_structures, time_column
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.sampling.recording import UniformRecording
+from islands.io.records.sampling.recording import Recording, UniformRecording
 from islands.io.records.sampling.repair import make_uniform
 from islands.io.records.sampling.sampling_time import find_sampling, make_recording
 from islands.io.records.table import Table
@@ -74,26 +74,51 @@ def read_table(
         found = UniformRecording(values, step, step * columns.first if start is None else start, (), ())
     else:
         recording = make_recording(table, columns, values, clock, dt, structure, options.time is not None)
-        places = [place for place, name in enumerate(chosen) if name in required]
-        found = make_uniform(recording, places, options.gaps, options.resample)
-        for name, column in zip(chosen, found.values.T, strict=True):
-            check_repaired(column, name, file, missing=name not in required)
+        found = _repair(recording, chosen, required, options, file)
     for name in () if missing_output else (*(() if resting_inputs else sources), *outputs):
         check_varies(columns, name)
-    record = Dataset(
+    record = _make_record(found, sources, output, structures, file)
+    return advance_inputs(record, _find_advanced(inputs, sources))
+
+
+def _repair(
+    recording: Recording,
+    chosen: Sequence[str],
+    required: Sequence[str],
+    options: ReadingOptions,
+    file: str,
+) -> UniformRecording:
+    """Make the sampling uniform, and check the columns; those that are not required may lack values."""
+    places = [place for place, name in enumerate(chosen) if name in required]
+    found = make_uniform(recording, places, options.gaps, options.resample)
+    for name, column in zip(chosen, found.values.T, strict=True):
+        check_repaired(column, name, file, missing=name not in required)
+    return found
+
+
+def _find_advanced(inputs: Sequence[str], sources: Sequence[str]) -> list[int]:
+    """Return the places of the inputs that are named as a column that is read one sample early."""
+    return [place for place, name in enumerate(inputs) if name.endswith(AT_ONCE) and name != sources[place]]
+
+
+def _make_record(
+    found: UniformRecording,
+    sources: Sequence[str],
+    output: str | None,
+    structures: Mapping[str, str],
+    file: str,
+) -> Dataset:
+    """Return the record of input columns and an output column, the last one if it is given."""
+    return Dataset(
         u=found.values[:, : len(sources)],
-        y=found.values[:, -1] if outputs else np.full(len(found.values), np.nan),
+        y=np.full(len(found.values), np.nan) if output is None else found.values[:, -1],
         dt=found.dt,
         input_names=tuple(sources),
         output_name=output or "y",
         input_units=tuple(parse_unit(source.removeprefix(structures[source])) for source in sources),
-        output_unit=parse_unit(output.removeprefix(structure)) if output else "",
+        output_unit="" if output is None else parse_unit(output.removeprefix(structures[output])),
         segments=found.segments,
         recordings=(file,) * max(1, len(found.segments)),
         start=found.start,
         reading=found.steps,
     )
-    advanced = [
-        place for place, name in enumerate(inputs) if name.endswith(AT_ONCE) and name != sources[place]
-    ]
-    return advance_inputs(record, advanced)

@@ -221,6 +221,20 @@ def _list_failures(found: SearchResult, entry: Assessment) -> Iterator[str]:
             yield f"the constraint {named_statement(check.text, require_narx(entry.model))} (value {value})"
     if errors["validation"].r2 < _GOOD_R2:
         yield f"simulation from the inputs alone: R2 {errors['validation'].r2:.3f}"
+    yield from _list_physical_failures(found, entry)
+    structure = entry.residual_structure
+    if structure.verdict != ADEQUATE and isfinite(structure.percent):
+        yield (
+            f"{100 * structure.free_run_share:.0f} % of the free-run residual is predictable "
+            f"(RMS {structure.percent:.2g} % of the output range)"
+        )
+    ratio = errors["validation"].rmse / errors["estimation"].rmse if errors["estimation"].rmse > 0 else 0.0
+    if ratio > _LARGE_RATIO:
+        yield f"the free-run error on the validation data is {ratio:.2g} times that on the estimation data"
+
+
+def _list_physical_failures(found: SearchResult, entry: Assessment) -> Iterator[str]:
+    """Yield what a model does at large or constant inputs, and whether its loops close."""
     physics = entry.physics
     diverging = [f"{test.name}" for test in physics.excursions if not test.bounded]
     if diverging:
@@ -234,15 +248,6 @@ def _list_failures(found: SearchResult, entry: Assessment) -> Iterator[str]:
     if found.claims_hysteresis and opened:
         worst = max(opened, key=lambda test: test.closure_percent)
         yield f"loops do not close at {worst.name}: {worst.closure_percent:.3g} % of the output range"
-    structure = entry.residual_structure
-    if structure.verdict != ADEQUATE and isfinite(structure.percent):
-        yield (
-            f"{100 * structure.free_run_share:.0f} % of the free-run residual is predictable "
-            f"(RMS {structure.percent:.2g} % of the output range)"
-        )
-    ratio = errors["validation"].rmse / errors["estimation"].rmse if errors["estimation"].rmse > 0 else 0.0
-    if ratio > _LARGE_RATIO:
-        yield f"the free-run error on the validation data is {ratio:.2g} times that on the estimation data"
 
 
 def _list_insignificant(entry: Assessment) -> list[str]:

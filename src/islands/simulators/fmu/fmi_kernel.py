@@ -121,28 +121,17 @@ def integrate(fmu, equations, begin, dt, start, middle, end, inputs, states, ind
     y : ndarray, shape (steps, outputs)
         Receives the outputs at the start of each step.
     """
-    places, arena = equations.places, equations.arena
     flags, next_time = np.zeros(32, np.uint8), np.zeros(1)
     size = states
-    for place in places:
+    for place in equations.places:
         size = max(size, place + 1)
     x, stage, slope, total = np.zeros(size), np.empty(size), np.empty(size), np.empty(size)
     # Those of the FMU.
-    fmu_x, fmu_stage, fmu_slope, fmu_total = x[:states], stage[:states], slope[:states], total[:states]
+    fmu_x, fmu_total = x[:states], total[:states]
     before, after = np.empty(indicators), np.empty(indicators)
     values = np.empty(equations.value_rows.size)
     samples = y.shape[0]
-    status = _resolve_events(fmu, flags, next_time)
-    if status <= WARNING:
-        status = exchange_states(fmu.get_states, fmu, fmu_x)
-    for i in range(places.size):
-        x[places[i]] = arena[LANES * (equations.instructions.states + i)]
-    if status <= WARNING:
-        status = exchange_states(fmu.set_states, fmu, fmu_x)
-    if status <= WARNING:
-        status = exchange_values(fmu.set_values, fmu, inputs, start[0])
-    if status <= WARNING:
-        status = exchange_states(fmu.get_indicators, fmu, before)
+    status = _begin(fmu, equations, inputs, start[0], x, fmu_x, before, flags, next_time)
     if status > WARNING:
         return 0, status
     for k in range(samples):
@@ -158,21 +147,11 @@ def integrate(fmu, equations, begin, dt, start, middle, end, inputs, states, ind
             break
         _read_slopes(equations, total)
         slope[:] = total
-        for part in range(3):
-            fraction = 1.0 if part == 2 else 0.5
-            stage[:] = x + fraction * dt * slope
-            status = set_time(fmu, time + fraction * dt)
-            if status <= WARNING:
-                status = exchange_values(fmu.set_values, fmu, inputs, end[k] if part == 2 else middle[k])
-            if status <= WARNING:
-                status = exchange_states(fmu.set_states, fmu, fmu_stage)
-            if status <= WARNING:
-                status = exchange_states(fmu.get_derivatives, fmu, fmu_slope)
-            if status > WARNING:
-                return k + 1, status
-            _execute(equations, k, 2 if part == 2 else 1, stage, slope, 2)
-            _read_slopes(equations, slope)
-            total += slope if part == 2 else 2.0 * slope
+        status = _add_stages(
+            fmu, equations, k, time, dt, inputs, middle[k], end[k], x, stage, slope, total, states
+        )
+        if status > WARNING:
+            return k + 1, status
         x += dt / 6.0 * total
         _limit(equations, x)
         status = set_time(fmu, following)
@@ -187,6 +166,48 @@ def integrate(fmu, equations, begin, dt, start, middle, end, inputs, states, ind
         if not np.isfinite(x).all():
             return k + 1, TERMINATED
     return samples, 0
+
+
+@kernel
+def _begin(fmu, equations, inputs, start, x, fmu_x, before, flags, next_time):
+    """Enter continuous time, and read the initial states and indicators; return the status."""
+    status = _resolve_events(fmu, flags, next_time)
+    if status <= WARNING:
+        status = exchange_states(fmu.get_states, fmu, fmu_x)
+    for i in range(equations.places.size):
+        x[equations.places[i]] = equations.arena[LANES * (equations.instructions.states + i)]
+    if status <= WARNING:
+        status = exchange_states(fmu.set_states, fmu, fmu_x)
+    if status <= WARNING:
+        status = exchange_values(fmu.set_values, fmu, inputs, start)
+    if status <= WARNING:
+        status = exchange_states(fmu.get_indicators, fmu, before)
+    return status
+
+
+@kernel
+def _add_stages(fmu, equations, k, time, dt, inputs, middle, end, x, stage, slope, total, states):
+    """Add the derivatives at the last three stages of step ``k`` to ``total``; return the status.
+
+    ``slope`` has the derivatives at the first stage, and ``stage`` receives the states of each stage.
+    """
+    fmu_stage, fmu_slope = stage[:states], slope[:states]
+    for part in range(3):
+        fraction = 1.0 if part == 2 else 0.5
+        stage[:] = x + fraction * dt * slope
+        status = set_time(fmu, time + fraction * dt)
+        if status <= WARNING:
+            status = exchange_values(fmu.set_values, fmu, inputs, end if part == 2 else middle)
+        if status <= WARNING:
+            status = exchange_states(fmu.set_states, fmu, fmu_stage)
+        if status <= WARNING:
+            status = exchange_states(fmu.get_derivatives, fmu, fmu_slope)
+        if status > WARNING:
+            return status
+        _execute(equations, k, 2 if part == 2 else 1, stage, slope, 2)
+        _read_slopes(equations, slope)
+        total += slope if part == 2 else 2.0 * slope
+    return 0
 
 
 @kernel(forceinline=True)

@@ -208,6 +208,34 @@ def _is_any_finite(before, lanes):
     return finite
 
 
+@kernel(forceinline=True)
+def _write_signals(arena, base, rows, shared, own, width, places, k, own_sample, moment, lanes):
+    """Write the signals at a moment of a step; each lane has its own ``places`` among ``width`` values."""
+    for s in range(shared.shape[2]):
+        write(base + _ROW * rows[s], _fill(shared[k, moment, s]))
+    first = (3 * own_sample + moment) * width
+    for s in range(places.shape[0]):
+        row = LANES * rows[shared.shape[2] + s]
+        for lane in range(lanes):
+            arena[row + lane] = own[first + places[s, lane]]
+
+
+@kernel(forceinline=True)
+def _write_outputs(base, outputs, sample, first, out):
+    """Write the outputs of sixteen lanes from ``first``."""
+    for output in range(outputs.size):
+        place = (sample * outputs.size + output) * out.shape[2] + first
+        write(out.ctypes.data + 8 * place, _read(base + _ROW * outputs[output]))
+
+
+@kernel
+def _mark_diverged(before, lanes, first, out):
+    """Replace all outputs of the lanes that have diverged by NaN."""
+    for lane in range(lanes):
+        if not _is_finite(before, lane):
+            out[:, :, first + lane] = np.nan
+
+
 @kernel
 def integrate(instructions, arena, signals, dt, limits, restarts, laws, lanes, first, every, out):
     """Integrate a system from the states in the arena; write the outputs.
@@ -219,10 +247,9 @@ def integrate(instructions, arena, signals, dt, limits, restarts, laws, lanes, f
     """
     ends, states = instructions.ends, instructions.states
     rows, slopes, outputs = instructions.signals, instructions.slopes, instructions.outputs
-    shared, own, places = signals.shared, signals.own.reshape(-1), signals.places
-    size = slopes.size * LANES
+    base, size = arena.ctypes.data, slopes.size * LANES
     before, total = arena[LANES * states : LANES * states + size].copy(), np.empty(size)
-    base, result = arena.ctypes.data, out.ctypes.data
+    shared, own, width, places = signals.shared, signals.own.reshape(-1), signals.own.shape[2], signals.places
     samples, restart, start, block = shared.shape[0], 0, 0, 0
     for k in range(samples):
         if restart < restarts.samples.size and restarts.samples[restart] == k:
@@ -239,20 +266,14 @@ def integrate(instructions, arena, signals, dt, limits, restarts, laws, lanes, f
                 begin = ends[1]  # the signals are those of the stage before
             else:
                 moment = (stage + 1) // 2
-                for s in range(shared.shape[2]):
-                    write(base + _ROW * rows[s], _fill(shared[k, moment, s]))
-                values = (3 * (k - start) + moment) * signals.own.shape[2]
-                for s in range(places.shape[1]):
-                    row = LANES * rows[shared.shape[2] + s]
-                    for lane in range(lanes):
-                        arena[row + lane] = own[values + places[block, s, lane]]
+                _write_signals(
+                    arena, base, rows, shared, own, width, places[block], k, k - start, moment, lanes
+                )
             if k == 0 and stage == 0:
                 begin = 0
             execute_code(instructions, begin, end, base, arena, laws, lanes)
             if is_read:
-                for output in range(outputs.size):
-                    place = (k // every * outputs.size + output) * out.shape[2] + first
-                    write(result + 8 * place, _read(base + _ROW * outputs[output]))
+                _write_outputs(base, outputs, k // every, first, out)
             if k + 1 == samples:
                 break
             for i in range(slopes.size):
@@ -264,6 +285,5 @@ def integrate(instructions, arena, signals, dt, limits, restarts, laws, lanes, f
         # A restart makes the states of a lane finite again.
         if restarts.samples.size == 0 and k % _CHECK == 0 and not _is_any_finite(before, lanes):
             break
-    for lane in range(lanes):
-        if restarts.samples.size == 0 and not _is_finite(before, lane):
-            out[:, :, first + lane] = np.nan
+    if restarts.samples.size == 0:
+        _mark_diverged(before, lanes, first, out)

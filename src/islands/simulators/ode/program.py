@@ -137,16 +137,9 @@ class _Generator:
         found = [self._make(output) for output in outputs]
         # The states of the laws need their derivatives even if no equation reads the forces.
         derived = [*slopes, *([self._force()] if laws else [])]
-        leaves = [
-            *(self._known["number", value] for value in self.constants),
-            *(self._named[each.name] for each in system.parameters),
-            *(self._known["signal", render(each)] for each in self.signals),
-            *(self._named[name] for name, _ in system.derivatives),
-        ]
-        for row, node in enumerate(leaves):
-            self.nodes[node].row = row
-        first_state = len(leaves) - len(system.derivatives)
-        own_slopes = len(leaves) + laws
+        leaves = self._place_leaves()
+        first_state = leaves - len(system.derivatives)
+        own_slopes = leaves + laws
         self._rows = own_slopes + laws
         for node in (*derived, *found):
             self._count(node)
@@ -174,6 +167,18 @@ class _Generator:
             tuple(self.signals),
             tuple(name for name, _ in system.derivatives),
         )
+
+    def _place_leaves(self) -> int:
+        """Give each leaf its row, in the order of `OdeProgram`; return their number."""
+        leaves = [
+            *(self._known["number", value] for value in self.constants),
+            *(self._named[each.name] for each in self.system.parameters),
+            *(self._known["signal", render(each)] for each in self.signals),
+            *(self._named[name] for name, _ in self.system.derivatives),
+        ]
+        for row, node in enumerate(leaves):
+            self.nodes[node].row = row
+        return len(leaves)
 
     def _slope_row(self, index: int, node: int, first_state: int) -> int:
         row = self.nodes[node].row

@@ -17,6 +17,14 @@ def _with_job(table: str) -> sa.ForeignKeyConstraint:
 
 def upgrade() -> None:
     """Create the tables."""
+    _create_jobs()
+    _create_progress()
+    _create_results()
+    _create_datasets()
+    _create_keys()
+
+
+def _create_jobs() -> None:
     op.create_table(
         "jobs",
         sa.Column("id", sa.String(32), nullable=False),
@@ -49,6 +57,9 @@ def upgrade() -> None:
     op.create_index("ix_jobs_state_priority_created", "jobs", ["state", "priority", "created"])
     op.create_index("ix_jobs_owner_created_id", "jobs", ["owner", "created", "id"])
     op.create_index("ix_jobs_owner_state_created_id", "jobs", ["owner", "state", "created", "id"])
+
+
+def _create_progress() -> None:
     op.create_table(
         "events",
         _job(),
@@ -69,6 +80,9 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("job_id", "generation", name="pk_points"),
         _with_job("points"),
     )
+
+
+def _create_results() -> None:
     op.create_table(
         "results",
         _job(),
@@ -93,6 +107,9 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("job_id", "name", name="pk_artefacts"),
         _with_job("artefacts"),
     )
+
+
+def _create_datasets() -> None:
     op.create_table(
         "datasets",
         sa.Column("owner", sa.String(64), nullable=False),
@@ -105,6 +122,9 @@ def upgrade() -> None:
         sa.Column("created", sa.Float, nullable=False),
         sa.PrimaryKeyConstraint("owner", "id", name="pk_datasets"),
     )
+
+
+def _create_keys() -> None:
     op.create_table(
         "keys",
         sa.Column("id", sa.String(16), nullable=False),

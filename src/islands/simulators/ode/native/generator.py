@@ -1,5 +1,7 @@
 """Generator of the machine code of a program: a loop over the samples whose rows are values."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -110,29 +112,15 @@ class NativeGenerator:
         if program.is_moving:
             own_sample = build.urem(sample, self._interval)
             own_places = self._load_places(build.udiv(sample, self._interval))
-        self._read_signals(sample, own_sample, 0, own_places)
+        read_signals = partial(self._read_signals, sample, own_sample, own_places)
+        read_signals(0)
         slopes = self._differentiate(before, program.ends[0])
         self._write_outputs(sample)
         following = build.add(sample, _INTEGER(1))
         build.cbranch(build.icmp_unsigned("<", following, self._samples), advance, end)
 
         build.position_at_end(advance)
-        total = slopes
-        half, sixth = self._scale(0.5), self._row.fill(build.fdiv(self._dt, _DOUBLE(6.0)))
-        for stage in (1, 2, 3):
-            part = half if stage < 3 else self._scale(1.0)
-            moved = [build.fadd(x, build.fmul(part, slope)) for x, slope in zip(before, slopes, strict=True)]
-            if stage != 2:  # the signals in the middle of the step are known
-                self._read_signals(sample, own_sample, (stage + 1) // 2, own_places)
-            slopes = self._differentiate(moved, program.ends[1 if stage == 2 else 0])
-            if stage < 3:
-                twice = (build.fmul(self._row.constant(2.0), slope) for slope in slopes)
-                total = [build.fadd(x, slope) for x, slope in zip(total, twice, strict=True)]
-        new = [
-            build.fadd(x, build.fmul(sixth, build.fadd(sum_, slope)))
-            for x, sum_, slope in zip(before, total, slopes, strict=True)
-        ]
-        new = self._limit(new, *limits)
+        new = self._limit(self._advance(before, slopes, read_signals), *limits)
         sample.add_incoming(following, build.block)
         for phi, value in zip(carried, new, strict=True):
             phi.add_incoming(value, build.block)
@@ -143,6 +131,26 @@ class NativeGenerator:
             self._row.store(value, self._arena, self._lanes * (program.states + index))
         build.ret_void()
         return self._module
+
+    def _advance(
+        self, states: list[Any], slopes: list[Any], read_signals: Callable[[int], None]
+    ) -> list[Any]:
+        """Return the states at the next sample, by RK4, given the derivatives at this one."""
+        build, total = self._build, slopes
+        half, sixth = self._scale(0.5), self._row.fill(build.fdiv(self._dt, _DOUBLE(6.0)))
+        for stage in (1, 2, 3):
+            part = half if stage < 3 else self._scale(1.0)
+            moved = [build.fadd(x, build.fmul(part, slope)) for x, slope in zip(states, slopes, strict=True)]
+            if stage != 2:  # the signals in the middle of the step are known
+                read_signals((stage + 1) // 2)
+            slopes = self._differentiate(moved, self._program.ends[1 if stage == 2 else 0])
+            if stage < 3:
+                twice = (build.fmul(self._row.constant(2.0), slope) for slope in slopes)
+                total = [build.fadd(x, slope) for x, slope in zip(total, twice, strict=True)]
+        return [
+            build.fadd(x, build.fmul(sixth, build.fadd(sum_, slope)))
+            for x, sum_, slope in zip(states, total, slopes, strict=True)
+        ]
 
     def _restart(self, states: list[Any], sample: Any) -> list[Any]:
         """Return the states of a sample; the first one of an interval has given states."""
@@ -183,7 +191,7 @@ class NativeGenerator:
             for index in range(own)
         ]
 
-    def _read_signals(self, sample: Any, own_sample: Any, moment: int, own_places: list[list[Any]]) -> None:
+    def _read_signals(self, sample: Any, own_sample: Any, own_places: list[list[Any]], moment: int) -> None:
         build, shared = self._build, self._program.shared
         moments, own_moments = (
             build.add(build.mul(each, _INTEGER(3)), _INTEGER(moment)) for each in (sample, own_sample)

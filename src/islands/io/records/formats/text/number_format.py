@@ -90,21 +90,7 @@ def find_number_format(
     RecordError
         Marks are mixed, or all numbers with a comma have two readings.
     """
-    proofs: dict[str, _Cell] = {}  # by the decimal mark that the number proves
-    ambiguous: dict[str, _Cell] = {}  # by the mark
-    grouped: dict[str, _Cell] = {}  # by the separator of thousands
-    for name, column in texts.items():
-        for sample, text in enumerate(column):
-            cell = (name, sample, text)
-            if match := _AMBIGUOUS.fullmatch(text):
-                ambiguous.setdefault(match[1], cell)
-            elif match := _PLAIN.fullmatch(text):
-                if mark := match[1] or match[2]:
-                    proofs.setdefault(mark, cell)
-            elif match := _match_groups(text):
-                grouped.setdefault(match[1], cell)
-                if mark := _OTHER.get(match[1]) or match[2]:
-                    proofs.setdefault(mark, cell)
+    proofs, ambiguous, grouped = _find_marks(texts)
     mark = decimal or _choose_mark(proofs, ambiguous, rows, separator)
     other = _OTHER[mark]
     if other in proofs or (other in ambiguous and other not in grouped and decimal is None):
@@ -117,6 +103,28 @@ def find_number_format(
         cell = grouped[separators[0]] if grouped else ambiguous[other]
         note += f"{'; ' if note else ''}{_place(cell, rows)} is read with thousands separated"
     return NumberFormat(mark, "".join(dict.fromkeys(separators)), note)
+
+
+def _find_marks(
+    texts: Mapping[str, Sequence[str]],
+) -> tuple[dict[str, _Cell], dict[str, _Cell], dict[str, _Cell]]:
+    """Return the first cell of each decimal mark, of each mark with two readings, and of each separator."""
+    proofs: dict[str, _Cell] = {}
+    ambiguous: dict[str, _Cell] = {}
+    grouped: dict[str, _Cell] = {}
+    for name, column in texts.items():
+        for sample, text in enumerate(column):
+            cell = (name, sample, text)
+            if match := _AMBIGUOUS.fullmatch(text):
+                ambiguous.setdefault(match[1], cell)
+            elif match := _PLAIN.fullmatch(text):
+                if mark := match[1] or match[2]:
+                    proofs.setdefault(mark, cell)
+            elif match := _match_groups(text):
+                grouped.setdefault(match[1], cell)
+                if mark := _OTHER.get(match[1]) or match[2]:
+                    proofs.setdefault(mark, cell)
+    return proofs, ambiguous, grouped
 
 
 def _choose_mark(
