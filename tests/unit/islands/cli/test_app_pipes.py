@@ -16,13 +16,13 @@ from support.command_line import ISLANDS, islands
 @pytest.mark.parametrize(
     ("arguments", "is_joined"),
     [
-        *((each, False) for each in ("", "fit --help", "systems list")),
-        *((each, True) for each in ("--help", "show no-result")),
+        *((each, False) for each in ("", "systems list")),
+        ("show no-result", True),
         *(
             pytest.param(*each, marks=pytest.mark.nightly)
             for each in [
-                *((each, False) for each in ("--help", "--version", "jobs --help")),
-                *((each, True) for each in ("systems list", "fitt")),
+                *((each, False) for each in ("--help", "--version", "fit --help", "jobs --help")),
+                *((each, True) for each in ("--help", "systems list", "fitt")),
             ]
         ),
     ],

@@ -35,6 +35,13 @@ def choose(data, delays=None):
     return choice_from_document(result.settings["choice"]), result
 
 
+@pytest.fixture(scope="module")
+def chosen():
+    """A short record of a linear system, the choice of `fit` and its result."""
+    data = record("first order", 300)
+    return data, *choose(data)
+
+
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
@@ -64,16 +71,15 @@ def test_dead_time_is_added_to_the_lags():
 
 
 @pytest.mark.ci
-def test_reasons_are_two_sentences():
-    choice, _ = choose(record("first order", 300))
+def test_reasons_are_two_sentences(chosen):
+    _, choice, _ = chosen
     assert len(choice.reasons) == 2
     assert choice.reasons[0].startswith("Preset auto chose smooth (library polynomial of degree 2")
 
 
 @pytest.mark.nightly
-def test_choice_is_the_same_again_and_survives_json():
-    data = record("first order", 300)
-    choice, _ = choose(data)
+def test_choice_is_the_same_again_and_survives_json(chosen):
+    data, choice, _ = chosen
     assert choose(data)[0] == choice
     assert choice_from_document(choice.to_document()) == choice
 
@@ -84,9 +90,8 @@ def test_damaged_choice_is_refused():
 
 
 @pytest.mark.ci
-def test_promising_kinds_are_compared_by_their_recommended_models():
-    data = record("first order", 300)
-    choice, result = choose(data)
+def test_promising_kinds_are_compared_by_their_recommended_models(chosen):
+    data, choice, result = chosen
     least = min(choice.trials.values())
     assert set(choice.errors) == {kind for kind, error in choice.trials.items() if error <= 3.0 * least}
     error = result.recommended.metrics["validation"]["free_run"].rmse

@@ -25,6 +25,12 @@ from support.simulated_records import EQUATIONS, recorded, wave
 
 Array = NDArray[np.float64]
 
+#: Effects that are searched for: a force, and others that resemble it or a term of the output.
+FEW = tuple(
+    CATALOGUE[name]
+    for name in ("coulomb-friction", "viscous", "backlash", "even-nonlinearity", "output-saturation")
+)
+
 EXAMPLES = sorted(path.stem for path in EQUATIONS.glob("*.toml"))
 
 #: Sampling time of a record for an example, in seconds.
@@ -253,7 +259,7 @@ def test_equations_without_states_are_simulated(tmp_path: Path) -> None:
 @pytest.mark.ci
 def test_a_missing_term_of_equations_without_states_is_discovered(tmp_path: Path) -> None:
     path, record = make_static(tmp_path)
-    diagnosis = islands.diagnose(record, path)
+    diagnosis = islands.diagnose(record, path, effects=FEW)
     assert diagnosis.verdict == Verdict.DISCOVERED
     assert diagnosis.discovery.equations.startswith("output = k*u + a1*u**3")
     assert diagnosis.effects[0].parameters["a1"].value == pytest.approx(1e-3, rel=0.01)
@@ -309,7 +315,7 @@ def test_dry_friction_that_the_equations_lack_is_named() -> None:
     record = Dataset(
         **{**fields("dc-motor"), "u": u[:, None], "y": noisy, "input_names": ("u_V",), "input_units": ("V",)}
     )
-    found = islands.diagnose(record, path_of("dc-motor"))
+    found = islands.diagnose(record, path_of("dc-motor"), effects=FEW)
     assert found.verdict == Verdict.NAMED
     friction, *others = found.effects
     assert (friction.name, others) == ("coulomb-friction", [])
