@@ -125,12 +125,7 @@ def run(
                     (folder / name).unlink(missing_ok=True)
             preset = job["preset"]
             if preset == AUTO:
-                stored = job.get("choice")
-                preset = (
-                    choice_from_document(stored)
-                    if stored
-                    else _choose_preset(data, held_out, job["changes"], show, stop, folder)
-                )
+                preset = _choose_preset(data, held_out, job, show, stop, folder)
                 # Checkpoints contain the job, so a resumed run does not choose again.
                 job = {**job, "choice": preset.to_document()}
             checkpoints = _CheckpointWriter(folder, job, show, state, spent)
@@ -177,14 +172,19 @@ def _print_limit(run_options: RunOptions, folder: Path) -> None:
 def _choose_preset(
     data: islands.Dataset,
     held_out: islands.Dataset | float,
-    changes: dict[str, Any],
+    job: dict[str, Any],
     show: Display,
     stop: StopRequests,
     folder: Path,
 ) -> Choice:
-    """Choose the preset. If a stop is requested, save the models of the kinds that were fitted, and end."""
+    """Return the stored choice of the preset, or choose one.
+
+    If a stop is requested, save the models of the kinds that were fitted, and end.
+    """
+    if stored := job.get("choice"):
+        return choice_from_document(stored)
     try:
-        return choose_preset(data, held_out, changes, show, stop)
+        return choose_preset(data, held_out, job["changes"], show, stop)
     except StoppedChoiceError as stopped:
         result, drawing = islands.Result.from_search(stopped.found), Steps(stop=stop)
         result.save(folder, drawing)
