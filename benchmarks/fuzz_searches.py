@@ -35,7 +35,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.errors import IslandsError
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.facade.coupled.result import CoupledResult
-from islands.facade.results.result import Result
+from islands.facade.results.identification import Result
 from islands.io.result_folder import result_json
 from islands.models.candidate_library import LIBRARIES
 from islands.simulators.specification.equations import OdeSpec

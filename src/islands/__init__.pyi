@@ -42,10 +42,10 @@ from islands.facade.record_monitor import create_monitor as create_monitor
 from islands.facade.record_monitor import monitor_record as monitor_record
 from islands.facade.results.complete_diagnosis import DiagnosisResult as DiagnosisResult
 from islands.facade.results.fitted_model import FittedModel as FittedModel
+from islands.facade.results.identification import Result as Result
 from islands.facade.results.model_analysis import linearise as linearise
 from islands.facade.results.model_simulation import simulate as simulate
-from islands.facade.results.result import Result as Result
-from islands.facade.results.saved_result import read_result as read_result
+from islands.facade.results.reader import read_result as read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis as SavedDiagnosis
 from islands.facade.results.saved_simulation import SavedSimulation as SavedSimulation
 from islands.io.data_frames import as_record as as_record

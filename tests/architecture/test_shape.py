@@ -7,6 +7,7 @@ import sysconfig
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -88,6 +89,23 @@ def count_body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     """Return the number of lines of a function behind its docstring."""
     body = function.body[1:] if ast.get_docstring(function) else function.body
     return (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
+
+
+def test_no_name_repeats_that_of_its_folder() -> None:
+    """``records/reader.py`` and not ``records/record_reader.py``; names of plurals count as well."""
+    repeating = [
+        str(path.relative_to(ROOT))
+        for path in SOURCES
+        for folder, name in pairwise(path.relative_to(ROOT).with_suffix("").parts[1:])
+        if repeats(name, folder)
+    ]
+    assert not repeating
+
+
+def repeats(name: str, folder: str) -> bool:
+    """Return whether a name begins or ends with that of its folder, in the singular or the plural."""
+    words, parent = ([word.removesuffix("s") for word in each.split("_")] for each in (name, folder))
+    return parent in (words[: len(parent)], words[-len(parent) :])
 
 
 def test_no_module_has_a_catch_all_name() -> None:

@@ -20,7 +20,7 @@ import islands
 from islands.data.dataset import Dataset
 from islands.data.signal_map import match_rate
 from islands.facade.results.fitted_model import FittedModel
-from islands.facade.results.result import Result
+from islands.facade.results.identification import Result
 from islands.io.records import read_record
 from islands.systems.catalogue import make_record
 from islands.validation.metrics import metrics

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from islands_service.backup import create_backup, restore_backup, verify_backup
-from islands_service.coordinator import coordinator as coordinator_module
+from islands_service.coordinator import main_loop as coordinator_module
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import JobOutcome, JobState, ProgressReport
 from islands_service.liveness import StopRequest

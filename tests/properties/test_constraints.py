@@ -6,7 +6,7 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.estimation.constrained_least_squares import constrained_least_squares
-from islands.estimation.constraints.constraint import Constraint
+from islands.estimation.constraints.conditions import Constraint
 from islands.estimation.constraints.parts import ClusterSums
 from islands.estimation.least_squares import least_squares
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint

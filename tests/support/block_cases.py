@@ -8,7 +8,7 @@ from islands.models.block import Block
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
 from islands.models.narx import Model
-from islands.simulation.block_simulation import make_simulator
+from islands.simulation.blocks import make_simulator
 from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record

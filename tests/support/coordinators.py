@@ -7,9 +7,9 @@ from types import MappingProxyType
 import pytest
 
 from islands.evolution.engine import SerialEngine
-from islands_service.coordinator import coordinator as coordinator_module
-from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator import main_loop as coordinator_module
 from islands_service.coordinator.job_run import JobRun
+from islands_service.coordinator.main_loop import Coordinator
 from islands_service.domain.job import Job, JobOutcome, JobState
 from islands_service.store import Store
 from support.processes import eventually

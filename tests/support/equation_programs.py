@@ -17,7 +17,7 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.documents.extension_json import extended_document
 from islands.effects.catalogue import CATALOGUE, catalogue_order
 from islands.effects.interface.effect import Effect, Site
-from islands.export.equations.equation_collection import collect_equations
+from islands.export.equations.collection import collect_equations
 from islands.export.extension import export_extended
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator

@@ -9,7 +9,7 @@ from functools import partial
 
 from islands.errors import IslandsError
 from islands.processes.settings import limit_threads
-from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.main_loop import Coordinator
 from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.coordinator.process_restart import restart_process
 from islands_service.liveness import (

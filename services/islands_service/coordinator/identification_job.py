@@ -18,7 +18,7 @@ from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.fit import fit
 from islands.facade.identify import identify
-from islands.facade.results.result import Result
+from islands.facade.results.identification import Result
 from islands.io.checkpoints import history_document
 from islands.io.models import NARX, model_json
 from islands.io.result_folder import result_document

@@ -1,5 +1,5 @@
 """SQL store of jobs, data sets and keys, in SQLite or PostgreSQL, and blobs. Read `store` first."""
 
-from islands_service.store.store import Store
+from islands_service.store.operations import Store
 
 __all__ = ["Store"]

@@ -8,7 +8,7 @@ from islands.cli.console import output
 from islands.errors import SettingsError
 
 if TYPE_CHECKING:
-    from islands.facade.results.result import Result
+    from islands.facade.results.identification import Result
 
 
 #: Files of a result in its folder.

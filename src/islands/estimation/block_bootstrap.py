@@ -20,7 +20,7 @@ from islands.data.dataset import Dataset
 from islands.estimation.damped_least_squares import compute_jacobian, find_directions, inner_products
 from islands.estimation.parameter_constraints import constrain_model
 from islands.estimation.shooting_residual import make_residual
-from islands.models.dynamic_model import DynamicModel
+from islands.models.protocol import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.estimation.constrained_least_squares import null_space
-from islands.estimation.constraints.constraint import Constrained
+from islands.estimation.constraints.conditions import Constrained
 from islands.kernels.summation import dot
 from islands.simulation.outcome import EvaluationOutcome
 

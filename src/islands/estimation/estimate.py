@@ -8,7 +8,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.constraints.checks import check_constraints
-from islands.estimation.constraints.constraint import Constrained
+from islands.estimation.constraints.conditions import Constrained
 from islands.estimation.parameter_constraints import constraint
 from islands.expressions.tree import Lagged
 from islands.models.narx import Model, canonical_order

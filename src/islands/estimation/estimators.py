@@ -14,8 +14,8 @@ from islands.estimation.extended_least_squares import extended_least_squares
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import refine
 from islands.expressions.tree import Lagged
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, require_narx
+from islands.models.protocol import DynamicModel
 from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import EvaluationOutcome, Status
 

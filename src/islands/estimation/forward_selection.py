@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.estimation.constraints.constraint import Direction
+from islands.estimation.constraints.conditions import Direction
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.froe import froe
 from islands.models.narx import canonical_order

@@ -11,13 +11,13 @@ from types import MappingProxyType
 import numpy as np
 
 from islands.errors import SettingsError
-from islands.estimation.constraints.constraint import Constrained, Constraint
+from islands.estimation.constraints.conditions import Constrained, Constraint
 from islands.estimation.constraints.parser import parse_statements
 from islands.estimation.constraints.parts import ClusterSums, StaticGain, Symmetry
 from islands.expressions.tree import Expression
 from islands.models.clusters import OUTPUT_AT_REST, steady_state
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 #: Property 1 (the paper, section 3): with these sums every output is an equilibrium at constant input.

@@ -22,7 +22,7 @@ from islands.estimation.damped_least_squares import (
 )
 from islands.estimation.parameter_constraints import constrain_model
 from islands.estimation.shooting_residual import make_residual
-from islands.models.dynamic_model import DynamicModel
+from islands.models.protocol import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import multiple_shooting
 

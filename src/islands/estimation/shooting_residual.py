@@ -5,10 +5,10 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.kernels.simulate import DIVERGED, Layout, simulate
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 from islands.program.term_pool import link
-from islands.simulation.block_simulation import make_simulator
+from islands.simulation.blocks import make_simulator
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from islands.estimation.constraints.constraint import Constraint
+from islands.estimation.constraints.conditions import Constraint
 from islands.evolution.individual import make_regressor
 from islands.expressions.tree import Expression
 from islands.kernels.codegen import NodeArrays

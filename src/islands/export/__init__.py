@@ -21,8 +21,8 @@ from islands.export.languages.s_function import s_function_source
 from islands.io.models import model_json
 from islands.models.block import Block
 from islands.models.coupled_narx import CoupledModel
-from islands.models.dynamic_model import DynamicModel
 from islands.models.measured_signals import measured_block
+from islands.models.protocol import DynamicModel
 
 #: Models that can be exported.
 Exported: TypeAlias = DynamicModel | CoupledModel

@@ -21,8 +21,8 @@ from islands.evolution.individual import Individual, unique_structures
 from islands.evolution.problem import Problem
 from islands.evolution.search_result import rank_models
 from islands.evolution.settings import Settings
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, require_narx
+from islands.models.protocol import DynamicModel
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run, multiple_shooting

@@ -14,7 +14,7 @@ from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.class_fit import fit_class
 from islands.facade.library_fit import FitSettings
-from islands.facade.results.result import Result
+from islands.facade.results.identification import Result
 from islands.io.data_frames import read_data
 from islands.io.models import NARX
 from islands.io.result_folder import record_document

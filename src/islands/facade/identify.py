@@ -35,7 +35,7 @@ from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.final_models import estimate_candidates, select_final_models
-from islands.facade.results.result import Result
+from islands.facade.results.identification import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import make_trial_library

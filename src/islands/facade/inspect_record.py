@@ -13,19 +13,19 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.inspection.channel import channels
 from islands.inspection.column_roles import ColumnChoice, choose_columns
-from islands.inspection.record_facts import RecordFacts, measure_facts
-from islands.inspection.record_inspection import (
+from islands.inspection.findings import (
     MOST_ROWS,
     InspectedColumn,
     InspectedSampling,
     RecordInspection,
 )
+from islands.inspection.record_facts import RecordFacts, measure_facts
 from islands.inspection.stamp_regularity import NO_BREAKS, TimeStamps, describe_stamps
 from islands.io.records.column_names import find_column, split_structures
 from islands.io.records.preview import ColumnPreview, Preview, preview_table
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.sampling.sampling_time import time_scale
+from islands.io.records.sampling.time_step import time_scale
 from islands.io.records.table import Columns, Table
 from islands.io.records.table_reading import read_table
 from islands.io.records.validation import MIN_SAMPLES, check_choice

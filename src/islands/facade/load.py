@@ -11,8 +11,8 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.results.fitted_model import FittedModel
-from islands.facade.results.result import Result
-from islands.facade.results.saved_result import read_result
+from islands.facade.results.identification import Result
+from islands.facade.results.reader import read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
 from islands.io.models import read_coupled_model, read_model
 from islands.simulators.specification.code import FmuSpec

@@ -12,7 +12,7 @@ from islands.data.dataset import Dataset
 from islands.figures.diverging_lines import annotate_divergence, limits, within_reach
 from islands.figures.downsampling import downsample
 from islands.figures.style import FRAME, blank, finish, house_style, label
-from islands.models.dynamic_model import DynamicModel
+from islands.models.protocol import DynamicModel
 from islands.validation.physics import LEVELS, hold_response, percent_of_range
 
 #: Colours of the levels from lowest to highest, distinguishable for colour-blind readers and in grey print.

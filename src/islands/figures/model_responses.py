@@ -13,8 +13,8 @@ from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.figures.style import MEASURED, SIMULATED, blank, finish, house_style, label
-from islands.models.dynamic_model import DynamicModel
 from islands.models.operating_point import static_characteristic
+from islands.models.protocol import DynamicModel
 from islands.simulation.step_response import StepResponse, step_response
 
 #: Names of the figures of `draw_responses`.

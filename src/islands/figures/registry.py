@@ -18,7 +18,7 @@ from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop, draw_loop_panel
 from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
-from islands.models.dynamic_model import DynamicModel
+from islands.models.protocol import DynamicModel
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import Assessment, assess_residual
 from islands.validation.predictable_residual import ResidualStructure

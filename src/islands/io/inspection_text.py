@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from textwrap import wrap
 
 from islands.inspection.fact import Fact
-from islands.inspection.record_inspection import InspectedColumn, InspectedSampling, RecordInspection
+from islands.inspection.findings import InspectedColumn, InspectedSampling, RecordInspection
 
 #: Width of the text.
 WIDTH = 80

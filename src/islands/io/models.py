@@ -20,9 +20,9 @@ from islands.io.narx_documents import (
 )
 from islands.io.result_models import read_preprocessing
 from islands.models.coupled_narx import CoupledModel
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, require_narx
 from islands.models.parametric import ParametricModel
+from islands.models.protocol import DynamicModel
 
 #: Tag of NARX models.
 NARX = Model.kind

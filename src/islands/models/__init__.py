@@ -1,4 +1,4 @@
 """Models of a record: the protocol and the block that all classes have in common, NARX and parametric models.
 
-Read `dynamic_model` and `block` first, then `narx`.
+Read `protocol` and `block` first, then `narx`.
 """

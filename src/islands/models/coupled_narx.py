@@ -10,7 +10,6 @@ from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.expressions.tree import Apply, Expression, Lagged
 from islands.models.block import Block, BlockTerm
-from islands.models.dynamic_model import EquationText
 from islands.models.equations import (
     equation,
     latex_equation,
@@ -21,6 +20,7 @@ from islands.models.equations import (
     signal_names,
 )
 from islands.models.narx import Model, measured_model
+from islands.models.protocol import EquationText
 from islands.models.signal_statement import describe_values, join_statements, symbols
 
 

@@ -3,8 +3,8 @@
 from islands.errors import ModelError
 from islands.models.block import Block, subtract_offsets
 from islands.models.coupled_narx import CoupledModel, measured_coupled_model
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, measured_model
+from islands.models.protocol import DynamicModel
 
 
 def measured_block(model: DynamicModel | CoupledModel) -> Block:

@@ -12,7 +12,6 @@ from islands.expressions.primitives import SUB
 from islands.expressions.printing import plain
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, replace_leaves
 from islands.models.block import Block, BlockTerm
-from islands.models.dynamic_model import DynamicModel, ModelEquation
 from islands.models.equations import (
     equation,
     latex_equation,
@@ -21,6 +20,7 @@ from islands.models.equations import (
     named_term,
     plain_text,
 )
+from islands.models.protocol import DynamicModel, ModelEquation
 from islands.models.regressor import Regressor, regressor
 from islands.models.signal_statement import describe_values, symbols
 

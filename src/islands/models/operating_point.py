@@ -17,9 +17,9 @@ from islands.errors import ModelError
 from islands.expressions.derivatives import differentiate
 from islands.expressions.evaluation import value
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, remove_shifts, walk
-from islands.models.dynamic_model import DynamicModel
 from islands.models.equations import expressions_of_record, named_term, signal_names
 from islands.models.narx import Model, measured_model, require_narx
+from islands.models.protocol import DynamicModel
 
 #: Sums of parameters below this fraction of their absolute sum are zero except for rounding.
 _ROUNDING = 1e-9

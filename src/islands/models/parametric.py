@@ -25,8 +25,8 @@ from islands.expressions.printing import (
 )
 from islands.expressions.tree import Expression, Lagged, replace_leaves
 from islands.models.block import Block, BlockTerm
-from islands.models.dynamic_model import EquationText
 from islands.models.equations import latex_statement, mathml_statement, signal_names
+from islands.models.protocol import EquationText
 from islands.models.signal_statement import describe_signals, describe_values, symbols
 
 #: Significant digits of the parameters in the text of an equation.

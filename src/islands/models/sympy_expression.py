@@ -8,9 +8,9 @@ from islands.distribution import describe_missing_extra
 from islands.errors import ModelError
 from islands.expressions.primitives import LARGEST_EXPONENT
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift
-from islands.models.dynamic_model import DynamicModel
 from islands.models.equations import expressions_of_record, signal_names
 from islands.models.narx import require_narx
+from islands.models.protocol import DynamicModel
 
 if TYPE_CHECKING:
     import sympy

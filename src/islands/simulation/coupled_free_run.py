@@ -11,7 +11,7 @@ from islands.data.signal_map import map_signals, match_rate
 from islands.errors import RecordError, SettingsError
 from islands.kernels.summation import dot
 from islands.models.coupled_narx import CoupledModel
-from islands.simulation.block_simulation import BlockSimulator
+from islands.simulation.blocks import BlockSimulator
 from islands.simulation.layout import check_warm_up, find_intervals
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.predictors import divergence_bound

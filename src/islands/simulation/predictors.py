@@ -10,10 +10,10 @@ from islands.data.signal_map import map_signals
 from islands.errors import SettingsError
 from islands.kernels.simulate import Layout, simulate
 from islands.kernels.summation import dot, total
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 from islands.program.term_pool import link
-from islands.simulation.block_simulation import make_simulator
+from islands.simulation.blocks import make_simulator
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 

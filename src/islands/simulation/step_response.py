@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, require_narx
 from islands.models.operating_point import find_equilibrium
+from islands.models.protocol import DynamicModel
 from islands.simulation.predictors import BOUND, free_run
 
 #: Steps of the model before the step of the input, besides the largest lag.

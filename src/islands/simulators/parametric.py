@@ -13,7 +13,7 @@ from islands.effects.interface.force import sum_output_forces
 from islands.errors import ModelError
 from islands.models.block import Block, subtract_offsets
 from islands.models.parametric import ParametricModel
-from islands.simulation.block_simulation import BlockSimulator
+from islands.simulation.blocks import BlockSimulator
 from islands.simulators.interface import BatchSimulator, SimulationRun
 
 #: Typical change of a parameter, relative to its value.

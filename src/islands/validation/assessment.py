@@ -12,7 +12,7 @@ from islands.data.split import Split
 from islands.errors import RecordError
 from islands.estimation.constraints.checks import ConstraintCheck, check_constraints
 from islands.estimation.parameter_constraints import count_free_parameters
-from islands.models.dynamic_model import DynamicModel
+from islands.models.protocol import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.estimation.block_bootstrap import draw_parameters
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 from islands.simulation.predictors import free_run, free_runs
 
 #: Members of an ensemble, up to rounding.

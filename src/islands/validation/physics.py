@@ -16,8 +16,8 @@ from islands.estimation.parameter_constraints import PROPERTY_1
 from islands.expressions import printing
 from islands.kernels.characteristic_roots import converges
 from islands.models.clusters import OUTPUT_AT_REST, clusters
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 from islands.simulation.predictors import divergence_bound, free_run
 from islands.systems.signals import hold_signal, minor_loops, sine
 

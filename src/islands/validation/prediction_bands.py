@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError
-from islands.models.dynamic_model import DynamicModel
+from islands.models.protocol import DynamicModel
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import Ensemble, effective_samples
 

@@ -19,7 +19,7 @@ from islands.cli.stop_requests import stop_requests
 from islands.data.dataset import Dataset
 from islands.evolution.presets import PRESETS
 from islands.io.records import write_record
-from islands.models.dynamic_model import DynamicModel
+from islands.models.protocol import DynamicModel
 from islands.progress import Steps, StoppedError
 from islands.reproduction.published import estimate_again
 from islands.reproduction.searches import read_document, search_island

@@ -9,7 +9,7 @@ from islands.cli import options
 from islands.export import EXPORTS, FILE_EXPORTS
 from islands.facade.load import load
 from islands.facade.results.fitted_model import FittedModel
-from islands.facade.results.result import Result
+from islands.facade.results.identification import Result
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.models.equations import named_signals
 

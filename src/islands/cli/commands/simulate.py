@@ -22,8 +22,8 @@ from islands.errors import SettingsError
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.load import load
 from islands.facade.results.fitted_model import FittedModel
+from islands.facade.results.identification import Result
 from islands.facade.results.model_simulation import SHOOTING
-from islands.facade.results.result import Result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
 from islands.io.records import read_dataset, write_simulation
 from islands.io.records.reader import open_record

@@ -13,8 +13,8 @@ from islands.estimation.constraints.parts import (
 )
 from islands.estimation.parameter_constraints import constrain_model, constraint
 from islands.models.clusters import clusters
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 
 #: Tolerance of an equality, relative to its largest term and to its target.
 TOLERANCE = 1e-9

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.export.equations.extended_equations import NamedValue, SampledCore
+from islands.export.equations.extended_system import NamedValue, SampledCore
 from islands.export.equations.program_system import refuse
 from islands.expressions.primitives import ADD, MUL, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Symbol

@@ -19,7 +19,7 @@ from islands.facade.coupled.selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
 from islands.facade.fit import fit
 from islands.facade.identify import SearchCallback, identify
-from islands.facade.results.result import Result
+from islands.facade.results.identification import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.rate_selection import select_rate

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from islands.data.coupled_record import CoupledRecord
 from islands.export import export_or_write
-from islands.facade.results.result import Result
+from islands.facade.results.identification import Result
 from islands.io.models import model_json
 from islands.io.result_folder import record_document
 from islands.io.result_text.text_layout import term_table, wrap

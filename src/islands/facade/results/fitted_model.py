@@ -18,8 +18,8 @@ from islands.export import export_or_write
 from islands.facade.results.model_analysis import linearise
 from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
 from islands.facade.results.notebook_html import render_html
-from islands.models.dynamic_model import DynamicModel
 from islands.models.operating_point import static_characteristic
+from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
 from islands.models.sympy_expression import to_sympy
 from islands.simulation.outcome import EvaluationOutcome

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 
 from islands.distribution import describe_missing_extra
 from islands.errors import ModelError
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import require_narx
 from islands.models.operating_point import differentiate_model
+from islands.models.protocol import DynamicModel
 
 if TYPE_CHECKING:
     import control

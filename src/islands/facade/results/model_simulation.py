@@ -11,7 +11,7 @@ from islands.data.signal_map import match_rate
 from islands.errors import RecordError, SettingsError, lookup, suggest
 from islands.io.data_frames import as_record, column_names, states_time
 from islands.io.records.column_names import find_column
-from islands.models.dynamic_model import DynamicModel
+from islands.models.protocol import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, free_run, multiple_shooting
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from html import escape
 from typing import TYPE_CHECKING
 
-from islands.models.dynamic_model import DynamicModel
+from islands.models.protocol import DynamicModel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

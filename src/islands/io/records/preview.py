@@ -12,7 +12,7 @@ from islands.errors import RecordError
 from islands.io.records.column_names import split_structures, time_column
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.sampling.sampling_time import find_sampling
+from islands.io.records.sampling.time_step import find_sampling
 from islands.io.records.table import Columns, RowRange, Table
 from islands.io.records.validation import (
     MIN_SAMPLES,

@@ -11,7 +11,7 @@ from islands.io.records.column_names import find_column, split_structures, time_
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.sampling.recording import Recording, UniformRecording
 from islands.io.records.sampling.repair import make_uniform
-from islands.io.records.sampling.sampling_time import find_sampling, make_recording
+from islands.io.records.sampling.time_step import find_sampling, make_recording
 from islands.io.records.table import Table
 from islands.io.records.validation import (
     check_choice,

@@ -2,9 +2,9 @@
 
 from textwrap import fill
 
-from islands.models.dynamic_model import DynamicModel
 from islands.models.equations import signal_names
 from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 
 #: Largest number of characters of a line.
 WIDTH = 80

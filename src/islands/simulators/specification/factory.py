@@ -19,9 +19,9 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
 from islands.errors import ModelError, RecordError, SettingsError, lookup, suggest
 from islands.io.models import model_from_json
-from islands.models.dynamic_model import DynamicModel
 from islands.models.narx import Model, measured_model
 from islands.models.parametric import ParametricModel
+from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_values
 from islands.simulators.fmu.simulator import make_fmu_simulator
 from islands.simulators.interface import Simulator

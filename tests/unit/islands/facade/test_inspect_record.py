@@ -5,7 +5,7 @@ import pytest
 
 import islands
 from islands.errors import RecordError
-from islands.inspection.record_inspection import SCHEMA
+from islands.inspection.findings import SCHEMA
 from islands.io.inspection_text import WIDTH, format_inspection
 from islands.io.records.reading_options import ReadingOptions
 from support.known_records import delay, lag, measure, steps

@@ -15,7 +15,7 @@ from islands.io.checkpoints import history_document
 from islands.io.records import read_record
 from islands.io.records.preview import preview
 from islands.io.result_folder import result_document
-from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.main_loop import Coordinator
 from islands_service.domain.job import Job, Submission
 from islands_service.liveness import StopRequest
 from islands_service.settings import ServiceSettings

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import select, update
 
 from islands.errors import IslandsError, RecordError, SettingsError
-from islands_service.coordinator import coordinator as coordinator_module
+from islands_service.coordinator import main_loop as coordinator_module
 from islands_service.coordinator.job_failures import describe_interruption, is_newer, make_problem_document
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import ISLANDS_VERSION, Job, JobOutcome, JobState, Submission

@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 
 from islands_service.coordinator import job_engine
-from islands_service.coordinator.coordinator import Coordinator
 from islands_service.coordinator.heartbeat import Heartbeat
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.coordinator.job_run import JobRun
+from islands_service.coordinator.main_loop import Coordinator
 from islands_service.domain.job import IDENTIFICATION, Job, JobOutcome, JobState
 from islands_service.liveness import StopRequest
 from islands_service.settings import ServiceSettings
@@ -30,7 +30,7 @@ def test_metrics_count_attempts_outcomes_and_writes(
         return DONE
 
     replace_runner(monkeypatch, fail_once)
-    monkeypatch.setattr("islands_service.coordinator.coordinator.RETRY_BACKOFF", 0.01)
+    monkeypatch.setattr("islands_service.coordinator.main_loop.RETRY_BACKOFF", 0.01)
     stopping = StopRequest()
     coordinator = SerialCoordinator(settings, "me", stopping)
     thread = Thread(target=coordinator.run)

@@ -4,7 +4,7 @@ import pytest
 
 from islands.errors import SettingsError
 from islands_service.coordinator import job_engine
-from islands_service.coordinator.coordinator import make_problem_document
+from islands_service.coordinator.main_loop import make_problem_document
 from islands_service.domain.job_memory import (
     ACTOR_BYTES,
     COORDINATOR_BYTES,

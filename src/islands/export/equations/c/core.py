@@ -3,9 +3,9 @@
 from functools import partial
 
 from islands.export.equations.c.signals import find_unused
-from islands.export.equations.equation_code import EquationCode
-from islands.export.equations.extended_equations import SampledCore
+from islands.export.equations.extended_system import SampledCore
 from islands.export.equations.sampled_core import MEASURED, RECORDED
+from islands.export.equations.statements import EquationCode
 from islands.export.languages.c import c_name, define_functions
 from islands.models.block import Block
 

@@ -22,9 +22,9 @@ from islands.export.equations.c.templates import (
     SAMPLED_FUNCTIONS,
     STEP,
 )
-from islands.export.equations.equation_code import EquationCode, make_step
-from islands.export.equations.equation_collection import CHANNEL_OPERATORS
-from islands.export.equations.extended_equations import ExtendedEquations, SignalMap
+from islands.export.equations.collection import CHANNEL_OPERATORS
+from islands.export.equations.extended_system import ExtendedEquations, SignalMap
+from islands.export.equations.statements import EquationCode, make_step
 from islands.expressions.printing import render
 from islands.expressions.tree import Symbol
 from islands.simulators.ode.output_system import SIMULATED

@@ -4,8 +4,8 @@ import re
 import textwrap
 from collections.abc import Sequence
 
-from islands.export.equations.equation_code import EquationCode
-from islands.export.equations.extended_equations import ExtendedEquations
+from islands.export.equations.extended_system import ExtendedEquations
+from islands.export.equations.statements import EquationCode
 from islands.expressions.printing import render
 from islands.expressions.tree import RATE, Apply, Expression, Symbol
 from islands.simulators.intersample import REACH, design_low_pass

@@ -1,6 +1,6 @@
 """Parts of a C program of an extended simulation."""
 
-#: Definitions of the functions in `islands.export.equations.equation_code.DEFINED`.
+#: Definitions of the functions in `islands.export.equations.statements.DEFINED`.
 DEFINITIONS = {
     "less": "static double less(double a, double b) { return a < b ? 1.0 : 0.0; }",
     "less_equal": "static double less_equal(double a, double b) { return a <= b ? 1.0 : 0.0; }",

@@ -1,8 +1,8 @@
 """Simulations in discrete time in MATLAB."""
 
-from islands.export.equations.equation_code import EquationCode
-from islands.export.equations.extended_equations import SampledCore
+from islands.export.equations.extended_system import SampledCore
 from islands.export.equations.sampled_core import MEASURED, RECORDED
+from islands.export.equations.statements import EquationCode
 from islands.export.languages.matlab import matlab_definition, matlab_name
 from islands.models.block import Block
 

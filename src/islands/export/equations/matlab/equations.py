@@ -3,9 +3,8 @@
 import re
 
 from islands.data.segments import MAX_RANGE_AT_REST
-from islands.export.equations.equation_code import EquationCode, make_step
-from islands.export.equations.equation_collection import CHANNEL_OPERATORS
-from islands.export.equations.extended_equations import ExtendedEquations, SignalMap
+from islands.export.equations.collection import CHANNEL_OPERATORS
+from islands.export.equations.extended_system import ExtendedEquations, SignalMap
 from islands.export.equations.matlab.core import write_matlab_core
 from islands.export.equations.matlab.operators import MATLAB_OPERATORS
 from islands.export.equations.matlab.signals import write_matlab_signals
@@ -21,6 +20,7 @@ from islands.export.equations.matlab.templates import (
     MOVE,
     SAMPLED_LOOP,
 )
+from islands.export.equations.statements import EquationCode, make_step
 from islands.expressions.tree import Symbol
 from islands.simulators.ode.output_system import SIMULATED
 

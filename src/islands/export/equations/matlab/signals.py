@@ -1,7 +1,7 @@
 """Signals between the samples in MATLAB: the input, its gain, channels, their rates and delays."""
 
-from islands.export.equations.equation_code import EquationCode
-from islands.export.equations.extended_equations import ExtendedEquations
+from islands.export.equations.extended_system import ExtendedEquations
+from islands.export.equations.statements import EquationCode
 from islands.expressions.printing import render
 from islands.expressions.tree import RATE, Apply, Expression, Symbol
 from islands.simulators.intersample import REACH, design_low_pass

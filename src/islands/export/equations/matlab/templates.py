@@ -1,6 +1,6 @@
 """Parts of a MATLAB program of an extended simulation."""
 
-#: Definitions of the functions in `islands.export.equations.equation_code.DEFINED`, and of functions that
+#: Definitions of the functions in `islands.export.equations.statements.DEFINED`, and of functions that
 #: are NaN where those of MATLAB are complex.
 DEFINITIONS = {
     "less": "function r = less(a, b)\n  r = double(a < b);\nend\n",

@@ -14,7 +14,7 @@ from islands.errors import ModelError, RecordError, SettingsError
 from islands.facade.coupled.identification import fit_coupled, identify_coupled
 from islands.facade.coupled.selection import measure_error
 from islands.facade.load import load
-from islands.facade.results.saved_result import read_result
+from islands.facade.results.reader import read_result
 from islands.simulation.coupled_free_run import coupled_free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures

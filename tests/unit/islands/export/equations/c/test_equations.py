@@ -13,7 +13,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Site
 from islands.effects.interface.map_equation import OPERATORS
 from islands.export.equations.c.operators import C_OPERATORS
-from islands.export.equations.equation_collection import CHANNEL_OPERATORS
+from islands.export.equations.collection import CHANNEL_OPERATORS
 from islands.export.equations.matlab.operators import MATLAB_OPERATORS
 from islands.export.extension import export_extended
 from islands.export.fmu.compiler import find_compiler

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import ModelError, SettingsError
 from islands.evolution.search_result import SearchResult
+from islands.facade.results.comparison import ResultComparison, compare_models
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
-from islands.facade.results.result_comparison import ResultComparison, compare_models
 from islands.io.result_folder import content_sha256, write_result
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.summary_text import summary

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from islands.export.equations.common_parts import take_common_parts
-from islands.export.equations.extended_equations import ExtendedEquations
+from islands.export.equations.extended_system import ExtendedEquations
 from islands.export.equations.identifiers import make_identifiers
 from islands.expressions.primitives import POW
 from islands.expressions.printing import EQUATION_OPERATORS, ProgramPrinter, render

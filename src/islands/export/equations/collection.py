@@ -12,7 +12,7 @@ from islands.effects.channels import TEMPERATURES
 from islands.effects.interface.effect import Effect, ForceLaw, SimulationContext, Site
 from islands.effects.time_variation import GAIN_EFFECTS
 from islands.errors import ModelError
-from islands.export.equations.extended_equations import (
+from islands.export.equations.extended_system import (
     ExtendedEquations,
     NamedValue,
     OutputForce,

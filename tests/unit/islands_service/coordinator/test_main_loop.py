@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from islands_service.coordinator import coordinator as coordinator_module
+from islands_service.coordinator import main_loop as coordinator_module
 from islands_service.coordinator import sweeper as sweeper_module
-from islands_service.coordinator.coordinator import Coordinator
 from islands_service.coordinator.job_run import JobRun
+from islands_service.coordinator.main_loop import Coordinator
 from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
@@ -154,7 +154,7 @@ def test_unavailable_store_during_a_job_is_not_an_attempt(
             raise StoreUnavailableError("the database does not answer")
         return DONE
 
-    monkeypatch.setattr("islands_service.coordinator.coordinator.RETRY_SECONDS", 0.01)
+    monkeypatch.setattr("islands_service.coordinator.main_loop.RETRY_SECONDS", 0.01)
     replace_runner(monkeypatch, work)
     coordinator()
     ended = wait_until_finished(store, job)
@@ -340,7 +340,7 @@ WAITING = """
 import sys, time
 from pathlib import Path
 from islands_service.liveness import StopRequest
-from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.main_loop import Coordinator
 from islands_service.coordinator.job_run import JobRun
 from islands_service.settings import ServiceSettings
 class Waiting(Coordinator):
@@ -355,7 +355,7 @@ import sys, time
 from pathlib import Path
 from islands_service.liveness import StopRequest
 from islands_service.coordinator import heartbeat
-from islands_service.coordinator.coordinator import Coordinator
+from islands_service.coordinator.main_loop import Coordinator
 from islands_service.coordinator.job_run import JobRun
 from islands_service.settings import ServiceSettings
 heartbeat.HANG_TIMEOUT = 0.3

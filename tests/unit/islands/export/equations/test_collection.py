@@ -3,7 +3,7 @@
 import pytest
 
 from islands.errors import ModelError, SettingsError
-from islands.export.equations.equation_collection import collect_equations
+from islands.export.equations.collection import collect_equations
 from islands.export.extension import EXTENDED_EXPORTS, export_extended
 from islands.simulators.specification.table import LocalExtendedSpec
 from support.simulated_records import DT, MODEL

@@ -11,11 +11,11 @@ from islands.errors import ModelError
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.facade.results.fitted_model import FittedModel
-from islands.facade.results.result import Result
+from islands.facade.results.identification import Result
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import read_model, terms_document
 from islands.io.result_models import check_single_output, read_shooting_interval
-from islands.models.dynamic_model import DynamicModel
+from islands.models.protocol import DynamicModel
 from islands.validation.metrics import Metrics
 from islands.validation.recommendation import Recommendation
 
