@@ -81,8 +81,9 @@ def test_a_model_of_deviations_reads_the_record_as_measured(record):
     assert model.preprocessing.output_offset == pytest.approx(record.y.mean())
     error = (free_run(model, record).y - record.y)[1:]
     assert np.sqrt(np.mean(error**2)) < 0.1
-    module = {}
-    exec(export(model, "python"), module)
+    module, program = {}, export(model, "python")
+    assert f"where y is the deviation from {model.preprocessing.output_offset:.8g} K" in program
+    exec(program, module)
     found = module["simulate"](record.u[:, 0].tolist(), record.y[:1].tolist())
     np.testing.assert_allclose(found[1:], free_run(model, record).y[1:], rtol=1e-12)
 

@@ -1,10 +1,13 @@
 """Block of the signals as measured: the offsets of the preprocessing are in the equations."""
 
+from dataclasses import replace
+
 from islands.errors import ModelError
 from islands.models.block import Block, subtract_offsets
 from islands.models.coupled_narx import CoupledModel, measured_coupled_model
 from islands.models.narx import Model, measured_model
 from islands.models.protocol import DynamicModel
+from islands.models.signal_statement import describe_signals
 
 
 def measured_block(model: DynamicModel | CoupledModel) -> Block:
@@ -22,4 +25,9 @@ def measured_block(model: DynamicModel | CoupledModel) -> Block:
             return measured_model(model).block()
         case CoupledModel():
             return measured_coupled_model(model).block()
-    return subtract_offsets(model.block(), model.preprocessing)
+    block = model.block()
+    found = subtract_offsets(block, model.preprocessing)
+    # The text of the equations is in deviations, so that it states which.
+    return (
+        block if found is block else replace(found, texts=(*block.texts, f"where {describe_signals(model)}"))
+    )
