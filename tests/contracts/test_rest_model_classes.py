@@ -12,6 +12,7 @@ from islands_service.coordinator.identification_job import run_identification_jo
 from islands_service.domain.job import REPORT, JobState
 from islands_service.figure_worker import read_search_result, render_figures, render_model_figures
 from islands_service.store.blobs import Blobs
+from support.command_line import succeed
 from support.gain_scheduled import TRUE, GainScheduledModel, make_record
 from support.job_runs import make_run
 from support.stores import LONG, taken
@@ -44,6 +45,7 @@ def test_a_job_of_a_class_has_the_model_and_its_exports(service, dataset):
         drawn = render_model_figures(rebuilt, model.rank)
         assert {"1/free-run.svg", "1/free-run.json"} <= drawn.keys()
         assert b"x1(k)" in render_figures(stored, rebuilt)[REPORT]
+        assert "slope = -0." in succeed("jobs", "watch", job.id, "--url", service.url)
         # The model is a simulation of a diagnosis.
         simulation = {"kind": "model", "model": document}
         assert client.diagnose(dataset, "u_V", "y_K", simulation).state == JobState.QUEUED

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from islands.cli.console import output
 from islands.cli.progress_display import progress
-from islands.io.models import narx_from_json
+from islands.io.models import model_from_json
 from islands.io.result_text.model_table import LEGEND, MARK
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.simulators.specification.table import EXTENDED_FILE
@@ -132,7 +132,7 @@ def _describe_recommended(client: Client, job: JobView, models: Sequence[ModelVi
         return
     # Results of earlier versions recommend no model.
     rank = next((model.rank for model in models if model.recommended), 1)
-    terms = term_table(narx_from_json(client.export(job.id, rank, "json"), f"model {rank}"))
+    terms = term_table(model_from_json(client.export(job.id, rank, "json"), f"model {rank}"))
     # Results of earlier versions have no sentences. The second one is the equation in one line.
     words = str((job.summary or {}).get("words", "")).splitlines()
     choice, sentences = "".join(words[:1]), words[2:]
