@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.coupled_record import CoupledRecord
-from islands.estimation.damped_least_squares import find_directions, minimise
+from islands.estimation.damped_least_squares import Residual, find_directions, minimise
 from islands.estimation.parameter_constraints import constrain_model
 from islands.models.coupled_narx import CoupledModel
 from islands.simulation.coupled_free_run import CoupledSimulator
@@ -69,7 +69,7 @@ def refine_coupled(
     return model.with_parameters(found.theta.tolist()) if found.steps else None
 
 
-class _CoupledResidual:
+class _CoupledResidual(Residual):
     """Simulation error of all outputs, each divided by its range, as a function of the parameters."""
 
     def __init__(
@@ -85,9 +85,6 @@ class _CoupledResidual:
             return None
         known = ~np.isnan(simulated.y[:, 0])
         return np.ascontiguousarray(((simulated.y - self._y)[known] / self._scale).T).reshape(-1)
-
-    def evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
-        return [self(theta) for theta in thetas]
 
 
 def _find_directions(model: CoupledModel, constraints: str) -> NDArray[np.float64] | None:

@@ -4,7 +4,7 @@ The steps are restricted to directions along which the constraints on the parame
 products are summed in a written order, so that a result has the same bits on every number of threads.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -30,8 +30,9 @@ class Residual(Protocol):
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return simulation minus measurement, shape (samples,); None after a divergence."""
 
-    def evaluate(self, thetas: NDArray[np.float64]) -> Sequence[NDArray[np.float64] | None]:
+    def evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
         """Return the residual of each of several parameter vectors, shape (vectors, terms)."""
+        return [self(theta) for theta in thetas]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

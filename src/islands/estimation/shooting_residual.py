@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.estimation.damped_least_squares import Residual
 from islands.kernels.simulate import DIVERGED, Layout, simulate
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
@@ -13,7 +14,7 @@ from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound
 
 
-class ShootingResidual:
+class ShootingResidual(Residual):
     """The multiple-shooting residual of a model as a function of its parameters.
 
     Parameters
@@ -52,12 +53,8 @@ class ShootingResidual:
         # The memory of other samples is not initialised: differences of it may overflow.
         return predicted[self._predicted] - self._y[self._predicted]
 
-    def evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
-        """Return the residual of each of several parameter vectors, shape (vectors, terms)."""
-        return [self(theta) for theta in thetas]
 
-
-class BlockResidual:
+class BlockResidual(Residual):
     """The simulation error of the block of a model as a function of its parameters.
 
     Parameters
@@ -89,5 +86,6 @@ def make_residual(
     model: DynamicModel, record: Dataset, interval: int | None, warm_up: int | None
 ) -> ShootingResidual | BlockResidual:
     """Return the multiple-shooting residual of a model of any class; see `ShootingResidual`."""
-    kind = ShootingResidual if isinstance(model, Model) else BlockResidual
-    return kind(model, record, interval, warm_up)  # type: ignore[arg-type]
+    if isinstance(model, Model):
+        return ShootingResidual(model, record, interval, warm_up)
+    return BlockResidual(model, record, interval, warm_up)

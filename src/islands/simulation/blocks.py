@@ -86,28 +86,29 @@ class BlockSimulator:
             found[start : start + length] = True
         return found
 
-    def remove_diverged(self, y: NDArray[np.float64], bound: float) -> int | None:
-        """Set one output to NaN from a divergence to the end of its interval.
+    def remove_diverged(self, y: NDArray[np.float64], bounds: Sequence[float]) -> tuple[int, int] | None:
+        """Set all outputs to NaN from the divergence of one to the end of its interval.
 
         Parameters
         ----------
-        y : ndarray, shape (samples,)
-        bound : float
-            A prediction with a larger absolute value has diverged.
+        y : ndarray, shape (outputs, samples)
+        bounds : sequence of float
+            A prediction of an output with a larger absolute value has diverged.
 
         Returns
         -------
-        int or None
-            First diverged sample; None if there is none.
+        (int, int) or None
+            First diverged sample, and its output; None if there is none.
         """
+        limits = np.array(bounds)[:, None]
         failures = []
         for start, length in zip(self._start, self._length, strict=True):
-            run = y[start : start + length]
-            outside = ~(np.abs(run) <= bound)
+            run = y[:, start : start + length]
+            outside = ~(np.abs(run) <= limits)
             if outside.any():
-                first = int(np.argmax(outside))
-                failures.append(int(start) + first)
-                run[first:] = np.nan
+                first = int(np.argmax(outside.any(axis=0)))
+                failures.append((int(start) + first, int(np.argmax(outside[:, first]))))
+                run[:, first:] = np.nan
         return min(failures, default=None)
 
     def _run(self, parameters: NDArray[np.float64], lanes: Sequence[tuple[int, int]]) -> NDArray[np.float64]:

@@ -76,27 +76,21 @@ class CoupledSimulator:
         if interval is not None and interval < 1:
             raise SettingsError(f"a shooting interval has at least 1 sample, got {interval}")
         self._y = record.y
-        self._start, self._length = find_intervals(record.records[0], self._warm_up, interval)
+        start, length = find_intervals(record.records[0], self._warm_up, interval)
         for each in record.records:
-            check_warm_up(each.y, self._start, self._warm_up)
+            check_warm_up(each.y, start, self._warm_up)
         self._bounds = [divergence_bound(each) for each in record.records]
         self._simulate = BlockSimulator(
-            model.block(), self._y.T, record.records[0].u.T, self._start, self._length, self._warm_up
+            model.block(), self._y.T, record.records[0].u.T, start, length, self._warm_up
         )
 
     def __call__(self, theta: NDArray[np.float64]) -> CoupledSimulation:
         """Simulate with the parameters of all equations, one after the other."""
-        predicted = np.ascontiguousarray(self._simulate(theta[None])[0].T)
-        failures = []
-        for start, length in zip(self._start, self._length, strict=True):
-            run = predicted[start : start + length]
-            outside = ~(np.abs(run) <= self._bounds)
-            if outside.any():
-                first = int(np.argmax(outside.any(axis=1)))
-                failures.append((int(start) + first, int(np.argmax(outside[first]))))
-                run[first:] = np.nan
-        if failures:
-            sample, output = min(failures)
+        runs = self._simulate(theta[None])[0]
+        failed = self._simulate.remove_diverged(runs, self._bounds)
+        predicted = np.ascontiguousarray(runs.T)
+        if failed:
+            sample, output = failed
             reason = f"|y{output + 1}| left {self._bounds[output]:.3g} at sample {sample}"
             outcome = EvaluationOutcome(Status.DIVERGED, reason)
             return CoupledSimulation(predicted + self._offsets, (np.inf,) * self._y.shape[1], outcome)

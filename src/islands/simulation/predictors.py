@@ -119,8 +119,9 @@ def _simulate_block(
     """Simulate the block of a model; ``offset`` is added to its output."""
     simulate_record = make_simulator(model.block(), record, interval, warm_up)
     predicted = simulate_record(np.array([model.parameters]))[0, 0]
-    sample = simulate_record.remove_diverged(predicted, bound)
-    if sample is not None:
+    failed = simulate_record.remove_diverged(predicted[None], [bound])
+    if failed:
+        sample, _ = failed
         reason = f"|y| left {bound:.3g} at sample {sample}"
         return Simulation(predicted + offset, np.inf, EvaluationOutcome(Status.DIVERGED, reason))
     error = (predicted - record.y)[simulate_record.predicted]
@@ -158,7 +159,7 @@ def free_runs(
         bound = divergence_bound(record)
         predicted = simulate_record(thetas)[:, 0]
         for run in predicted:
-            simulate_record.remove_diverged(run, bound)
+            simulate_record.remove_diverged(run[None], [bound])
         return predicted + offset
     program, cut, bound = link(model.regressors), layout(record, warm_up), divergence_bound(record)
     squared_error, diverged = np.empty(len(cut.start)), np.empty(len(cut.start), np.int64)

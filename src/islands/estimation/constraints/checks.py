@@ -58,7 +58,6 @@ def check_constraints(model: DynamicModel, constraints: str) -> tuple[Constraint
     SettingsError
         A statement cannot be read, or there is one for a model that is not a NARX model.
     """
-    constrain_model(model, constraints)
     if not isinstance(model, Model):
         constrain_model(model, constraints)
         return ()
