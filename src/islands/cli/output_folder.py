@@ -8,11 +8,15 @@ from islands.cli.console import output
 from islands.errors import SettingsError
 
 if TYPE_CHECKING:
+    from islands.facade.coupled.result import CoupledResult
     from islands.facade.results.identification import Result
 
 
 #: Files of a result in its folder.
 RESULT_FILES = "result.json, models/, figures/, summary.txt, method.txt"
+
+#: Files of a result of several outputs.
+COUPLED_FILES = "result.json, model.json, summary.txt, figures/, outputs/ (the result of each output)"
 
 
 def check_folder(folder: Path, force: bool, result: str = "result.json") -> None:
@@ -33,7 +37,8 @@ def check_folder(folder: Path, force: bool, result: str = "result.json") -> None
         raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
 
 
-def show_result(result: "Result", folder: Path) -> None:
+def show_result(result: "Result | CoupledResult", folder: Path) -> None:
     """Print the summary and the files of a result."""
     output.print(str(result), markup=False)
-    output.print(f"{folder}/: {RESULT_FILES}", markup=False)
+    files = COUPLED_FILES if hasattr(result, "ranks") else RESULT_FILES
+    output.print(f"{folder}/: {files}", markup=False)

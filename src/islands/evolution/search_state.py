@@ -2,12 +2,14 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, Caches
+from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.history import HistoryPoint
+from islands.evolution.island import Island
 from islands.evolution.settings import Settings
 
 
@@ -29,6 +31,8 @@ class SearchState:
         kept, so that the history of a long run stays short.
     caches : mapping
         Bytes in use and byte limit of each cache, by name.
+    earlier : tuple of SearchState
+        Searches of the outputs before this one; empty for one output.
     """
 
     archipelago: Archipelago
@@ -37,6 +41,7 @@ class SearchState:
     outcomes: Mapping[str, int] = field(default_factory=dict)
     history: tuple[HistoryPoint, ...] = ()
     caches: Caches = field(default_factory=dict)
+    earlier: tuple["SearchState", ...] = ()
 
 
 def advance(state: SearchState, epoch: ArchipelagoEpoch) -> SearchState:
@@ -63,6 +68,14 @@ def advance(state: SearchState, epoch: ArchipelagoEpoch) -> SearchState:
 
 def _has_equal_fitness(one: HistoryPoint, other: HistoryPoint) -> bool:
     return one.best == other.best and one.islands == other.islands
+
+
+def keep_hall(state: SearchState) -> SearchState:
+    """Return the state of a search that has ended without its populations, which nothing reads any more."""
+    first, *others = state.archipelago.islands
+    kept = Island(first.index, first.seed, first.generation, (), (), state.archipelago.hall_of_fame)
+    empty = [Island(each.index, each.seed, each.generation, (), (), HallOfFame()) for each in others]
+    return replace(state, archipelago=Archipelago((kept, *empty)))
 
 
 def stop_reason(state: SearchState, settings: Settings) -> str:

@@ -14,7 +14,7 @@ from islands.cli.preprocessing_options import with_preprocessing_options
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.record_options import with_reading_options
 from islands.cli.recordings import Recordings, measured_names
-from islands.cli.runs.coupled import couple_data, coupled_options, join_columns, keep_coupled
+from islands.cli.runs.coupled import couple_data, coupled_options, join_columns, search_outputs
 from islands.cli.stop_requests import REPEAT, stop_requests
 from islands.data.averaging import AUTO
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
@@ -134,17 +134,18 @@ def fit(
             "progress": show,
             "stop": stop,
         }
+        result: islands.Result | islands.CoupledResult
         if len(outputs) > 1:
             if given.pop("model") != NARX:
                 raise SettingsError(f"--model {model} is for one output: leave it out")
             if dead_time:
                 raise SettingsError("--dead-time is for one output: leave it out")
             given["library"] = SEVERAL_OUTPUTS if library == AUTO else library
-            pair = couple_data(data, held_out, len(outputs), steps, names)
-            fit_all = partial(islands.fit_coupled, pair[0], validation=pair[1], **coupled_options(given))
-            stop.end(out, keep_coupled(fit_all, out, show, stop)[1], REPEAT)
-            return
-        result = islands.fit(data, validation=held_out, **given)
+            record, held = couple_data(data, [held_out], len(outputs), steps, names)
+            fit_all = partial(islands.fit_coupled, record, validation=held, **coupled_options(given))
+            result = search_outputs(fit_all, out, stop)
+        else:
+            result = islands.fit(data, validation=held_out, **given)
         result = result.with_wall_time(perf_counter() - began)
         show("figures", 1.0)
         drawing = Steps(stop=stop)

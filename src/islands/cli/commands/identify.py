@@ -11,14 +11,12 @@ from islands.cli.engines import ENGINES
 from islands.cli.output_folder import check_folder
 from islands.cli.preprocessing_options import with_preprocessing_options
 from islands.cli.record_options import with_reading_options
-from islands.cli.recordings import Recordings, measured_names
-from islands.cli.runs.coupled import couple_data, identify_several, join_columns
-from islands.cli.runs.identify import RunOptions, load_run, read_parts, run
+from islands.cli.runs.coupled import join_columns
+from islands.cli.runs.identify import RunOptions, load_run, run
 from islands.cli.search_options import DEFAULTS, SearchOptions, with_search_options
-from islands.data.coupled_record import CoupledRecord
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError, lookup
-from islands.evolution.presets import AUTO, resolve_settings
+from islands.evolution.presets import AUTO
 from islands.io.records import fingerprint
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 
@@ -94,21 +92,7 @@ def identify(
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
         check_folder(out, force)
         names, output_column = join_columns(options.columns(inputs), outputs)
-        if len(outputs) > 1:
-            if wall_time is not None:
-                raise SettingsError("--wall-time is for one output: leave it out")
-            preset = COUPLED_PRESET if search.preset == AUTO else search.preset
-            lag = resolve_settings(preset, search.changes).maximum_lag
-            recordings = Recordings(records, measured_names(names, steps), output_column, dt, reading)
-            data, held_out, test_data = read_parts(recordings, rows, validation, test, lag)
-            coupled = couple_data(data, held_out, len(outputs), steps, names)
-            tested: CoupledRecord | None = None
-            if test_data is not None:
-                _, others = couple_data(data, test_data, len(outputs), steps, names)
-                assert isinstance(others, CoupledRecord), "the test data are no fraction"
-                tested = others
-            identify_several(run_options, out, coupled, preset, search.seed, search.changes, tested)
-            return
+        several = len(outputs) > 1
         paths = [str(path.resolve()) for path in records]
         given = {"validation": validation, "test": test}
         files = {
@@ -121,11 +105,12 @@ def identify(
             "sha256": {path: fingerprint(path) for path in (*paths, *files.values())},
             "inputs": names,
             "output": output_column,
+            **({"outputs": len(outputs)} if several else {}),
             "dt": dt,
             "rows": rows,
             "reading": reading.changes(),
             "preprocessing": asdict(steps),
-            "preset": search.preset,
+            "preset": COUPLED_PRESET if several and search.preset == AUTO else search.preset,
             "seed": search.seed,
             "changes": dict(search.changes),
         }

@@ -1,28 +1,27 @@
 """Run of ``islands identify`` in its folder: record, search, checkpoints, result."""
 
-import json
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
-from math import inf, isfinite
+from dataclasses import dataclass
+from functools import partial
+from math import inf
 from pathlib import Path
 from time import monotonic, perf_counter
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 import islands
 from islands.cli.console import errors, output, print_message
 from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
 from islands.cli.output_folder import show_result
 from islands.cli.progress_display import Display, compile_kernels, progress
-from islands.cli.recordings import Recordings
+from islands.cli.recordings import Recordings, measured_names
+from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
+from islands.cli.runs.held_out_test import TEST, evaluate_test
 from islands.cli.runs.timed_engine import TimedEngine
 from islands.cli.search_progress import search_progress
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands.data.compatibility import match_record
+from islands.data.coupled_record import CoupledRecord
 from islands.data.preprocessing_steps import PreprocessingSteps
-from islands.data.signal_map import match_rate
 from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
@@ -40,16 +39,12 @@ from islands.io.checkpoints import (
 from islands.io.records import fingerprint
 from islands.io.records.reading_options import ReadingOptions
 from islands.progress import Steps
-from islands.validation.metrics import metrics
 
 #: File of the search state.
 CHECKPOINT = "checkpoint.json"
 
 #: File of the hall of fame.
 HALL = "hall.json"
-
-#: File of the metrics on the test data.
-TEST = "test.json"
 
 #: Least seconds between two checkpoints: the work that a crash may lose.
 CHECKPOINT_SECONDS = 10.0
@@ -118,7 +113,7 @@ def run(
             # signal that arrives while Ray ends does not discard the result.
             stop = handlers.enter_context(stop_requests())
             until = inf if run_options.wall_time is None else monotonic() + run_options.wall_time
-            engine = TimedEngine(started, until)
+            engine = TimedEngine(started, until, job.get("outputs", 1))
             if state is None:
                 # Delete the files of an earlier run.
                 for name in (CHECKPOINT, HALL, TEST):
@@ -129,18 +124,20 @@ def run(
                 # Checkpoints contain the job, so a resumed run does not choose again.
                 job = {**job, "choice": preset.to_document()}
             checkpoints = _CheckpointWriter(folder, job, show, state, spent)
-            arguments: dict[str, Any] = {"preset": preset, "seed": job["seed"], **job["changes"]}
             began = perf_counter() - spent
             try:
-                result = islands.identify(
+                result = _search(
                     data,
+                    folder,
+                    job["changes"],
                     validation=held_out,
                     start=state,
                     progress=show,
                     on_epoch=checkpoints,
                     stop=stop,
                     engine=engine,
-                    **arguments,
+                    preset=preset,
+                    seed=job["seed"],
                 )
             finally:
                 # Also after an engine failure, so that no finished epoch is lost.
@@ -149,15 +146,33 @@ def run(
             show("figures", 1.0)
             drawing = Steps(stop=stop)
             result.save(folder, drawing)
-        if not stop() and result.search_result.search.ended_by == "stopped":
+        results = result.results if isinstance(result, islands.CoupledResult) else (result,)
+        searches = [each.search_result.search for each in results]
+        if not stop() and any(each.ended_by == "stopped" for each in searches):
             _print_limit(run_options, folder)
         show_result(result, folder)
         if run_options.verbose:
-            for name, (size, limit) in result.search_result.search.caches.items():
-                output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
+            for each in searches:
+                for name, (size, limit) in each.caches.items():
+                    output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
         if test_data is not None:
-            _evaluate_test(result, test_data, folder)
-        stop.end(folder, (*result.left_out, *drawing.left_out), f"continue with --resume {folder}")
+            evaluate_test(result, test_data, folder)
+        stop.end(folder, (*result.left_out, *drawing.left_out), _explain_continuation(folder))
+
+
+def _search(
+    data: islands.Dataset | CoupledRecord, folder: Path, changes: dict[str, Any], **arguments: Any
+) -> islands.Result | islands.CoupledResult:
+    """Search one or several outputs."""
+    if isinstance(data, islands.Dataset):
+        return islands.identify(data, **arguments, **changes)
+    search = partial(islands.identify_coupled, data, **arguments, **coupled_options(changes))
+    return search_outputs(search, folder, arguments["stop"], partial(_explain_continuation, folder))
+
+
+def _explain_continuation(folder: Path) -> str:
+    """Say how to get the complete result. A run has no checkpoint before its first epoch."""
+    return f"continue with --resume {folder}" if (folder / CHECKPOINT).exists() else REPEAT
 
 
 def _print_limit(run_options: RunOptions, folder: Path) -> None:
@@ -170,8 +185,8 @@ def _print_limit(run_options: RunOptions, folder: Path) -> None:
 
 
 def _choose_preset(
-    data: islands.Dataset,
-    held_out: islands.Dataset | float,
+    data: Any,
+    held_out: Any,
     job: dict[str, Any],
     show: Display,
     stop: StopRequests,
@@ -200,31 +215,7 @@ def _resolve_possible(job: dict[str, Any]) -> tuple[Settings, ...]:
     return (resolve_settings(job["preset"], job["changes"]),)
 
 
-def _evaluate_test(result: islands.Result, test_data: islands.Dataset, folder: Path) -> None:
-    """Simulate the recommended model on the test data; print and write the metrics."""
-    test_data = match_rate(result.best.model, test_data)
-    simulated = result.best.simulate(test_data)
-    numbers, text = compute_errors(test_data, simulated.y if simulated.outcome else None)
-    document = {"outcome": str(simulated.outcome), **numbers}
-    (folder / TEST).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    output.print(f"test data, not used before: free run {simulated.outcome}{text}", markup=False)
-
-
-def compute_errors(
-    record: islands.Dataset, y: NDArray[np.float64] | None
-) -> tuple[dict[str, float | None], str]:
-    """Return the metrics of a simulation as JSON values and as text; both are empty if y is None."""
-    if y is None:
-        return {}, ""
-    found = metrics(record.y, y)
-    numbers = {name: value if isfinite(value) else None for name, value in asdict(found).items()}
-    text = f", MAPE {found.mape:.4f} %, R2 {found.r2:.5f}, RMSE {found.rmse:.6g} {record.output_unit}"
-    return numbers, text.rstrip()
-
-
-def _read_data(
-    job: dict[str, Any], lag: int
-) -> tuple[islands.Dataset, islands.Dataset | float, islands.Dataset | None]:
+def _read_data(job: dict[str, Any], lag: int) -> tuple[Any, Any, Any]:
     """Read the data for estimation, validation (or its fraction) and the final test."""
     for name, known in job["sha256"].items():
         if fingerprint(name) != known:
@@ -233,30 +224,30 @@ def _read_data(
     paths = [Path(name) for name in job.get("records") or [job["record"]]]
     reading = ReadingOptions(**job.get("reading", {}))
     steps = PreprocessingSteps(**job.get("preprocessing", {}))
-    recordings = Recordings(paths, job["inputs"], job["output"], job["dt"], reading, steps)
-    return read_parts(recordings, job["rows"], job["validation"], job["test"], lag)
+    outputs = job.get("outputs", 1)
+    if outputs == 1:
+        recordings = Recordings(paths, job["inputs"], job["output"], job["dt"], reading, steps)
+        return _read_parts(recordings, job, lag)
+    names = measured_names(job["inputs"], steps)
+    recordings = Recordings(paths, names, job["output"], job["dt"], reading)
+    data, *others = _read_parts(recordings, job, lag)
+    record, held_out, test_data = couple_data(data, others, outputs, steps, job["inputs"])
+    return record, held_out, test_data
 
 
-def read_parts(
-    recordings: Recordings, rows: str | None, validation: str | None, test: str | None, lag: int
+def _read_parts(
+    recordings: Recordings, job: dict[str, Any], lag: int
 ) -> tuple[islands.Dataset, islands.Dataset | float, islands.Dataset | None]:
-    """Read the data for estimation, validation (or its fraction) and the final test.
-
-    Parameters
-    ----------
-    recordings : Recordings
-    rows, validation, test : str or None
-        Options of the command.
-    lag : int
-        Largest lag of the models.
+    """Read the data for estimation, validation (or its fraction) and the final test, of all outputs.
 
     Raises
     ------
     SettingsError, RecordError
         A part shares samples with another one, or is too short.
     """
+    rows, test = job["rows"], job["test"]
     data = recordings.read(rows)
-    held_out = recordings.read_held_out(validation, rows)
+    held_out = recordings.read_held_out(job["validation"], rows)
     test_data: islands.Dataset | None = None
     if test is not None:
         given = recordings.read_held_out(test, rows, "--test")

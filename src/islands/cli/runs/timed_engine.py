@@ -1,6 +1,7 @@
 """Engine with a limit of wall time."""
 
 from collections.abc import Generator
+from contextlib import closing
 from time import monotonic
 
 from islands.evolution.archipelago import Archipelago
@@ -10,11 +11,30 @@ from islands.progress import Stop
 
 
 class TimedEngine:
-    """Engine whose search ends at a time; the steps after the search are not left out."""
+    """Engine whose searches end at a time, but not before their first epoch.
 
-    def __init__(self, engine: Engine, until: float) -> None:
-        self._engine, self._until = engine, until
+    The steps after a search are not left out.
+
+    Parameters
+    ----------
+    engine : Engine
+    until : float
+        Monotonic time at which the last search ends.
+    searches : int
+        Number of searches, one after the other. Each has an equal part of the time that is left.
+    """
+
+    def __init__(self, engine: Engine, until: float, searches: int = 1) -> None:
+        self._engine, self._until, self._left = engine, until, searches
 
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
-        """Run the engine."""
-        return self._engine.run(problem, start, lambda: stop() or monotonic() > self._until)
+        """Run the next search."""
+        now = monotonic()
+        until = now + (self._until - now) / self._left
+        self._left = max(1, self._left - 1)
+        begun = False
+        epochs = self._engine.run(problem, start, lambda: stop() or (begun and monotonic() > until))
+        with closing(epochs):
+            for epoch in epochs:
+                begun = True
+                yield epoch

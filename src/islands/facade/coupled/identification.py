@@ -1,6 +1,7 @@
 """`fit_coupled` and `identify_coupled`: one equation per output, chosen and refined for a common free run."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
@@ -14,6 +15,8 @@ from islands.estimation.coupled_refinement import refine_coupled
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.engine import Engine
 from islands.evolution.presets import resolve_settings
+from islands.evolution.search_state import SearchState, keep_hall, stop_reason
+from islands.evolution.settings import Settings
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.coupled.selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
@@ -152,6 +155,7 @@ def identify_coupled(
     progress: ProgressCallback = ignore_progress,
     on_epoch: SearchCallback | None = None,
     stop: Stop = never_stop,
+    start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
     **changes: Unpack[SettingChanges],
 ) -> CoupledResult:
@@ -170,9 +174,12 @@ def identify_coupled(
     progress : callable, optional
         Called with a message and the completed fraction of each stage.
     on_epoch : callable, optional
-        Called with the `SearchState` and the `Settings` after every epoch of the search of each output.
+        Called with the `SearchState` and the `Settings` after every epoch of the search of each output. The
+        state contains those of the outputs before it.
     stop : callable, optional
         As for `fit_coupled`.
+    start : SearchState, optional
+        State to continue from; the result equals that of an uninterrupted run.
     engine : str, Ray or Engine, optional
         What runs the islands, as for `identify`.
     **changes
@@ -198,12 +205,49 @@ def identify_coupled(
             "select is 'validation' with several outputs: equations are chosen by their free run together"
         )
     chosen.setdefault("average", settings.average)
-    find = partial(identify, preset=preset, seed=seed, on_epoch=on_epoch, stop=stop, engine=engine)
+    find = _Searches(partial(identify, preset=preset, seed=seed, stop=stop, engine=engine), start, on_epoch)
     trial = make_trial_library(settings)
     data = _read_data(record, inputs, outputs, dt, validation)
     return _couple(
         data, chosen, trial, settings.maximum_lag + 3, refine_together, Steps(progress, stop), find
     )
+
+
+class _Searches:
+    """Searches of the outputs, one after the other.
+
+    Parameters
+    ----------
+    search : callable
+        `identify` with the arguments that all searches share.
+    start : SearchState or None
+        State to continue from.
+    on_epoch : callable or None
+        Receives the states of the running search with those of the searches before it.
+    """
+
+    def __init__(
+        self, search: Callable[..., Result], start: SearchState | None, on_epoch: SearchCallback | None
+    ) -> None:
+        self._search, self._on_epoch = search, on_epoch
+        self._starts = () if start is None else (*start.earlier, replace(start, earlier=()))
+        self._ended: tuple[SearchState, ...] = ()
+        self._state: SearchState | None = None
+
+    def __call__(self, record: Dataset, **options: Any) -> Result:
+        """Search the next output."""
+        place = len(self._ended)
+        self._state = self._starts[place] if place < len(self._starts) else None
+        found = self._search(record, start=self._state, on_epoch=self._report, **options)
+        if self._state is not None:
+            self._ended = (*self._ended, self._state)
+        return found
+
+    def _report(self, state: SearchState, settings: Settings) -> None:
+        # A search that a limit of time has ended can continue, with its populations.
+        self._state = keep_hall(state) if stop_reason(state, settings) else state
+        if self._on_epoch is not None:
+            self._on_epoch(replace(state, earlier=self._ended), settings)
 
 
 def _check_constraints(constraints: str | None, options: dict[str, Any]) -> None:

@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -87,6 +87,8 @@ class CoupledResult(FittedCoupledModel):
         Data with the sampling time of the model.
     left_out : tuple of str
         Steps that a request to stop has left out; empty for a complete result.
+    wall_s : float or None
+        Duration of all searches in seconds; None if they were not timed.
     """
 
     results: tuple[Result, ...]
@@ -95,6 +97,11 @@ class CoupledResult(FittedCoupledModel):
     estimation: CoupledRecord
     validation: CoupledRecord
     left_out: tuple[str, ...] = ()
+    wall_s: float | None = None
+
+    def with_wall_time(self, seconds: float) -> "CoupledResult":
+        """Return a copy of the result with the duration of all searches in seconds."""
+        return replace(self, wall_s=seconds)
 
     @property
     def metrics(self) -> Mapping[str, Mapping[str, Mapping[str, Metrics]]]:
@@ -159,6 +166,7 @@ class CoupledResult(FittedCoupledModel):
             "average": self.model.average,
             "warm_up": self.warm_up,
             "refined": self.refined,
+            "wall_s": self.wall_s,
             "left_out": list(self.left_out),
             "equation": self.equation,
             "signals": coupled_signals(self.model),

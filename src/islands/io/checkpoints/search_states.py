@@ -1,5 +1,6 @@
 """Search states as JSON values: counters and history."""
 
+import json
 from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
@@ -7,16 +8,32 @@ from typing import Any
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.history import HistoryPoint
 from islands.evolution.search_state import SearchState
+from islands.io.checkpoints.reading import archipelago_from_document
+from islands.io.checkpoints.writing import checkpoint_text
 
 
 def state_document(state: SearchState) -> dict[str, Any]:
-    """Return the counters and the history of a search as JSON values; infinite fitnesses become null."""
+    """Return a search without its archipelago as JSON values; infinite fitnesses become null.
+
+    Searches of earlier outputs are stored with their archipelagos.
+    """
     return {
         "evaluations": state.evaluations,
         "duplicates": state.duplicates,
         "outcomes": dict(state.outcomes),
         "history": history_document(state.history),
+        **({"earlier": [_search_document(each) for each in state.earlier]} if state.earlier else {}),
     }
+
+
+def _search_document(state: SearchState) -> dict[str, Any]:
+    text = checkpoint_text(state.archipelago, state_document(state))
+    return dict(json.loads(text))
+
+
+def _search_from_document(document: Mapping[str, Any]) -> SearchState:
+    archipelago, about = archipelago_from_document(json.dumps(document), "of an earlier output")
+    return state_from_document(archipelago, about)
 
 
 def history_document(history: Sequence[HistoryPoint]) -> list[list[Any]]:
@@ -50,7 +67,7 @@ def state_from_document(archipelago: Archipelago, document: Mapping[str, Any]) -
 
     Raises
     ------
-    KeyError, TypeError, ValueError, AttributeError
+    KeyError, TypeError, ValueError, AttributeError, ModelError
         The document does not describe a search state.
     """
     return SearchState(
@@ -59,4 +76,5 @@ def state_from_document(archipelago: Archipelago, document: Mapping[str, Any]) -
         document["duplicates"],
         document["outcomes"],
         history_from_document(document["history"]),
+        earlier=tuple(map(_search_from_document, document.get("earlier", ()))),
     )

@@ -91,11 +91,19 @@ def test_preprocessed_outputs_are_simulated_as_measured(record, tmp_path) -> Non
 
 
 @pytest.mark.ci
-def test_several_outputs_are_identified_by_evolution(record, tmp_path) -> None:
-    settings = ("--population", "6", "--generations", "1", "--max-terms", "3", "--average", "1")
+def test_a_run_that_its_wall_time_has_ended_is_resumed_to_the_whole_result(record, tmp_path) -> None:
+    settings = ("--population", 6, "--generations", 3, "--max-terms", 3, "--average", 1, "--engine", "serial")
+    whole, part = tmp_path / "whole", tmp_path / "part"
     with undrawn_figures():
-        printed = succeed("identify", record, *COLUMNS, *settings, "--out", tmp_path / "result")
-    assert "2 outputs" in printed
+        assert "2 outputs" in succeed("identify", record, *COLUMNS, *settings, "--out", whole)
+        succeed("identify", record, *COLUMNS, *settings, "--wall-time", 1e-9, "--out", part)
+        searches = [
+            json.loads((part / "outputs" / name / "result.json").read_text())["search"]
+            for name in ("1-y1", "2-y2")
+        ]
+        assert [search["ended_by"] for search in searches] == ["stopped", "stopped"]
+        succeed("identify", "--resume", part, "--engine", "serial")
+    assert (part / "model.json").read_bytes() == (whole / "model.json").read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -105,7 +113,6 @@ def test_several_outputs_are_identified_by_evolution(record, tmp_path) -> None:
         ("fit", ("--output", "y1", "--output", "u"), "u is an input and an output"),
         ("fit", ("--output", "y1,y2", "--constraints", "gain = 2"), "are for one output"),
         ("fit", ("--output", "y1,y2", "--feedthrough", "yes"), "as u+1"),
-        ("identify", ("--output", "y1,y2", "--wall-time", "9"), "is for one output"),
         ("identify", ("--output", "y1,y2", "--test", "120:150"), "other samples for estimation"),
         ("identify", ("--output", "y1,y1"), "y1 is given twice"),
     ],

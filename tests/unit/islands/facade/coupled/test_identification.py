@@ -11,10 +11,17 @@ from islands.data.averaging import average_samples
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import join
 from islands.errors import ModelError, RecordError, SettingsError
+from islands.evolution.search_state import SearchState
 from islands.facade.coupled.identification import fit_coupled, identify_coupled
 from islands.facade.coupled.selection import measure_error
 from islands.facade.load import load
 from islands.facade.results.reader import read_result
+from islands.io.checkpoints import (
+    archipelago_from_document,
+    checkpoint_text,
+    state_document,
+    state_from_document,
+)
 from islands.simulation.coupled_free_run import coupled_free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures
@@ -116,11 +123,18 @@ def test_noise_is_not_amplified_by_the_coupling() -> None:
 
 
 @pytest.mark.ci
-def test_an_evolution_has_the_same_result_for_the_same_seed() -> None:
+def test_an_evolution_continues_from_the_stored_state_of_every_output() -> None:
     record = make_coupled_record(PREY, samples=150)
-    settings = {"population": 8, "generations": 1, "max_terms": 3, "average": 1, "library_degree": 2}
-    first, second = (identify_coupled(record, seed=3, **settings) for _ in range(2))
-    assert first.model == second.model
+    settings = {"population": 8, "generations": 2, "max_terms": 3, "average": 1, "library_degree": 2}
+    states: list[SearchState] = []
+    whole = identify_coupled(record, seed=3, on_epoch=lambda state, _: states.append(state), **settings)
+    assert [len(state.earlier) for state in states] == [0, 0, 1, 1]
+    for state in (states[0], states[3]):
+        text = checkpoint_text(state.archipelago, state_document(state))
+        stored = state_from_document(*archipelago_from_document(text, "test"))
+        assert len(stored.earlier) == len(state.earlier)
+        again = identify_coupled(record, seed=3, start=stored, **settings)
+        assert again.model == whole.model
 
 
 @pytest.mark.parametrize(

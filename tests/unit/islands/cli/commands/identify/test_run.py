@@ -8,8 +8,8 @@ from math import inf
 
 import pytest
 
-from islands.cli.runs import coupled, timed_engine
 from islands.cli.runs import identify as command
+from islands.cli.runs import timed_engine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.history import HistoryPoint
@@ -94,8 +94,7 @@ def test_ctrl_c_while_the_engine_ends_keeps_the_result(run, monkeypatch, tmp_pat
         yield SerialEngine()
         signal.raise_signal(signal.SIGINT)
 
-    for module in (command, coupled):
-        monkeypatch.setattr(module, "start_engine", ending)
+    monkeypatch.setattr(command, "start_engine", ending)
     rows = [line.split(",") for line in (tmp_path / "r.csv").read_text().splitlines()]
     delayed = ["z_um", "0", *(row[-1] for row in rows[1:])]
     lines = [",".join((*row, value)) for row, value in zip(rows, delayed, strict=False)]
