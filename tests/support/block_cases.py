@@ -9,7 +9,6 @@ from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
 from islands.models.narx import Model
 from islands.simulation.blocks import make_simulator
-from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.gain_scheduled import TRUE, GainScheduledModel, make_record
@@ -88,7 +87,7 @@ def state_case(exported, data):
 
 def coupled_case(exported, data):
     """Return the case of a model of several outputs and a record at its rate, as measured."""
-    simulated = coupled_free_run(exported, data)
+    simulated = free_run(exported, data)
     assert simulated.outcome
     return make_case(exported, data.records[0].u, data.y, simulated.y)
 

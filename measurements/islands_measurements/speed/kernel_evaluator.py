@@ -62,7 +62,7 @@ def prepare_record(record: Dataset) -> Prepared:
         layout(record, WARM_UP, INTERVAL),
         layout(record[: WARM_UP + 1], WARM_UP, INTERVAL),
         select_rows(record, WARM_UP),
-        divergence_bound(record),
+        divergence_bound(record.y),
     )
 
 

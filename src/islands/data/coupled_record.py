@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_channel_name
+from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset
 from islands.data.missing_outputs import skip_missing_outputs
 from islands.data.split import split_data
@@ -68,6 +70,21 @@ class CoupledRecord:
         return self.records[0].samples
 
     @property
+    def segments(self) -> tuple[int, ...]:
+        """Number of samples of each segment."""
+        return self.records[0].segments
+
+    @property
+    def bounds(self) -> tuple[tuple[int, int], ...]:
+        """First sample of each segment, and the one after its last."""
+        return self.records[0].bounds
+
+    @property
+    def u(self) -> NDArray[np.float64]:
+        """The inputs, shape (samples, inputs)."""
+        return self.records[0].u
+
+    @property
     def y(self) -> NDArray[np.float64]:
         """The outputs, shape (samples, outputs). NaN marks a missing value."""
         return np.column_stack([record.y for record in self.records])
@@ -125,6 +142,61 @@ class CoupledRecord:
         )
 
 
+#: Record of one or several outputs.
+AnyRecord: TypeAlias = Dataset | CoupledRecord
+
+
+@dataclass(frozen=True, slots=True)
+class CoupledSplit:
+    """Estimation data and validation data of several outputs."""
+
+    estimation: CoupledRecord
+    validation: CoupledRecord
+
+
+class OutputNames(Protocol):
+    """Columns and sampling time of a model of several outputs."""
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs, without the outputs."""
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+
+    @property
+    def dt(self) -> float | None:
+        """Sampling time in seconds. None if any is allowed."""
+
+
+def match_coupled(model: OutputNames, record: CoupledRecord) -> CoupledRecord:
+    """Return a record with its columns in the order of a model.
+
+    Outputs are matched by name, or by position if no name occurs in both; inputs as in `match_record`.
+
+    Raises
+    ------
+    RecordError
+        The columns, units or sampling time of the record are not those of the model.
+    """
+    by_name = {each.output_name: each for each in record.records}
+    records = record.records
+    if set(by_name) == set(model.output_names):
+        records = tuple(by_name[name] for name in model.output_names)
+    elif len(records) != len(model.output_names) or set(by_name) & set(model.output_names):
+        raise RecordError(
+            f"the model has the outputs {', '.join(model.output_names)}, the record "
+            f"{', '.join(record.output_names)}: name the same outputs"
+        )
+    return CoupledRecord(
+        tuple(
+            match_record(ColumnReference(model.input_names, name, model.dt), each)
+            for name, each in zip(model.output_names, records, strict=True)
+        )
+    )
+
+
 def check_outputs(inputs: Sequence[str], outputs: Sequence[str]) -> None:
     """Check that there are several outputs, each named once, and none of them is an input.
 
@@ -165,9 +237,7 @@ def couple(record: Dataset, outputs: int) -> CoupledRecord:
     return CoupledRecord((single, *others))
 
 
-def split_coupled(
-    record: CoupledRecord, validation: CoupledRecord | float
-) -> tuple[CoupledRecord, CoupledRecord]:
+def split_coupled(record: CoupledRecord, validation: CoupledRecord | float) -> CoupledSplit:
     """Return estimation data and validation data, split at the same samples for every output.
 
     Samples of which an output is missing are skipped.
@@ -196,7 +266,7 @@ def split_coupled(
     else:
         held_out = [validation] * len(record.records)
     parts = [split_data(*pair) for pair in zip(record.records, held_out, strict=True)]
-    return (
+    return CoupledSplit(
         CoupledRecord(tuple(part.estimation for part in parts)),
         CoupledRecord(tuple(part.validation for part in parts)),
     )

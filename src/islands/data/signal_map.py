@@ -4,9 +4,11 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.data.averaging import average_samples
-from islands.data.compatibility import Reference, match_record
+from islands.data.compatibility import ColumnReference, Reference, match_record
+from islands.data.coupled_record import CoupledRecord, OutputNames, match_coupled
 from islands.data.dataset import Dataset, same_dt
 from islands.data.preprocessing import reduce_record
 from islands.data.preprocessing_steps import Preprocessing
@@ -51,6 +53,34 @@ def match_rate(model: SampledReference, record: Dataset) -> Dataset:
         record = reduce_record(record, done)
     averaged = model.average > 1 and model.dt is not None and same_dt(model.dt, record.dt * model.average)
     return average_samples(record, model.average) if averaged else record
+
+
+class CoupledReference(OutputNames, SampledReference, Protocol):
+    """Model of several outputs with the columns of a record."""
+
+    def output_preprocessing(self, place: int) -> Preprocessing | None:
+        """Return the preprocessing with the offsets of the inputs and of one output."""
+
+
+def map_coupled_signals(
+    model: CoupledReference, record: CoupledRecord
+) -> tuple[CoupledRecord, NDArray[np.float64]]:
+    """Return the signals that a model of several outputs reads, and the offset of every output.
+
+    See `map_signals`.
+    """
+    matched = match_coupled(model, record.map(lambda each: match_rate(model, each)))
+    mapped = [
+        map_signals(
+            ColumnReference(
+                *(model.input_names, each.output_name, model.dt, model.average),
+                model.output_preprocessing(place),
+            ),
+            each,
+        )
+        for place, each in enumerate(matched.records)
+    ]
+    return CoupledRecord(tuple(each for each, _ in mapped)), np.array([offset for _, offset in mapped])
 
 
 def map_signals(model: SignalReference, record: Dataset) -> tuple[Dataset, float]:

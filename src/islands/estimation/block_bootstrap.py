@@ -16,17 +16,17 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
+from islands.data.coupled_record import AnyRecord
 from islands.estimation.damped_least_squares import compute_jacobian, find_directions, inner_products
 from islands.estimation.parameter_constraints import constrain_model
 from islands.estimation.shooting_residual import make_residual
-from islands.models.protocol import DynamicModel
+from islands.models.coupled_narx import AnyModel
 from islands.simulation.outcome import EvaluationOutcome
 
 
 def draw_parameters(
-    model: DynamicModel,
-    record: Dataset,
+    model: AnyModel,
+    record: AnyRecord,
     interval: int | None,
     constraints: str,
     warm_up: int | None,
@@ -37,9 +37,9 @@ def draw_parameters(
 
     Parameters
     ----------
-    model : DynamicModel
+    model : DynamicModel or CoupledModel
         Model whose parameters minimise the multiple-shooting error.
-    record : Dataset
+    record : Dataset or CoupledRecord
         Estimation data.
     interval : int or None
         Shooting interval of that error in samples: 1 for least squares, None for the free run.

@@ -16,6 +16,7 @@ from islands.estimation.constraints.parser import parse_statements
 from islands.estimation.constraints.parts import ClusterSums, StaticGain, Symmetry
 from islands.expressions.tree import Expression
 from islands.models.clusters import OUTPUT_AT_REST, steady_state
+from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome, Status
@@ -55,8 +56,8 @@ def constraint(text: str) -> Constraint:
     return Constraint(parts)
 
 
-def constrain_model(model: DynamicModel, text: str) -> Constrained | EvaluationOutcome:
-    """Return the constraint on the parameters of a model.
+def constrain_model(model: AnyModel, text: str) -> Constrained | EvaluationOutcome:
+    """Return the constraint on the parameters of a model, which holds for each of its equations.
 
     Returns
     -------
@@ -68,6 +69,8 @@ def constrain_model(model: DynamicModel, text: str) -> Constrained | EvaluationO
     SettingsError
         A statement cannot be read, or the model is not a NARX model, whose terms the statements are about.
     """
+    if isinstance(model, CoupledModel):
+        return _constrain_equations(model, text)
     if not isinstance(model, Model):
         if text != "none":
             raise SettingsError(f"the constraints {text!r} are about the terms of a NARX model: take 'none'")
@@ -78,6 +81,27 @@ def constrain_model(model: DynamicModel, text: str) -> Constrained | EvaluationO
             Status.INFEASIBLE, "the constraint forces a parameter to zero: remove its term"
         )
     return constrained
+
+
+def _constrain_equations(model: CoupledModel, text: str) -> Constrained | EvaluationOutcome:
+    parts = []
+    for single in model.models:
+        part = constrain_model(single, text)
+        if isinstance(part, EvaluationOutcome):
+            return part
+        parts.append(part)
+    matrix = np.zeros(np.sum([part.S.shape for part in parts], axis=0))
+    row = column = 0
+    for part in parts:
+        rows, columns = part.S.shape
+        matrix[row : row + rows, column : column + columns] = part.S
+        row, column = row + rows, column + columns
+    return Constrained(
+        tuple(item for part in parts for item in part.regressors),
+        matrix,
+        np.concatenate([part.c for part in parts]),
+        np.concatenate([part.signs for part in parts]),
+    )
 
 
 def count_free_parameters(model: DynamicModel, text: str) -> int:

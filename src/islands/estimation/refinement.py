@@ -6,12 +6,12 @@ constraints remain satisfied because the steps are restricted to their null spac
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, TypeVar, cast
 
 import numpy as np
 
 from islands.data.compatibility import match_record
-from islands.data.dataset import Dataset
+from islands.data.coupled_record import AnyRecord, CoupledRecord, match_coupled
 from islands.errors import RecordError
 from islands.estimation.covariance import sandwich_of_jacobian
 from islands.estimation.damped_least_squares import (
@@ -22,11 +22,12 @@ from islands.estimation.damped_least_squares import (
 )
 from islands.estimation.parameter_constraints import constrain_model
 from islands.estimation.shooting_residual import make_residual
+from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.protocol import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import multiple_shooting
 
-M = TypeVar("M", bound=DynamicModel)
+M = TypeVar("M", bound=AnyModel)
 
 #: Refinement ends when a step reduces the squared error by a smaller relative amount.
 _MIN_GAIN = 1e-8
@@ -44,7 +45,7 @@ class RefinedModel(Generic[M]):
 
 def refine(
     model: M,
-    record: Dataset,
+    record: AnyRecord,
     interval: int | None,
     constraints: str = "none",
     warm_up: int | None = None,
@@ -56,9 +57,10 @@ def refine(
 
     Parameters
     ----------
-    model : DynamicModel
-        Model with parameters that meet the constraints.
-    record : Dataset
+    model : DynamicModel or CoupledModel
+        Model with parameters that meet the constraints. The parameters of all equations of several outputs
+        are refined together.
+    record : Dataset or CoupledRecord
     interval : int or None
         Length of a shooting interval in samples. None is the free run.
     constraints : str
@@ -92,13 +94,16 @@ def refine(
     constrained = constrain_model(model, constraints)
     if isinstance(constrained, EvaluationOutcome):
         return constrained
-    record = match_record(model, record)
-    # This call also checks the inputs, the lags and the length of the record, which the kernel does not.
+    # This call also checks the columns, the lags and the length of the record, which the kernel does not.
     started = multiple_shooting(model, record, interval, warm_up)
     if not started.outcome:
         return started.outcome
-    if np.isnan(started.mean_squared_error):
-        raise RecordError(f"{record.output_name} has missing samples: refinement needs every sample")
+    if np.isnan(started.mean_squared_errors).any():
+        raise RecordError("an output has missing samples: refinement needs every sample")
+    if isinstance(record, CoupledRecord):
+        record = match_coupled(cast("CoupledModel", model), record)
+    else:
+        record = match_record(cast("DynamicModel", model), record)
     theta = np.array(model.parameters)
     directions = find_directions(theta, constrained)
     if isinstance(directions, EvaluationOutcome):
@@ -119,5 +124,5 @@ def refine(
         covariance = sandwich_of_jacobian(jacobian, found.error, residual.intervals)
         squares = np.einsum("ti,ij,tj->t", directions, covariance, directions)
         errors = np.sqrt(np.maximum(squares, 0.0)).tolist()
-    refined = model.with_parameters(found.theta.tolist(), errors)
+    refined: M = model.with_parameters(found.theta.tolist(), errors)  # type: ignore[assignment]
     return RefinedModel(refined, mean_square(error), mean_square(found.error), found.steps)

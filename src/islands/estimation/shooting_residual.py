@@ -3,11 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.data.dataset import Dataset
 from islands.estimation.damped_least_squares import Residual
 from islands.kernels.simulate import DIVERGED, Layout, simulate
+from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
-from islands.models.protocol import DynamicModel
 from islands.program.term_pool import link
 from islands.simulation.blocks import make_simulator
 from islands.simulation.layout import layout
@@ -33,7 +34,7 @@ class ShootingResidual(Residual):
         first = model.maximum_lag if warm_up is None else warm_up
         self._program = link(model.regressors)
         self._cut: Layout = layout(record, first, interval)
-        self._y, self._bound = record.y, divergence_bound(record)
+        self._y, self._bound = record.y, divergence_bound(record.y)
         self._predicted = np.zeros(record.samples, bool)
         for start, length in zip(self._cut.start, self._cut.length, strict=True):
             self._predicted[start : start + length] = True
@@ -57,6 +58,9 @@ class ShootingResidual(Residual):
 class BlockResidual(Residual):
     """The simulation error of the block of a model as a function of its parameters.
 
+    The errors of several outputs are relative to the ranges of the outputs. They follow one another sample by
+    sample, so that a block of rows is a block of time.
+
     Parameters
     ----------
     model, record, interval, warm_up
@@ -64,13 +68,26 @@ class BlockResidual(Residual):
     """
 
     def __init__(
-        self, model: DynamicModel, record: Dataset, interval: int | None, warm_up: int | None
+        self,
+        model: AnyModel,
+        record: AnyRecord,
+        interval: int | None,
+        warm_up: int | None,
     ) -> None:
         first = model.maximum_lag if warm_up is None else warm_up
         self._simulate = make_simulator(model.block(), record, interval, first)
         self._predicted = self._simulate.predicted
-        self._y, self._bound = record.y[self._predicted], divergence_bound(record)
+        outputs = np.atleast_2d(record.y.T)
+        self._y = outputs[:, self._predicted]
+        self._bounds = np.array([[divergence_bound(y)] for y in outputs])
+        self._scales = np.ones((1, 1))
+        #: Number of rows of every interval, in the order of time.
         self.intervals = self._simulate.intervals
+        if isinstance(record, CoupledRecord):
+            self._scales = np.array([[each.output_range or 1.0] for each in record.records])
+            # The scores of all outputs at one sample are summed at least.
+            lengths = np.ones(self._y.shape[1], np.int64) if interval is None else self.intervals
+            self.intervals = len(outputs) * lengths
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return prediction minus measurement over all predicted samples, or None after a divergence."""
@@ -78,14 +95,21 @@ class BlockResidual(Residual):
 
     def evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
         """Return the residual of each of several parameter vectors, which are simulated together."""
-        runs = self._simulate(thetas)[:, 0, self._predicted]
-        return [run - self._y if (np.abs(run) <= self._bound).all() else None for run in runs]
+        runs = self._simulate(thetas)[:, : len(self._y), self._predicted]
+        return [
+            ((run - self._y) / self._scales).T.reshape(-1) if (np.abs(run) <= self._bounds).all() else None
+            for run in runs
+        ]
 
 
 def make_residual(
-    model: DynamicModel, record: Dataset, interval: int | None, warm_up: int | None
+    model: AnyModel,
+    record: AnyRecord,
+    interval: int | None,
+    warm_up: int | None,
 ) -> ShootingResidual | BlockResidual:
     """Return the multiple-shooting residual of a model of any class; see `ShootingResidual`."""
     if isinstance(model, Model):
+        assert isinstance(record, Dataset), "the record matches the model"
         return ShootingResidual(model, record, interval, warm_up)
     return BlockResidual(model, record, interval, warm_up)

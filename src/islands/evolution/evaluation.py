@@ -140,7 +140,7 @@ class Evaluator:
         self.warm_up = settings.maximum_lag
         self._layout = layout(record, self.warm_up, FITNESSES[settings.fitness](settings.shooting))
         self._predicted = int(self._layout.length.sum())
-        self._bound = divergence_bound(record)
+        self._bound = divergence_bound(record.y)
         self._rows = select_rows(record, self.warm_up)
         self._constraint = constraint(settings.constraints)
         self._outcomes = _OUTCOMES | {

@@ -18,6 +18,7 @@ from islands.evolution.fitness import FITNESS_MODES
 from islands.evolution.history import HistoryPoint
 from islands.models.equations import equation
 from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 from islands.progress import Steps
 from islands.validation.assessment import Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
@@ -159,7 +160,7 @@ class SearchResult:
 
 def with_bands(
     found: SearchResult,
-    candidates: Sequence[ValidatedModel],
+    candidates: Sequence[ValidatedModel[DynamicModel]],
     constraints: str,
     warm_up: int,
     steps: Steps,

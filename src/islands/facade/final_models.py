@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from math import isfinite
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeAlias, TypeVar
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
@@ -28,6 +28,9 @@ from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.assessment import Assessment, assess
 from islands.validation.ensemble import ValidatedModel
+
+#: Model of one output that a search has found.
+Candidate: TypeAlias = ValidatedModel[DynamicModel]
 
 #: Structures of every size whose parameters are refined: the best by validation error and by fitness.
 _REFINED = (8, 8)
@@ -56,7 +59,7 @@ _Sized = TypeVar("_Sized", bound=_HasSize)
 
 
 def select_final_models(
-    candidates: Iterable[ValidatedModel], problem: Problem, split: Split, steps: Steps
+    candidates: Iterable[Candidate], problem: Problem, split: Split, steps: Steps
 ) -> tuple[Assessment, ...]:
     """Assess the candidates and return the best model of every size, best first.
 
@@ -83,22 +86,22 @@ def select_final_models(
     return rank_models(kept)
 
 
-def _order_candidates(
-    candidates: list[ValidatedModel], settings: Settings, record: Dataset
-) -> list[ValidatedModel]:
+def _order_candidates(candidates: list[Candidate], settings: Settings, record: Dataset) -> list[Candidate]:
     """Return the candidates in the order of the error that selects them, least first."""
     if settings.select != "fitness":
         return sorted(candidates, key=lambda entry: entry.order)
     interval = FITNESSES[settings.fitness](settings.shooting)
 
-    def order(candidate: ValidatedModel) -> tuple[float, tuple[float, tuple[str, ...], tuple[float, ...]]]:
+    def order(
+        candidate: Candidate,
+    ) -> tuple[float, tuple[float, tuple[str, ...], tuple[float, ...]]]:
         run = multiple_shooting(candidate.model, record, interval, settings.maximum_lag)
         return run.mean_squared_error, candidate.order
 
     return sorted(candidates, key=order)
 
 
-def _with_standard_errors(candidate: ValidatedModel, settings: Settings, record: Dataset) -> DynamicModel:
+def _with_standard_errors(candidate: Candidate, settings: Settings, record: Dataset) -> DynamicModel:
     """Return the model with standard errors; most candidates do not need them, so they have none."""
     model = candidate.model
     limits = settings.constraints, settings.maximum_lag
@@ -122,7 +125,7 @@ def estimate_candidates(
     split: Split,
     offsets: Offsets,
     steps: Steps,
-) -> list[ValidatedModel]:
+) -> list[Candidate]:
     """Estimate and refine the best structures of every size, and validate them.
 
     Structures are those of the hall of fame and those that seeded the search, so that the result is never
@@ -199,7 +202,7 @@ def _take_fittest(individuals: Sequence[Individual], most: int) -> list[Individu
 
 def _estimate_models(
     individuals: list[Individual], settings: Settings, split: Split, offsets: Offsets, steps: Steps
-) -> list[ValidatedModel]:
+) -> list[Candidate]:
     """Return models with estimated and with refined parameters in the units of the record.
 
     Models whose free run diverges on the validation data are returned only if the fitness selects.
@@ -220,7 +223,7 @@ def _estimate_models(
         for each in found
         if not isinstance(each, EvaluationOutcome) and each.model.size <= settings.max_terms
     ]
-    keep = list[ValidatedModel] if settings.select == "fitness" else _without_diverged
+    keep = list[Candidate] if settings.select == "fitness" else _without_diverged
     if settings.estimator and not steps.skip(f"estimator {settings.estimator}"):
         return keep(_estimate_with_choice(fitted, settings, split))
     estimated = [each.model for each in fitted]
@@ -236,9 +239,7 @@ def _estimate_models(
     return validated
 
 
-def _estimate_with_choice(
-    fitted: list[FittedStructure], settings: Settings, split: Split
-) -> list[ValidatedModel]:
+def _estimate_with_choice(fitted: list[FittedStructure], settings: Settings, split: Split) -> list[Candidate]:
     """Return models with the parameters of the estimator that the settings choose."""
     found = (
         estimate_with(
@@ -258,7 +259,7 @@ def _estimate_with_choice(
 
 def _refine(
     models: Sequence[DynamicModel], interval: int | None, settings: Settings, split: Split, steps: Steps
-) -> list[ValidatedModel]:
+) -> list[Candidate]:
     """Refine models over shooting intervals and validate them; the kernels run in parallel threads."""
 
     def refine_one(model: DynamicModel) -> DynamicModel | None:
@@ -282,7 +283,7 @@ def _refine(
 
 def _validate(
     models: Iterable[DynamicModel], interval: int | None, validation: Dataset, warm_up: int
-) -> list[ValidatedModel]:
+) -> list[Candidate]:
     """Simulate models on the validation data and return them, least error first."""
     validated = (
         ValidatedModel(model, interval, free_run(model, validation, warm_up).mean_squared_error)
@@ -291,5 +292,7 @@ def _validate(
     return sorted(validated, key=lambda entry: entry.order)
 
 
-def _without_diverged(validated: Iterable[ValidatedModel]) -> list[ValidatedModel]:
+def _without_diverged(
+    validated: Iterable[Candidate],
+) -> list[Candidate]:
     return [each for each in validated if isfinite(each.error)]

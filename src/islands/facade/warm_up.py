@@ -35,7 +35,6 @@ from islands.kernels.population import (
 )
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
-from islands.simulation.coupled_free_run import coupled_free_run
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED
@@ -155,4 +154,4 @@ def _simulate_two_outputs(record: Dataset) -> None:
         for place, name in enumerate(names)
     )
     both = CoupledRecord((record, replace(record, output_name="other")))
-    coupled_free_run(CoupledModel(tuple(equations)), both)
+    free_run(CoupledModel(tuple(equations)), both)

@@ -30,7 +30,7 @@ def finite_part(record: Dataset, simulated: NDArray[np.float64]) -> NDArray[np.f
             f"a simulation has one value for each of the record's {record.samples} samples, "
             f"got shape {values.shape}"
         )
-    values[~(np.abs(values) <= divergence_bound(record))] = np.nan
+    values[~(np.abs(values) <= divergence_bound(record.y))] = np.nan
     return values
 
 

@@ -14,8 +14,9 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.printing import plain
 from islands.expressions.tree import Primitive
 from islands.io.models import model_from_json, model_json
+from islands.io.narx_documents import read_coupled
+from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.narx import Model
-from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor, regressor
 from islands.validation.ensemble import Ensemble, EnsembleStructure
 from islands.validation.prediction_bands import PredictionBands
@@ -57,14 +58,14 @@ def ensemble_document(ensemble: Ensemble | None) -> list[dict[str, Any]] | None:
     ]
 
 
-def _structure_document(model: DynamicModel) -> dict[str, Any]:
+def _structure_document(model: AnyModel) -> dict[str, Any]:
     if isinstance(model, Model):
         return {"regressors": [plain(item.expression, model.inputs) for item in model.regressors]}
     return {"model": json.loads(model_json(model))}
 
 
 def ensemble_from_document(
-    document: Any, model: DynamicModel, primitives: Mapping[str, Primitive] = PRIMITIVES
+    document: Any, model: AnyModel, primitives: Mapping[str, Primitive] = PRIMITIVES
 ) -> Ensemble | None:
     """Return the ensemble of a document.
 
@@ -72,7 +73,7 @@ def ensemble_from_document(
     ----------
     document : list or None
         Value made by `ensemble_document`.
-    model : DynamicModel
+    model : DynamicModel or CoupledModel
         A model of the result. It gives the names of the columns and the sampling time.
     primitives : mapping
         Primitives that expressions may contain.
@@ -92,13 +93,15 @@ def ensemble_from_document(
 
 
 def _structure(
-    document: StructureDocument, model: DynamicModel, primitives: Mapping[str, Primitive]
+    document: StructureDocument, model: AnyModel, primitives: Mapping[str, Primitive]
 ) -> EnsembleStructure:
     parameters = np.array(document.parameters, dtype=np.float64)
-    found: DynamicModel
+    found: AnyModel
     if isinstance(model, Model):
         terms = tuple(_regressor(text, primitives) for text in document.regressors)
         found = replace(model, regressors=terms, theta=None, standard_errors=None)
+    elif isinstance(model, CoupledModel):
+        found = read_coupled(document.model or {}, "the ensemble", primitives)
     else:
         found = model_from_json(json.dumps(document.model), "the ensemble")
     if parameters.shape[1] != found.size:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
@@ -20,7 +20,7 @@ from islands.models.equations import (
     signal_names,
 )
 from islands.models.narx import Model, measured_model
-from islands.models.protocol import EquationText
+from islands.models.protocol import DynamicModel, EquationText
 from islands.models.signal_statement import describe_values, join_statements, symbols
 
 
@@ -137,13 +137,23 @@ class CoupledModel:
         """
         return tuple(value for model in self.models for value in model.parameters)
 
-    def with_parameters(self, theta: Sequence[float]) -> "CoupledModel":
-        """Return a copy with other parameters of all equations, without standard errors."""
+    def with_parameters(
+        self, theta: Sequence[float], standard_errors: Sequence[float] | None = None
+    ) -> "CoupledModel":
+        """Return a copy with the given parameters and standard errors of all equations."""
         models, begin = [], 0
         for model in self.models:
-            models.append(model.with_parameters(theta[begin : begin + model.size]))
+            rows = slice(begin, begin + model.size)
+            errors = None if standard_errors is None else standard_errors[rows]
+            models.append(model.with_parameters(theta[rows], errors))
             begin += model.size
         return replace(self, models=tuple(models))
+
+    @property
+    def standard_errors(self) -> tuple[float, ...] | None:
+        """Standard errors of all equations, one after the other. None if one equation has none."""
+        errors = [model.standard_errors for model in self.models]
+        return None if None in errors else tuple(value for each in errors for value in each or ())
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -217,6 +227,10 @@ class CoupledModel:
         """Return the terms of one equation, without parameters, in the channels of the coupled model."""
         channels = self.channels(place)
         return [_read_channels(item.expression, channels) for item in self.models[place].regressors]
+
+
+#: Model of one or several outputs.
+AnyModel: TypeAlias = DynamicModel | CoupledModel
 
 
 def measured_coupled_model(model: CoupledModel) -> CoupledModel:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
+from islands.data.coupled_record import AnyRecord
 from islands.errors import SettingsError
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import ADD, MUL
@@ -144,13 +144,13 @@ class BlockSimulator:
             first[place] = value(start, lambda channel, _lag: first[channel], named)
 
 
-def make_simulator(block: Block, record: Dataset, interval: int | None, warm_up: int) -> BlockSimulator:
-    """Return the simulator of a block of one output on the intervals of a record.
+def make_simulator(block: Block, record: AnyRecord, interval: int | None, warm_up: int) -> BlockSimulator:
+    """Return the simulator of a block on the intervals of a record.
 
     Parameters
     ----------
     block : Block
-    record : Dataset
+    record : Dataset or CoupledRecord
         Signals of the block.
     interval : int or None
         Length of a shooting interval in samples, 1 for one-step-ahead prediction; None is the free run over
@@ -170,8 +170,10 @@ def make_simulator(block: Block, record: Dataset, interval: int | None, warm_up:
     if interval is not None and interval < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {interval}")
     start, length = find_intervals(record, warm_up, interval if block.restarts_from_outputs else None)
-    check_warm_up(record.y, start, warm_up)
-    return BlockSimulator(block, record.y[None], record.u.T, start, length, warm_up)
+    outputs = np.atleast_2d(record.y.T)
+    for y in outputs:
+        check_warm_up(y, start, warm_up)
+    return BlockSimulator(block, outputs, record.u.T, start, length, warm_up)
 
 
 def _make_groups(runs: Sequence[tuple[int, int]]) -> Iterator[Sequence[tuple[int, int]]]:

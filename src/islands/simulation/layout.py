@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.coupled_record import AnyRecord
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.kernels.simd import padded_size
@@ -66,7 +67,7 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
 
 
 def find_intervals(
-    record: Dataset, warm_up: int, interval: int | None
+    record: AnyRecord, warm_up: int, interval: int | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the first predicted sample and the length of every interval, in time order.
 

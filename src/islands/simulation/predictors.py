@@ -5,11 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.data.dataset import Dataset
-from islands.data.signal_map import map_signals
-from islands.errors import SettingsError
+from islands.data.signal_map import map_coupled_signals, map_signals
+from islands.errors import RecordError, SettingsError
 from islands.kernels.simulate import Layout, simulate
 from islands.kernels.summation import dot, total
+from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.program.term_pool import link
@@ -27,19 +29,26 @@ class Simulation:
 
     Attributes
     ----------
-    y : ndarray, shape (samples,)
+    y : ndarray, shape (samples,) or (samples, outputs)
         One value for each sample at the rate of the model, in the unit of the record: as measured, or as
-        deviations if the record is preprocessed. NaN during the warm-up of every segment, and from a
-        divergence to the end of its interval.
-    mean_squared_error : float
-        Mean over all predicted samples. Infinite after a divergence, NaN if a measured output is missing.
+        deviations if the record is preprocessed. NaN during the warm-up of every segment, and, for all
+        outputs, from the divergence of one to the end of its interval.
+    mean_squared_errors : tuple of float
+        Mean over all predicted samples, by output. Infinite after a divergence, NaN if a measured output is
+        missing.
     outcome : EvaluationOutcome
         OK, or DIVERGED with the first diverged sample.
     """
 
     y: NDArray[np.float64]
-    mean_squared_error: float
+    mean_squared_errors: tuple[float, ...]
     outcome: EvaluationOutcome
+
+    @property
+    def mean_squared_error(self) -> float:
+        """Mean squared error of the only output."""
+        (error,) = self.mean_squared_errors
+        return error
 
 
 def one_step_ahead(model: DynamicModel, record: Dataset, warm_up: int | None = None) -> Simulation:
@@ -48,15 +57,18 @@ def one_step_ahead(model: DynamicModel, record: Dataset, warm_up: int | None = N
 
 
 def free_run(
-    model: DynamicModel, record: Dataset, warm_up: int | None = None, bound: float | None = None
+    model: AnyModel,
+    record: AnyRecord,
+    warm_up: int | None = None,
+    bound: float | None = None,
 ) -> Simulation:
-    """Simulate every segment from its first samples; the output is only read during the warm-up."""
+    """Simulate every segment from its first samples; the outputs are only read during the warm-up."""
     return multiple_shooting(model, record, None, warm_up, bound)
 
 
 def multiple_shooting(
-    model: DynamicModel,
-    record: Dataset,
+    model: AnyModel,
+    record: AnyRecord,
     interval: int | None,
     warm_up: int | None = None,
     bound: float | None = None,
@@ -65,8 +77,11 @@ def multiple_shooting(
 
     Parameters
     ----------
-    model : Model
-    record : Dataset
+    model : DynamicModel or CoupledModel
+    record : Dataset or CoupledRecord
+        A `CoupledRecord` for a model of several outputs. A record as measured is filtered, decimated and
+        averaged as that of the model, and the offsets of the model are subtracted from it and added to the
+        simulation.
     interval : int or None
         Length of an interval in samples. None is the whole segment.
     warm_up : int or None
@@ -84,68 +99,95 @@ def multiple_shooting(
     SettingsError
         The warm-up is shorter than the model's largest lag, or the interval is less than 1.
     """
-    record, offset = map_signals(model, record)
-    if warm_up is None:
-        warm_up = model.maximum_lag
-    if warm_up < model.maximum_lag:
-        raise SettingsError(f"the model reads {model.maximum_lag} samples back, the warm-up has {warm_up}")
-    theta = np.array(model.parameters)
-    bound = divergence_bound(record) if bound is None else bound
+    first = model.maximum_lag if warm_up is None else warm_up
+    if first < model.maximum_lag:
+        raise SettingsError(f"the model reads {model.maximum_lag} samples back, the warm-up has {first}")
     if not isinstance(model, Model):
-        return _simulate_block(model, record, interval, warm_up, bound, offset)
-    cut = layout(record, warm_up, interval)
+        return _simulate_block(model, record, interval, first, bound)
+    signals, offset = map_signals(model, _require_one_output(record))
+    theta = np.array(model.parameters)
+    bound = divergence_bound(signals.y) if bound is None else bound
+    cut = layout(signals, first, interval)
     squared_error = np.empty(len(cut.start))
     diverged = np.empty(len(cut.start), np.int64)
-    predicted = np.full(record.samples, np.nan)
+    predicted = np.full(signals.samples, np.nan)
     simulate(link(model.regressors), theta, cut, bound, np.inf, True, squared_error, diverged, predicted)
     failed = _remove_diverged(predicted, cut, diverged)
     if offset:
         predicted += offset
     if failed.size:
         sample = int((cut.start + diverged)[failed].min())
-        reason = f"|y| left {bound:.3g} at sample {sample}"
-        return Simulation(predicted, np.inf, EvaluationOutcome(Status.DIVERGED, reason))
-    return Simulation(predicted, float(total(squared_error) / cut.length.sum()), OK)
+        return _diverged(predicted, sample, "y", bound, 1)
+    return Simulation(predicted, (float(total(squared_error) / cut.length.sum()),), OK)
 
 
 def _simulate_block(
-    model: DynamicModel,
-    record: Dataset,
+    model: AnyModel,
+    record: AnyRecord,
     interval: int | None,
     warm_up: int,
-    bound: float,
-    offset: float,
+    bound: float | None,
 ) -> Simulation:
-    """Simulate the block of a model; ``offset`` is added to its output."""
-    simulate_record = make_simulator(model.block(), record, interval, warm_up)
-    predicted = simulate_record(np.array([model.parameters]))[0, 0]
-    failed = simulate_record.remove_diverged(predicted[None], [bound])
+    """Simulate the block of a model."""
+    signals, offsets = _map(model, record)
+    block, outputs = model.block(), np.atleast_2d(signals.y.T)
+    bounds = [divergence_bound(y) if bound is None else bound for y in outputs]
+    simulate_record = make_simulator(block, signals, interval, warm_up)
+    predicted = simulate_record(np.array([model.parameters]))[0, : len(outputs)]
+    failed = simulate_record.remove_diverged(predicted, bounds)
+    y = np.ascontiguousarray(predicted.T.reshape(signals.y.shape)) + offsets
     if failed:
-        sample, _ = failed
-        reason = f"|y| left {bound:.3g} at sample {sample}"
-        return Simulation(predicted + offset, np.inf, EvaluationOutcome(Status.DIVERGED, reason))
-    error = (predicted - record.y)[simulate_record.predicted]
-    return Simulation(predicted + offset, float(dot(error, 0, error, 0, error.size)) / error.size, OK)
+        sample, output = failed
+        return _diverged(y, sample, block.signals[output], bounds[output], len(outputs))
+    errors = np.ascontiguousarray((predicted - outputs)[:, simulate_record.predicted])
+    return Simulation(y, tuple(float(dot(each, 0, each, 0, each.size)) / each.size for each in errors), OK)
+
+
+def _map(model: AnyModel, record: AnyRecord) -> tuple[AnyRecord, NDArray[np.float64] | float]:
+    """Return the signals of a model, and the offsets that are added to its outputs."""
+    if not isinstance(model, CoupledModel):
+        return map_signals(model, _require_one_output(record))
+    if not isinstance(record, CoupledRecord):
+        raise RecordError(
+            f"the model has the outputs {', '.join(model.output_names)}: give a CoupledRecord with all"
+        )
+    return map_coupled_signals(model, record)
+
+
+def _require_one_output(record: AnyRecord) -> Dataset:
+    if isinstance(record, CoupledRecord):
+        raise RecordError(
+            f"the model has one output, and the record {', '.join(record.output_names)}: give a Dataset"
+        )
+    return record
+
+
+def _diverged(y: NDArray[np.float64], sample: int, output: str, bound: float, outputs: int) -> Simulation:
+    outcome = EvaluationOutcome(Status.DIVERGED, f"|{output}| left {bound:.3g} at sample {sample}")
+    return Simulation(y, (np.inf,) * outputs, outcome)
 
 
 def free_runs(
-    model: DynamicModel, thetas: NDArray[np.float64], record: Dataset, warm_up: int
+    model: AnyModel,
+    thetas: NDArray[np.float64],
+    record: AnyRecord,
+    warm_up: int,
 ) -> NDArray[np.float64]:
     """Simulate every segment of a record once for each of several parameter vectors of a structure.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel or CoupledModel
         Structure; its parameters are not used.
     thetas : ndarray, shape (vectors, terms)
-    record : Dataset
+    record : Dataset or CoupledRecord
         Record with the inputs of the model.
     warm_up : int
         Number of samples before the first prediction, at least the largest lag of the model.
 
     Returns
     -------
-    ndarray, shape (vectors, samples)
+    ndarray, shape (vectors, samples) or (vectors, samples, outputs)
         NaN during the warm-up of every segment, and from a divergence to the end of its segment.
 
     Raises
@@ -153,17 +195,19 @@ def free_runs(
     RecordError
         The record does not match the model, is too short, or its output is missing in a warm-up.
     """
-    record, offset = map_signals(model, record)
+    signals, offset = _map(model, record)
     if not isinstance(model, Model):
-        simulate_record = make_simulator(model.block(), record, None, warm_up)
-        bound = divergence_bound(record)
-        predicted = simulate_record(thetas)[:, 0]
-        for run in predicted:
-            simulate_record.remove_diverged(run[None], [bound])
-        return predicted + offset
-    program, cut, bound = link(model.regressors), layout(record, warm_up), divergence_bound(record)
+        outputs = np.atleast_2d(signals.y.T)
+        bounds = [divergence_bound(y) for y in outputs]
+        simulate_record = make_simulator(model.block(), signals, None, warm_up)
+        runs = simulate_record(thetas)[:, : len(outputs)]
+        for run in runs:
+            simulate_record.remove_diverged(run, bounds)
+        return runs.transpose(0, 2, 1).reshape(len(runs), *signals.y.shape) + offset
+    assert isinstance(signals, Dataset)
+    program, cut, bound = link(model.regressors), layout(signals, warm_up), divergence_bound(signals.y)
     squared_error, diverged = np.empty(len(cut.start)), np.empty(len(cut.start), np.int64)
-    predicted = np.full((len(thetas), record.samples), np.nan)
+    predicted = np.full((len(thetas), signals.samples), np.nan)
     for theta, run in zip(thetas, predicted, strict=True):
         simulate(program, theta, cut, bound, np.inf, True, squared_error, diverged, run)
         _remove_diverged(run, cut, diverged)
@@ -180,14 +224,14 @@ def _remove_diverged(
     return failed
 
 
-def divergence_bound(record: Dataset) -> float:
-    """Return the absolute output above which a simulation of the record has diverged.
+def divergence_bound(y: NDArray[np.float64]) -> float:
+    """Return the absolute output above which a simulation of a measured output has diverged.
 
     The bound is `BOUND` times the larger of the output's range and its largest absolute value. If outputs are
     missing or all are zero, it is at least `BOUND` in the output's unit.
     """
-    known = record.y[~np.isnan(record.y)]
-    return divergence_bound_of_range(known, complete=known.size == record.samples)
+    known = y[~np.isnan(y)]
+    return divergence_bound_of_range(known, complete=known.size == y.size)
 
 
 def divergence_bound_of_range(known: NDArray[np.float64], complete: bool) -> float:

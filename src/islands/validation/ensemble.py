@@ -11,16 +11,20 @@ one half.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.coupled_record import AnyRecord, CoupledSplit
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.estimation.block_bootstrap import draw_parameters
+from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
-from islands.models.protocol import DynamicModel
 from islands.simulation.predictors import free_run, free_runs
+
+M = TypeVar("M", bound=AnyModel)
 
 #: Members of an ensemble, up to rounding.
 MEMBERS = 64
@@ -43,20 +47,21 @@ _DEVIATIONS = 1.645
 
 
 @dataclass(frozen=True, slots=True)
-class ValidatedModel:
+class ValidatedModel(Generic[M]):
     """A model with the error of its free run, which may become part of an ensemble.
 
     Attributes
     ----------
-    model : DynamicModel
+    model : DynamicModel or CoupledModel
     interval : int or None
         Shooting interval of the error that its parameters minimise, in samples: 1 for least squares, None for
         the free run.
     error : float
-        Mean squared error of the free run on the validation data; not finite if it diverged.
+        Mean squared error of the free run on the validation data (see `mean_squares`); not finite if it
+        diverged.
     """
 
-    model: DynamicModel
+    model: M
     interval: int | None
     error: float
 
@@ -77,7 +82,7 @@ class EnsembleStructure:
 
     Attributes
     ----------
-    model : DynamicModel
+    model : DynamicModel or CoupledModel
         Model with estimated parameters.
     weight : float
         Weight of the structure. Its members have equal weights.
@@ -85,7 +90,7 @@ class EnsembleStructure:
         Parameters of the members.
     """
 
-    model: DynamicModel
+    model: AnyModel
     weight: float
     parameters: NDArray[np.float64]
 
@@ -114,18 +119,18 @@ class Ensemble:
         ]
         return np.concatenate(shares)
 
-    def simulate(self, record: Dataset, warm_up: int) -> NDArray[np.float64]:
+    def simulate(self, record: AnyRecord, warm_up: int) -> NDArray[np.float64]:
         """Return the free runs of all members.
 
         Parameters
         ----------
-        record : Dataset
+        record : Dataset or CoupledRecord
         warm_up : int
             Number of samples before the first prediction. Members with larger lags start later.
 
         Returns
         -------
-        ndarray, shape (members, samples)
+        ndarray, shape (members, samples) or (members, samples, outputs)
             The measured output before the first prediction, and NaN after a divergence.
         """
         runs = []
@@ -144,7 +149,7 @@ class Ensemble:
         Parameters
         ----------
         runs : ndarray, shape (members, samples)
-            Result of `simulate`, or some of its columns.
+            Result of `simulate` for one output, or some of its columns.
         centre : ndarray, shape (samples,)
             Simulated output.
 
@@ -163,8 +168,8 @@ class Ensemble:
 
 
 def make_ensemble(
-    candidates: Sequence[ValidatedModel],
-    split: Split,
+    candidates: Sequence[ValidatedModel[M]],
+    split: Split | CoupledSplit,
     constraints: str,
     warm_up: int,
     seed: int,
@@ -177,7 +182,7 @@ def make_ensemble(
     candidates : sequence of ValidatedModel
         Models with parameters. Of several candidates with one structure, the one with the least validation
         error counts. Their order has no effect.
-    split : Split
+    split : Split or CoupledSplit
         Estimation data, from which the members draw their parameters, and validation data, which give the
         weights.
     constraints : str
@@ -195,7 +200,7 @@ def make_ensemble(
         None if the free run of every candidate diverges on the validation data, or if ``skip`` returned true.
     """
     structures = []
-    floor = (_ROUNDING * split.validation.output_range) ** 2
+    floor = _error_floor(split.validation)
     kept = _weigh(_best_of_each_structure(candidates), split.validation, floor, warm_up)
     for position, (candidate, weight) in enumerate(kept):
         if skip():
@@ -203,10 +208,11 @@ def make_ensemble(
         model, count = candidate.model, max(1, round(MEMBERS * weight))
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(position,)))
         drawn = draw_parameters(model, split.estimation, candidate.interval, constraints, warm_up, count, rng)
-        error = split.validation.y - free_runs(model, drawn, split.validation, warm_up)
         # The divergence of a member gives NaN, which is not plausible either.
-        predicted = ~np.isnan(free_run(model, split.validation, warm_up).y)
-        plausible = np.mean(error[:, predicted] ** 2, axis=1) <= _IMPLAUSIBLE * candidate.error + floor
+        predicted = _predicted(free_run(model, split.validation, warm_up).y)
+        runs = free_runs(model, drawn, split.validation, warm_up)
+        errors = mean_squares(split.validation, runs, predicted)
+        plausible = errors <= _IMPLAUSIBLE * candidate.error + floor
         members = drawn[plausible] if plausible.any() else np.array([model.parameters])
         structure = model
         if isinstance(model, Model):
@@ -215,9 +221,47 @@ def make_ensemble(
     return Ensemble(tuple(structures)) if structures else None
 
 
-def _best_of_each_structure(candidates: Sequence[ValidatedModel]) -> list[ValidatedModel]:
+def mean_squares(
+    record: AnyRecord, runs: NDArray[np.float64], predicted: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the mean squared error of simulations.
+
+    Parameters
+    ----------
+    record : Dataset or CoupledRecord
+    runs : ndarray, shape (runs, samples) or (runs, samples, outputs)
+    predicted : ndarray of bool, shape (samples,)
+        Samples that count.
+
+    Returns
+    -------
+    ndarray, shape (runs,)
+        In the squared unit of the output. With several outputs, the geometric mean of the errors relative to
+        the squared ranges: the likelihood of independent normal errors with unknown variances depends on it.
+    """
+    squares: NDArray[np.float64] = np.mean((record.y - runs)[:, predicted] ** 2, axis=1)
+    if isinstance(record, Dataset):
+        return squares
+    ranges = np.array([each.output_range or 1.0 for each in record.records])
+    # Errors by rounding are equal.
+    relative: NDArray[np.float64] = np.exp(np.log(squares / ranges / ranges + _ROUNDING**2).mean(axis=1))
+    return relative
+
+
+def _predicted(y: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which samples of a simulation of one or several outputs have a value, shape (samples,)."""
+    found: NDArray[np.bool_] = ~np.isnan(y.reshape(len(y), -1)[:, 0])
+    return found
+
+
+def _error_floor(record: AnyRecord) -> float:
+    scale = record.output_range if isinstance(record, Dataset) else 1.0
+    return (_ROUNDING * scale) ** 2
+
+
+def _best_of_each_structure(candidates: Sequence[ValidatedModel[M]]) -> list[ValidatedModel[M]]:
     """Return the candidate with the least error of each structure, in the order of their errors."""
-    found: dict[tuple[str, ...], ValidatedModel] = {}
+    found: dict[tuple[str, ...], ValidatedModel[M]] = {}
     for candidate in sorted(candidates, key=lambda each: each.order):
         if np.isfinite(candidate.error):
             found.setdefault(candidate.model.parameter_names, candidate)
@@ -225,13 +269,14 @@ def _best_of_each_structure(candidates: Sequence[ValidatedModel]) -> list[Valida
 
 
 def _weigh(
-    candidates: list[ValidatedModel], validation: Dataset, floor: float, warm_up: int
-) -> list[tuple[ValidatedModel, float]]:
+    candidates: list[ValidatedModel[M]], validation: AnyRecord, floor: float, warm_up: int
+) -> list[tuple[ValidatedModel[M], float]]:
     """Return the candidates of relevant weight with their weights, largest weight first."""
     if not candidates:
         return []
     best = free_run(candidates[0].model, validation, warm_up).y
-    count = effective_samples((validation.y - best)[~np.isnan(best)])
+    residual = (validation.y - best)[_predicted(best)]
+    count = sum(map(effective_samples, np.atleast_2d(residual.T)))
     errors = np.array([candidate.error for candidate in candidates]) + floor
     # The floor is 0 if the output is constant, and the ratio of two errors remains finite.
     errors += np.finfo(float).tiny * max(1.0, errors.max())

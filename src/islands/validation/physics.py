@@ -271,7 +271,7 @@ def _simulate(
             )
         )
     joined = join(tuple(recordings))
-    simulated = free_run(model, joined, bound=divergence_bound(record)).y
+    simulated = free_run(model, joined, bound=divergence_bound(record.y)).y
     for begin, end in joined.bounds:
         yield simulated[begin + warm_up : end]
 

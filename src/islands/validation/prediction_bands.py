@@ -19,9 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.coupled_record import CoupledSplit
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError
+from islands.models.coupled_narx import CoupledModel
 from islands.models.protocol import DynamicModel
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import Ensemble, effective_samples
@@ -100,12 +102,27 @@ class PredictionBands:
         RecordError
             The record does not match the model, or is too short for it or for a member of the ensemble.
         """
-        factor = self._factor(level)
         first = model.maximum_lag if warm_up is None else warm_up
-        run = free_run(model, record, first)
-        spread = self.ensemble.spread(self.ensemble.simulate(record, first), run.y)
-        half = factor * np.sqrt(self.noise**2 + spread**2)
-        return PredictionBand(level, run.y, run.y - half, run.y + half)
+        run = free_run(model, record, first).y
+        return self.band(run, self.ensemble.simulate(record, first), level)
+
+    def band(
+        self, run: NDArray[np.float64], runs: NDArray[np.float64], level: float = LEVEL
+    ) -> PredictionBand:
+        """Return the band about a free run.
+
+        Parameters
+        ----------
+        run : ndarray, shape (samples,)
+            Free run of the model.
+        runs : ndarray, shape (members, samples)
+            Free runs of the ensemble.
+        level : float
+            As for `predict`.
+        """
+        factor = self._factor(level)
+        half = factor * np.sqrt(self.noise**2 + self.ensemble.spread(runs, run) ** 2)
+        return PredictionBand(level, run, run - half, run + half)
 
     def typical_half_width(self, level: float = LEVEL) -> float:
         """Return the median half-width of a band on the data, in the unit of the output."""
@@ -138,30 +155,67 @@ def calibrate_bands(
     tuple of PredictionBands or None
         None for a model that diverges on the estimation or the validation data.
     """
-    parts = [(record, *_runs(record, ensemble, warm_up)) for record in (split.estimation, split.validation)]
-    return tuple(_calibrate(model, ensemble, parts, warm_up) for model in models)
+    parts = [(record, ensemble.simulate(record, warm_up)) for record in (split.estimation, split.validation)]
 
-
-def _runs(record: Dataset, ensemble: Ensemble, warm_up: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return samples of a record at equal distances, and the free runs of the ensemble at them."""
-    samples = np.arange(0, record.samples, -(-record.samples // _SAMPLES))
-    return samples, ensemble.simulate(record, warm_up)[:, samples]
-
-
-def _calibrate(
-    model: DynamicModel,
-    ensemble: Ensemble,
-    parts: Sequence[tuple[Dataset, NDArray[np.int64], NDArray[np.float64]]],
-    warm_up: int,
-) -> PredictionBands | None:
-    residuals, spreads, count = [], [], 0.0
-    for record, samples, runs in parts:
-        run = free_run(model, record, warm_up)
-        if not run.outcome:
+    def calibrate(model: DynamicModel) -> PredictionBands | None:
+        simulated = [free_run(model, record, warm_up) for record, _ in parts]
+        if not all(run.outcome for run in simulated):
             return None
-        residual = record.y - run.y
+        outputs = [
+            _Output(record.y, run.y, runs) for (record, runs), run in zip(parts, simulated, strict=True)
+        ]
+        return _calibrate(ensemble, outputs)
+
+    return tuple(map(calibrate, models))
+
+
+def calibrate_output_bands(
+    model: CoupledModel, ensemble: Ensemble, split: CoupledSplit, warm_up: int
+) -> tuple[PredictionBands, ...]:
+    """Calibrate the bands of every output of a model; none if it diverges on a part of the data.
+
+    Parameters
+    ----------
+    model : CoupledModel
+    ensemble : Ensemble
+    split : CoupledSplit
+    warm_up : int
+        Number of samples before the first prediction.
+    """
+    found = []
+    parts = [
+        (record, free_run(model, record, warm_up), ensemble.simulate(record, warm_up))
+        for record in (split.estimation, split.validation)
+    ]
+    if not all(run.outcome for _, run, _ in parts):
+        return ()
+    for place in range(len(model.models)):
+        outputs = [
+            _Output(record.records[place].y, run.y[:, place], runs[:, :, place])
+            for record, run, runs in parts
+        ]
+        if (calibrated := _calibrate(ensemble, outputs)) is None:
+            return ()
+        found.append(calibrated)
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Output:
+    """Measured output, free run of the model, and free runs of the ensemble, on a part of the data."""
+
+    y: NDArray[np.float64]
+    run: NDArray[np.float64]
+    runs: NDArray[np.float64]
+
+
+def _calibrate(ensemble: Ensemble, parts: Sequence[_Output]) -> PredictionBands | None:
+    residuals, spreads, count = [], [], 0.0
+    for part in parts:
+        residual = part.y - part.run
         count += effective_samples(residual[~np.isnan(residual)])
-        spread = ensemble.spread(runs, run.y[samples])
+        samples = np.arange(0, len(residual), -(-len(residual) // _SAMPLES))
+        spread = ensemble.spread(part.runs[:, samples], part.run[samples])
         known = ~np.isnan(residual[samples]) & np.isfinite(spread)
         residuals.append(np.abs(residual[samples][known]))
         spreads.append(spread[known])

@@ -13,7 +13,7 @@ from islands.cli import options
 from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels
 from islands.cli.record_options import with_reading_options
-from islands.data.coupled_record import CoupledRecord
+from islands.data.coupled_record import CoupledRecord, match_coupled
 from islands.data.dataset import Dataset
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import DETREND
@@ -33,7 +33,6 @@ from islands.io.records.table_reading import read_table
 from islands.io.records.writer import write_coupled_simulation
 from islands.models.coupled_narx import coupled_signals
 from islands.models.equations import named_signals
-from islands.simulation.coupled_free_run import match_coupled
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 
@@ -164,8 +163,8 @@ def _simulate_model(found: FittedModel, request: _Request) -> None:
 def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
     """Simulate all outputs of a record from its first samples; print the errors and write the outputs."""
     model, outputs = found.model, request.outputs
-    if request.mode != "free-run" or request.bands is not None:
-        raise SettingsError("a model of several outputs has free runs only: leave out --mode and --bands")
+    if request.mode != "free-run":
+        raise SettingsError("a model of several outputs has free runs only: leave out --mode")
     request.refuse_detrend("a model of several outputs")
     if outputs and len(outputs) != len(model.output_names):
         raise SettingsError(
@@ -189,8 +188,10 @@ def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
     compile_kernels()
     first = found.warm_up if request.warm_up is None else request.warm_up
     simulation = found.simulate(data, first)
+    bands = () if request.bands is None else found.bands(data, request.bands, first)
     if request.out is not None:
-        write_coupled_simulation(data, simulation.y, request.out)
+        limits = [(band.lower, band.upper) for band in bands]
+        write_coupled_simulation(data, simulation.y, request.out, limits)
         output.print(f"{request.out}: {data.samples} rows", markup=False)
     output.print(f"free-run after a warm-up of {first} samples: {simulation.outcome}", markup=False)
     for each, y in zip(data.records, simulation.y.T, strict=True):
@@ -200,6 +201,8 @@ def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
             f"{each.output_unit}".rstrip(),
             markup=False,
         )
+    for each, band in zip(data.records, bands, strict=False):
+        _print_band(each, band, f"{each.output_name}: ")
 
 
 def _simulate_system(found: SavedSimulation, request: _Request) -> None:
@@ -238,10 +241,10 @@ def _print_metrics(
         _print_band(data, band)
 
 
-def _print_band(data: Dataset, band: PredictionBand) -> None:
+def _print_band(data: Dataset, band: PredictionBand, title: str = "") -> None:
     predicted = ~np.isnan(band.y)
     half = 0.5 * float(np.median((band.upper - band.lower)[predicted]))
-    text = f"{100 * band.level:g} % band: median half-width {half:.6g} {data.output_unit}".rstrip()
+    text = f"{title}{100 * band.level:g} % band: median half-width {half:.6g} {data.output_unit}".rstrip()
     known = predicted & ~np.isnan(data.y)
     if known.any():
         inside = (band.lower <= data.y) & (data.y <= band.upper)

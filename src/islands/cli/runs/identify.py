@@ -146,15 +146,7 @@ def run(
             show("figures", 1.0)
             drawing = Steps(stop=stop)
             result.save(folder, drawing)
-        results = result.results if isinstance(result, islands.CoupledResult) else (result,)
-        searches = [each.search_result.search for each in results]
-        if not stop() and any(each.ended_by == "stopped" for each in searches):
-            _print_limit(run_options, folder)
-        show_result(result, folder)
-        if run_options.verbose:
-            for each in searches:
-                for name, (size, limit) in each.caches.items():
-                    output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
+        _show_run(result, run_options, folder, stop)
         if test_data is not None:
             evaluate_test(result, test_data, folder)
         stop.end(folder, (*result.left_out, *drawing.left_out), _explain_continuation(folder))
@@ -175,13 +167,23 @@ def _explain_continuation(folder: Path) -> str:
     return f"continue with --resume {folder}" if (folder / CHECKPOINT).exists() else REPEAT
 
 
-def _print_limit(run_options: RunOptions, folder: Path) -> None:
-    """Print that the search ended before its last generation."""
-    errors.print(f"stopped: the result is the best so far; continue with --resume {folder}", markup=False)
-    if run_options.wall_time is not None:
-        errors.print(
-            "a result limited by --wall-time is not reproducible: it depends on the speed of the run"
-        )
+def _show_run(
+    result: islands.Result | islands.CoupledResult, options: RunOptions, folder: Path, stop: StopRequests
+) -> None:
+    """Print the result, whether its searches ended before their last generations, and their caches."""
+    results = result.results if isinstance(result, islands.CoupledResult) else (result,)
+    searches = [each.search_result.search for each in results]
+    if not stop() and any(each.ended_by == "stopped" for each in searches):
+        errors.print(f"stopped: the result is the best so far; continue with --resume {folder}", markup=False)
+        if options.wall_time is not None:
+            errors.print(
+                "a result limited by --wall-time is not reproducible: it depends on the speed of the run"
+            )
+    show_result(result, folder)
+    if options.verbose:
+        for each in searches:
+            for name, (size, limit) in each.caches.items():
+                output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
 
 
 def _choose_preset(

@@ -7,16 +7,17 @@ from math import inf
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from islands.data.averaging import AUTO, average_samples
-from islands.data.coupled_record import CoupledRecord, check_outputs, couple, split_coupled
+from islands.data.coupled_record import CoupledRecord, CoupledSplit, check_outputs, couple, split_coupled
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError, suggest
-from islands.estimation.coupled_refinement import refine_coupled
 from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.estimation.refinement import refine
 from islands.evolution.engine import Engine
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState, keep_hall, stop_reason
 from islands.evolution.settings import Settings
+from islands.facade.coupled.bands import make_bands
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.coupled.selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
@@ -37,9 +38,13 @@ from islands.progress import (
     ignore_progress,
     never_stop,
 )
+from islands.simulation.outcome import EvaluationOutcome
 
 if TYPE_CHECKING:
     from islands.io.data_frames import FrameLike
+
+#: Largest number of accepted steps of the common refinement over each interval.
+_STEPS = 20
 
 #: Names of the steps after the searches of the outputs.
 _CHOICE, _REFINEMENT = "choice of the equations", "refinement of all equations"
@@ -139,7 +144,7 @@ def fit_coupled(
     trial = take_library(chosen["library"], degree, lags, constraints)
     find = partial(fit, seed=seed, stop=stop)
     data = _read_data(record, inputs, outputs, dt, validation)
-    return _couple(data, chosen, trial, trial.lags + 3, refine_together, Steps(progress, stop), find)
+    return _couple(data, chosen, trial, trial.lags + 3, refine_together, seed, Steps(progress, stop), find)
 
 
 def identify_coupled(
@@ -209,7 +214,7 @@ def identify_coupled(
     trial = make_trial_library(settings)
     data = _read_data(record, inputs, outputs, dt, validation)
     return _couple(
-        data, chosen, trial, settings.maximum_lag + 3, refine_together, Steps(progress, stop), find
+        data, chosen, trial, settings.maximum_lag + 3, refine_together, seed, Steps(progress, stop), find
     )
 
 
@@ -269,7 +274,7 @@ def _read_data(
     outputs: Sequence[str],
     dt: float | None,
     validation: "CoupledRecord | FrameLike | float",
-) -> tuple[CoupledRecord, CoupledRecord]:
+) -> CoupledSplit:
     """Return estimation data and validation data, at the sampling time of the record."""
 
     def as_coupled(data: Any) -> CoupledRecord:
@@ -287,18 +292,20 @@ def _read_data(
 
 
 def _couple(
-    data: tuple[CoupledRecord, CoupledRecord],
+    data: CoupledSplit,
     options: dict[str, Any],
     trial: TrialLibrary,
     least: int,
     refine_together: bool,
+    seed: int,
     steps: Steps,
     find: Callable[..., Result],
 ) -> CoupledResult:
     """Search every output, choose the equations and refine them."""
-    estimation, validation = data
-    names = estimation.output_names
-    splits = [Split(estimation.separate(place), validation.separate(place)) for place in range(len(names))]
+    names = data.estimation.output_names
+    splits = [
+        Split(data.estimation.separate(place), data.validation.separate(place)) for place in range(len(names))
+    ]
     steps("sampling rate", 0.0)
     # The equations have one sampling time: the shortest that one of them needs.
     average = options.get("average", AUTO)
@@ -311,58 +318,61 @@ def _couple(
         except StoppedError as stopped:
             raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
     steps.report("choice of the equations", 0.0)
-    estimation, validation = (
-        part.map(partial(average_samples, count=options["average"])) for part in (estimation, validation)
-    )
+    means = partial(average_samples, count=options["average"])
+    data = CoupledSplit(data.estimation.map(means), data.validation.map(means))
     warm_up = max(entry.warm_up for result in results for entry in result.models)
     ranked = [[require_narx(entry.model) for entry in result.models] for result in results]
     best = [result.recommendation.rank for result in results]
-    choice = choose_equations(ranked, best, validation, warm_up, partial(steps.skip, _CHOICE))
+    choice = choose_equations(ranked, best, data.validation, warm_up, partial(steps.skip, _CHOICE))
     model = CoupledModel(tuple(models[rank - 1] for models, rank in zip(ranked, choice.ranks, strict=True)))
     refined = None
+    constraints = str(results[0].search_result.settings["constraints"])
     if refine_together and choice.error < inf and not steps.skip(_REFINEMENT):
         steps.report(_REFINEMENT, 0.0)
         skip = partial(steps.skip, _REFINEMENT)
         shooting = results[0].search_result.shooting_interval
-        constraints = str(results[0].search_result.settings["constraints"])
-        refined = _refine(model, estimation, validation, shooting, warm_up, constraints, choice.error, skip)
+        refined = _refine(model, data, shooting, warm_up, constraints, choice.error, skip)
+    bands = make_bands(refined or model, ranked, choice.ranks, data, constraints, warm_up, seed, steps)
     left_out = [
         f"{name}: {step}" for name, found in zip(names, results, strict=True) for step in found.left_out
     ]
     return CoupledResult(
         refined or model,
         warm_up,
+        bands,
         tuple(results),
         choice.ranks,
         refined is not None,
-        estimation,
-        validation,
+        data,
         (*left_out, *steps.left_out),
     )
 
 
 def _refine(
     model: CoupledModel,
-    estimation: CoupledRecord,
-    validation: CoupledRecord,
+    data: CoupledSplit,
     shooting: int,
     warm_up: int,
     constraints: str,
     error: float,
     skip: Callable[[], bool],
 ) -> CoupledModel | None:
-    """Refine first over shooting intervals and then over the free run; return the model if it is better."""
+    """Refine all parameters together; return the model if its error on the validation data is smaller.
+
+    Each equation was estimated with the measured values of the other outputs, whose noise biases the
+    parameters, and a common simulation feeds errors from one equation to the other.
+    """
     best, started = None, model
     for interval in (shooting, None):
         if skip():
             break
-        found = refine_coupled(started, estimation, interval, warm_up, constraints, stop=skip)
-        if found is None:
+        found = refine(started, data.estimation, interval, constraints, warm_up, _STEPS, stop=skip)
+        if isinstance(found, EvaluationOutcome) or not found.steps:
             continue
-        started = found
-        reached = measure_error(found, validation, warm_up)
+        started = found.model
+        reached = measure_error(started, data.validation, warm_up)
         if reached < error:
-            best, error = found, reached
+            best, error = started, reached
     return best
 
 

@@ -8,17 +8,20 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from islands.data.coupled_record import CoupledRecord
+from islands.data.coupled_record import CoupledRecord, CoupledSplit, match_coupled
+from islands.data.signal_map import match_rate
+from islands.errors import ModelError
 from islands.export import export_or_write
 from islands.facade.results.identification import Result
+from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import model_json
 from islands.io.result_folder import record_document
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.models.coupled_narx import CoupledModel, coupled_equation, coupled_signals
 from islands.progress import Steps
-from islands.simulation.coupled_free_run import CoupledSimulation, coupled_free_run
-from islands.simulation.predictors import one_step_ahead
+from islands.simulation.predictors import Simulation, free_run, one_step_ahead
 from islands.validation.metrics import Metrics, metrics
+from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,17 +39,21 @@ class FittedCoupledModel:
         Equations of all outputs.
     warm_up : int
         Number of samples before the first prediction. The errors depend on it.
+    prediction_bands : tuple of PredictionBands
+        Prediction bands of every output. Empty if the free run of the model diverged, the search was stopped
+        before them, or outside of a result folder.
     """
 
     model: CoupledModel
     warm_up: int
+    prediction_bands: tuple[PredictionBands, ...]
 
     @property
     def equation(self) -> str:
         """Equations with the column names of the record, one line per output."""
         return coupled_equation(self.model)
 
-    def simulate(self, record: CoupledRecord, warm_up: int | None = None) -> CoupledSimulation:
+    def simulate(self, record: CoupledRecord, warm_up: int | None = None) -> Simulation:
         """Simulate all outputs of a record from its first samples.
 
         Parameters
@@ -56,7 +63,45 @@ class FittedCoupledModel:
         warm_up : int, optional
             Number of samples before the first prediction; by default that of the errors of the result.
         """
-        return coupled_free_run(self.model, record, self.warm_up if warm_up is None else warm_up)
+        return free_run(self.model, record, self.warm_up if warm_up is None else warm_up)
+
+    def bands(
+        self, record: CoupledRecord, level: float = LEVEL, warm_up: int | None = None
+    ) -> tuple[PredictionBand, ...]:
+        """Simulate all outputs of a record, each with a band that contains its measured samples.
+
+        Parameters
+        ----------
+        record, warm_up
+            As for `simulate`.
+        level : float
+            Probability with which a band contains a measured sample, between 0.5 and 0.99.
+
+        Returns
+        -------
+        tuple of PredictionBand
+            One for each output.
+
+        Raises
+        ------
+        ModelError
+            The model has no bands.
+        SettingsError
+            The level is out of range.
+        """
+        if not self.prediction_bands:
+            raise ModelError(
+                "the model has no prediction bands: it is not of a result folder, its free run diverges, or "
+                "the search was stopped before them"
+            )
+        first = self.warm_up if warm_up is None else warm_up
+        data = record.map(lambda each: match_rate(self.model, each))
+        run = free_run(self.model, data, first).y
+        runs = self.prediction_bands[0].ensemble.simulate(match_coupled(self.model, data), first)
+        return tuple(
+            each.band(run[:, place], runs[..., place], level)
+            for place, each in enumerate(self.prediction_bands)
+        )
 
     def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
         """Return the coupled model as text in a format of ``EXPORTS``, or write it to a file."""
@@ -83,8 +128,8 @@ class CoupledResult(FittedCoupledModel):
         Rank of the chosen model in each of these results.
     refined : bool
         Whether the parameters were refined on the common simulation. If not, they are those of the results.
-    estimation, validation : CoupledRecord
-        Data with the sampling time of the model.
+    split : CoupledSplit
+        Estimation data and validation data with the sampling time of the model.
     left_out : tuple of str
         Steps that a request to stop has left out; empty for a complete result.
     wall_s : float or None
@@ -94,8 +139,7 @@ class CoupledResult(FittedCoupledModel):
     results: tuple[Result, ...]
     ranks: tuple[int, ...]
     refined: bool
-    estimation: CoupledRecord
-    validation: CoupledRecord
+    split: CoupledSplit
     left_out: tuple[str, ...] = ()
     wall_s: float | None = None
 
@@ -111,7 +155,7 @@ class CoupledResult(FittedCoupledModel):
         simulation diverged.
         """
         found: dict[str, dict[str, dict[str, Metrics]]] = {name: {} for name in self.model.output_names}
-        for part, record in (("estimation", self.estimation), ("validation", self.validation)):
+        for part, record in (("estimation", self.split.estimation), ("validation", self.split.validation)):
             free = self.simulate(record)
             for place, (name, single) in enumerate(
                 zip(self.model.output_names, self.model.models, strict=True)
@@ -127,11 +171,13 @@ class CoupledResult(FittedCoupledModel):
         return found
 
     def plot(self, output: str) -> "Figure":
-        """Draw the free run of one output on the validation data."""
+        """Draw the free run of one output on the validation data, with its 90 % band."""
         from islands.figures.free_run import draw_free_run  # noqa: PLC0415 - matplotlib takes half a second
 
         place = self.model.output_names.index(output)
-        return draw_free_run(self.validation.records[place], self.simulate(self.validation).y[:, place])
+        data, run = self.split.validation, self.simulate(self.split.validation)
+        band = self.bands(data)[place] if self.prediction_bands else None
+        return draw_free_run(data.records[place], run.y[:, place], band=band)
 
     def save(self, folder: str | Path, steps: Steps | None = None) -> Path:
         """Write ``result.json``, ``model.json``, ``summary.txt``, ``figures/`` and ``outputs/``.
@@ -173,9 +219,10 @@ class CoupledResult(FittedCoupledModel):
             "outputs": [
                 {
                     "name": name,
-                    "unit": self.validation.records[place].output_unit,
+                    "unit": self.split.validation.records[place].output_unit,
                     "folder": f"outputs/{list_folders(self.model.output_names)[place]}",
                     "rank": self.ranks[place],
+                    "bands": bands_document(self.prediction_bands[place] if self.prediction_bands else None),
                     "metrics": {
                         part: {mode: _finite(asdict(each)) for mode, each in by_mode.items()}
                         for part, by_mode in self.metrics[name].items()
@@ -183,8 +230,11 @@ class CoupledResult(FittedCoupledModel):
                 }
                 for place, name in enumerate(self.model.output_names)
             ],
-            "estimation": record_document(self.estimation.records[0]) | {"names": self._names()},
-            "validation": record_document(self.validation.records[0]) | {"names": self._names()},
+            "ensemble": ensemble_document(
+                self.prediction_bands[0].ensemble if self.prediction_bands else None
+            ),
+            "estimation": record_document(self.split.estimation.records[0]) | {"names": self._names()},
+            "validation": record_document(self.split.validation.records[0]) | {"names": self._names()},
         }
 
     def _names(self) -> dict[str, list[str]]:
@@ -196,12 +246,12 @@ class CoupledResult(FittedCoupledModel):
             f"{len(self.model.models)} outputs, {self.model.size} terms, parameters {refined}:",
             "",
             *(line for single in self.model.models for line in [*term_table(single), ""]),
-            *wrap(f"{coupled_signals(self.model) or f'k counts samples of {self.validation.dt:g} s'}."),
+            *wrap(f"{coupled_signals(self.model) or f'k counts samples of {self.split.validation.dt:g} s'}."),
             "",
             "Validation data; all outputs are simulated together, from the inputs alone:",
             f"{'output':20} {'free-run RMSE':>18} {'% of range':>10} {'R2':>8} {'one-step RMSE':>18}",
         ]
-        for record, (name, parts) in zip(self.validation.records, self.metrics.items(), strict=True):
+        for record, (name, parts) in zip(self.split.validation.records, self.metrics.items(), strict=True):
             free, one = parts["validation"]["free_run"], parts["validation"]["one_step_ahead"]
             unit = f" {record.output_unit}".rstrip()
             lines.append(

@@ -4,12 +4,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
-import numpy as np
-
 from islands.data.coupled_record import CoupledRecord
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model
-from islands.simulation.coupled_free_run import CoupledSimulator
+from islands.simulation.predictors import free_run
 
 #: Excess of the error over the least, as a fraction, that never justifies another term.
 NEGLIGIBLE_EXCESS = 0.03
@@ -101,7 +99,7 @@ def _list_starts(ranked: Sequence[Sequence[Model]], recommended: Sequence[int]) 
 
 def measure_error(model: CoupledModel, validation: CoupledRecord, warm_up: int) -> float:
     """Return the error of the coupled free run relative to the ranges of the outputs."""
-    simulated = CoupledSimulator(model, validation, None, warm_up)(np.array(model.parameters))
+    simulated = free_run(model, validation, warm_up)
     if not simulated.outcome:
         return inf
     ranges = [each.output_range or 1.0 for each in validation.records]

@@ -75,7 +75,7 @@ def simulate(
 
     record = as_record(record)
     y = simulate_spec(model, record, columns)
-    return Simulation(y, float(np.mean((record.y - y) ** 2)), EvaluationOutcome())
+    return Simulation(y, (float(np.mean((record.y - y) ** 2)),), EvaluationOutcome())
 
 
 def record_of_model(

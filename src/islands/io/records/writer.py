@@ -63,16 +63,23 @@ def write_simulation(
     _write(path, names, rows)
 
 
-def write_coupled_simulation(record: CoupledRecord, simulated: NDArray[np.float64], path: str | Path) -> None:
+def write_coupled_simulation(
+    record: CoupledRecord, simulated: NDArray[np.float64], path: str | Path, bands: Sequence[Band] = ()
+) -> None:
     """Write the column ``time`` (s) and one column per output, such as ``level_cm_sim``.
 
     Parameters
     ----------
     simulated : ndarray, shape (samples, outputs)
+    bands : sequence of (ndarray, ndarray)
+        Limits of the prediction band of each output, written as the columns ``level_cm_low`` and
+        ``level_cm_high``; none by default.
     """
-    names = ("time", *(f"{name}_sim" for name in record.output_names))
-    rows = zip(_round_times(record.records[0]), *simulated.T.tolist(), strict=True)
-    _write(path, names, rows)
+    columns = {f"{name}_sim": y for name, y in zip(record.output_names, simulated.T, strict=True)}
+    for name, (lower, upper) in zip(record.output_names, bands, strict=False):
+        columns |= {f"{name}_low": lower, f"{name}_high": upper}
+    rows = zip(_round_times(record.records[0]), *(each.tolist() for each in columns.values()), strict=True)
+    _write(path, ("time", *columns), rows)
 
 
 def _round_times(record: Dataset) -> list[float]:

@@ -12,10 +12,12 @@ from islands.estimation.estimate import estimate
 from islands.estimation.refinement import RefinedModel, refine
 from islands.estimation.shooting_residual import ShootingResidual
 from islands.expressions.parsing import parse
+from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.physics import cluster_sums
+from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record
 
 HYSTERESIS = {
     "y(k-1)": 1.0,
@@ -244,6 +246,35 @@ def test_parameter_that_starts_at_zero_is_refined():
     start = model({**HYSTERESIS, "u(k-1)*phi1(u(k-1), u(k-2))": 0.0})
     found = refine_model(start, make_record(HYSTERESIS), 50)
     assert found.model.parameters == pytest.approx(model(HYSTERESIS).parameters, rel=1e-6)
+
+
+# Several outputs.
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("coupled", [TWO_MASSES, PREY], ids=["masses", "prey"])
+def test_the_parameters_of_several_outputs_are_within_their_standard_errors(coupled):
+    deviations = []
+    for seed in range(20):
+        record = make_coupled_record(coupled, samples=400, noise=0.05, seed=seed)
+        found = refine(coupled, record, None, warm_up=2).model
+        deviations.append((np.array(found.parameters) - coupled.parameters) / found.standard_errors)
+    assert 0.88 < (np.abs(deviations) < 1.96).mean() < 0.99
+
+
+def test_the_equations_of_several_outputs_keep_their_constraint():
+    true = CoupledModel(
+        (
+            equation({"y(k-1)": 0.7, "y(k-2)": 0.3, "phi1(u1(k-1), u1(k-2))": 0.5}, ("u", "y2"), "y1"),
+            equation({"y(k-1)": 0.6, "y(k-2)": 0.4, "phi1(u2(k-1), u2(k-2))": 0.3}, ("u", "y1"), "y2"),
+        )
+    )
+    record = make_coupled_record(true, noise=0.02)
+    start = true.with_parameters((0.6, 0.4, 0.4, 0.5, 0.5, 0.2))
+    found = refine(start, record, None, "hysteresis")
+    assert found.after < 0.1 * found.before
+    for single in found.model.models:
+        assert all(cluster.met for cluster in cluster_sums(single))
 
 
 # Failures and invalid arguments.

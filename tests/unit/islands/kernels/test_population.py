@@ -112,7 +112,7 @@ def evaluated(
         table() if pairs is None else pairs,
         select_rows(data, WARM_UP),
         layout(data, WARM_UP, INTERVAL),
-        divergence_bound(data),
+        divergence_bound(data.y),
     )
     sizes = np.array([len(structure) for structure in structures])
     given, bounds = SelectedTerms(numbers, sizes), np.full(most + 1, allowed)

@@ -72,7 +72,7 @@ for name, groups in (("clusters", clusters), ("free", free)):
         for array in (*selected, *results):
             array.fill(0)
         context = PopulationContext(0, -1, OUTPUT, 1e-4, store.nodes, groups, pair_table(1 << 16),
-                                    select_rows(record, 4), cut, divergence_bound(record))
+                                    select_rows(record, 4), cut, divergence_bound(record.y))
         pruned = np.array([True, False, False, False])
         given = SelectedTerms(structures, sizes)
         evaluate(given, pruned, np.full(count + 1, np.inf), context, selected, results)

@@ -13,7 +13,7 @@ from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.export import EXPORTS, export
 from islands.models.coupled_narx import CoupledModel
-from islands.simulation.coupled_free_run import coupled_free_run
+from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record
 
 _TERMS = {"y(k-1)": 0.5, "max(u1(k-1), u3(k-2))": 0.1, "u2(k-1)*u4(k-1)*y(k-2)": -0.2, "1": 0.1 + 0.2}
@@ -45,7 +45,7 @@ def record_of(model):
 def channels_of(model):
     """Return the inputs, the outputs with their first samples, and the expected outputs."""
     record = record_of(model)
-    expected = coupled_free_run(model, record).y
+    expected = free_run(model, record).y
     expected[: model.maximum_lag] = record.y[: model.maximum_lag]
     return record.records[0].u.T, record.y.T, expected.T
 

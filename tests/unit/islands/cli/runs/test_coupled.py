@@ -8,7 +8,7 @@ import pytest
 
 import islands
 from islands.data.coupled_record import CoupledRecord
-from islands.simulation.coupled_free_run import coupled_free_run
+from islands.simulation.predictors import free_run
 from islands.validation.metrics import metrics
 from support.command_line import fail, succeed
 from support.coupled_systems import TWO_MASSES, make_coupled_record
@@ -47,6 +47,9 @@ def test_a_fitted_model_is_simulated_and_shown(record, tmp_path, monkeypatch) ->
     header, *rows = csv.reader(out.read_text().splitlines())
     assert header == ["time", "y1_sim", "y2_sim"]
     assert len(rows) == 150
+    printed = succeed("simulate", folder, record, "--bands", 0.9, "--out", out)
+    assert "y2: 90 % band: median half-width" in printed
+    assert out.read_text().splitlines()[0] == "time,y1_sim,y2_sim,y1_low,y1_high,y2_low,y2_high"
     for kind, start in (("plain", "y1(k) ="), ("c", "/*"), ("json", "{")):
         assert succeed("show", folder, "--format", kind).startswith(start)
     succeed("show", folder, "--format", "fmu", "--out", tmp_path / "masses.fmu")
@@ -84,7 +87,7 @@ def test_preprocessed_outputs_are_simulated_as_measured(record, tmp_path) -> Non
     data = CoupledRecord(tuple(islands.read_record(record, "u", name) for name in ("y1", "y2")))
     simulated = np.genfromtxt(out, delimiter=",", skip_header=1)[:, 1:]
     warm_up = json.loads((folder / "result.json").read_text())["warm_up"]
-    expected = coupled_free_run(model, data, warm_up).y[warm_up:]
+    expected = free_run(model, data, warm_up).y[warm_up:]
     np.testing.assert_allclose(simulated[-len(expected) :], expected, rtol=1e-9)
     # The offsets belong to the outputs as measured.
     assert np.abs(expected.mean(axis=0) - data.y[warm_up:].mean(axis=0)).max() < 0.05 * np.ptp(data.y)

@@ -22,7 +22,7 @@ from islands.io.checkpoints import (
     state_document,
     state_from_document,
 )
-from islands.simulation.coupled_free_run import coupled_free_run
+from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures
 
@@ -52,7 +52,7 @@ def test_without_noise_the_free_run_has_no_error(found) -> None:
 
 
 def test_the_errors_are_those_of_the_common_free_run(found) -> None:
-    simulated = coupled_free_run(found.model, found.validation, found.warm_up)
+    simulated = free_run(found.model, found.split.validation, found.warm_up)
     for place, name in enumerate(found.model.output_names):
         rmse = found.metrics[name]["validation"]["free_run"].rmse
         assert rmse**2 == pytest.approx(simulated.mean_squared_errors[place], rel=1e-9)
@@ -65,6 +65,10 @@ def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> Non
     assert load(folder).model == found.model
     loaded = islands.load(folder)
     assert (loaded.model, loaded.warm_up) == (found.model, found.warm_up)
+    for stored, band in zip(
+        loaded.bands(found.split.validation), found.bands(found.split.validation), strict=True
+    ):
+        np.testing.assert_array_equal(stored.lower, band.lower)
     document = json.loads((folder / "result.json").read_text())
     assert [each["name"] for each in document["outputs"]] == ["y1", "y2"]
     for each in document["outputs"]:
@@ -82,7 +86,7 @@ def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> Non
 def test_a_model_of_means_simulates_the_record_before_averaging() -> None:
     record = make_coupled_record(TWO_MASSES, samples=300, noise=0.01)
     result = fit_coupled(record, **(FAST | {"degree": 1, "average": 2}))
-    assert (result.model.average, result.validation.dt) == (2, 0.2)
+    assert (result.model.average, result.split.validation.dt) == (2, 0.2)
     np.testing.assert_array_equal(
         result.simulate(record).y,
         result.simulate(record.map(lambda each: average_samples(each, 2))).y,
@@ -94,7 +98,7 @@ def test_several_recordings_give_their_ends_to_the_validation_data() -> None:
     records = [make_coupled_record(TWO_MASSES, samples=120, seed=seed) for seed in (1, 2)]
     joined = CoupledRecord(tuple(join(each) for each in zip(*(r.records for r in records), strict=True)))
     result = fit_coupled(joined, **(FAST | {"degree": 1}))
-    assert result.validation.records[0].segments == (30, 30)
+    assert result.split.validation.records[0].segments == (30, 30)
     assert result.metrics["y2"]["validation"]["free_run"].mape < 1e-6
 
 
@@ -116,10 +120,25 @@ def test_noise_is_not_amplified_by_the_coupling() -> None:
     clean = make_coupled_record(TWO_MASSES, samples=500, seed=2)
 
     def error(result):
-        return np.sqrt(coupled_free_run(result.model, clean).mean_squared_errors).max()
+        return np.sqrt(free_run(result.model, clean).mean_squared_errors).max()
 
     assert together.refined
     assert error(together) < 0.5 * error(alone)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("model", [TWO_MASSES, PREY], ids=["masses", "prey"])
+def test_the_bands_of_every_output_contain_new_measurements(model) -> None:
+    noise = 0.05
+    options = FAST | {"degree": 1 if model is TWO_MASSES else 2, "max_terms": 5}
+    found = fit_coupled(make_coupled_record(model, samples=400, noise=noise), **options)
+    new = make_coupled_record(model, samples=2000, noise=noise, seed=2)
+    # The warm-up is measured without noise: the bands are for the noise of the other samples.
+    clean = make_coupled_record(model, samples=2000, seed=2)
+    for band, measured in zip(found.bands(clean, 0.9), new.records, strict=True):
+        known = ~np.isnan(band.y)
+        inside = (band.lower <= measured.y)[known] & (measured.y <= band.upper)[known]
+        assert 0.8 < inside.mean() < 0.97
 
 
 @pytest.mark.ci
@@ -168,7 +187,7 @@ def test_missing_outputs_are_skipped_for_all() -> None:
     record = make_coupled_record(PREY, samples=150)
     holed = np.where(np.isin(np.arange(150), (50, 120)), np.nan, record.y[:, 0])
     found = fit_coupled(CoupledRecord((replace(record.records[0], y=holed), record.records[1])), **FAST)
-    assert found.estimation.samples + found.validation.samples == record.samples - 2
+    assert found.split.estimation.samples + found.split.validation.samples == record.samples - 2
     assert found.metrics["y2"]["validation"]["free_run"].mape < 1e-6
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import islands
 from islands.data.averaging import average_samples
-from islands.data.coupled_record import CoupledRecord
+from islands.data.coupled_record import CoupledRecord, match_coupled
 from islands.data.dataset import Dataset
 from islands.data.preprocessing import preprocess
 from islands.data.signal_map import match_rate
@@ -16,9 +16,8 @@ from islands.errors import RecordError, SettingsError
 from islands.export import export
 from islands.io.models import read_coupled_model, write_model
 from islands.models.coupled_narx import CoupledModel, measured_coupled_model
-from islands.simulation.coupled_free_run import CoupledSimulator, coupled_free_run, match_coupled
 from islands.simulation.outcome import Status
-from islands.simulation.predictors import free_run
+from islands.simulation.predictors import free_run, multiple_shooting
 from support.block_cases import coupled_case
 from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record, simulate_scalar
 from support.exported_programs import needs_compiler, needs_octave, run_fmu, run_matlab_system
@@ -39,7 +38,7 @@ DECOUPLED = CoupledModel(
 @pytest.mark.parametrize("segments", [(), (150, 250), (40,) * 10])
 def test_a_decoupled_model_has_the_bits_of_its_single_models(segments) -> None:
     record = make_coupled_record(DECOUPLED, noise=0.1, segments=segments)
-    coupled = coupled_free_run(DECOUPLED, record, warm_up=4)
+    coupled = free_run(DECOUPLED, record, warm_up=4)
     for place, single in enumerate(DECOUPLED.models):
         alone = free_run(single, record.separate(place), warm_up=4)
         np.testing.assert_array_equal(coupled.y[:, place], alone.y)
@@ -51,21 +50,21 @@ def test_a_free_run_equals_a_simulation_with_python_floats(model) -> None:
     record = make_coupled_record(model, noise=0.05)
     warm_up = model.maximum_lag
     expected = simulate_scalar(model, record.records[0].u, record.y[:warm_up])
-    np.testing.assert_array_equal(coupled_free_run(model, record).y[warm_up:], expected[warm_up:])
+    np.testing.assert_array_equal(free_run(model, record).y[warm_up:], expected[warm_up:])
 
 
 def test_a_free_run_reads_the_outputs_in_the_warm_up_only() -> None:
     record = make_coupled_record(TWO_MASSES, noise=0.05)
     known = np.arange(record.samples) < TWO_MASSES.maximum_lag
     blind = record.map(lambda each: replace(each, y=np.where(known, each.y, np.nan)))
-    simulated = coupled_free_run(TWO_MASSES, blind)
-    np.testing.assert_array_equal(simulated.y, coupled_free_run(TWO_MASSES, record).y)
+    simulated = free_run(TWO_MASSES, blind)
+    np.testing.assert_array_equal(simulated.y, free_run(TWO_MASSES, record).y)
     assert np.isnan(simulated.mean_squared_errors).all()
 
 
 def test_an_interval_of_one_sample_is_the_prediction_one_step_ahead() -> None:
     record = make_coupled_record(PREY, noise=0.05)
-    steps = CoupledSimulator(PREY, record, 1)(np.array(PREY.parameters))
+    steps = multiple_shooting(PREY, record, 1)
     expected = simulate_scalar(PREY, record.records[0].u[:10], record.y[:9])
     np.testing.assert_array_equal(steps.y[9], expected[9])
 
@@ -73,7 +72,7 @@ def test_an_interval_of_one_sample_is_the_prediction_one_step_ahead() -> None:
 def test_a_divergence_ends_all_outputs_of_its_segment_only() -> None:
     unstable = TWO_MASSES.with_parameters((1.6, -0.8, 0.1, 5e3, 1.5, 3.0, 0.12, -0.04))
     record = make_coupled_record(TWO_MASSES, segments=(300, 100))
-    simulated = coupled_free_run(unstable, record)
+    simulated = free_run(unstable, record)
     assert simulated.outcome.verdict is Status.DIVERGED
     first = int(simulated.outcome.reason.rpartition(" ")[2])
     assert np.isfinite(simulated.y[2:first]).all()
@@ -86,18 +85,16 @@ def test_means_are_simulated_from_the_samples_of_the_record() -> None:
     means = CoupledModel(tuple(replace(each, average=2, dt=0.2) for each in TWO_MASSES.models))
     record = make_coupled_record(TWO_MASSES)
     averaged = record.map(lambda each: average_samples(each, 2))
-    np.testing.assert_array_equal(coupled_free_run(means, record).y, coupled_free_run(means, averaged).y)
+    np.testing.assert_array_equal(free_run(means, record).y, free_run(means, averaged).y)
 
 
 def test_outputs_and_inputs_are_matched_by_name() -> None:
     record = make_coupled_record(TWO_MASSES, noise=0.05)
     turned = CoupledRecord(record.records[::-1])
-    np.testing.assert_array_equal(
-        coupled_free_run(TWO_MASSES, turned).y, coupled_free_run(TWO_MASSES, record).y
-    )
+    np.testing.assert_array_equal(free_run(TWO_MASSES, turned).y, free_run(TWO_MASSES, record).y)
     strange = CoupledRecord((record.records[0], replace(record.records[1], output_name="x")))
     with pytest.raises(RecordError, match="name the same outputs"):
-        coupled_free_run(TWO_MASSES, strange)
+        free_run(TWO_MASSES, strange)
 
 
 def test_an_input_read_one_sample_early_is_advanced() -> None:
@@ -110,15 +107,15 @@ def test_an_input_read_one_sample_early_is_advanced() -> None:
     record = CoupledRecord(
         tuple(Dataset(u, y[:, place], 0.1, ("u",), name) for place, name in enumerate("ab"))
     )
-    np.testing.assert_allclose(coupled_free_run(early, record).y[1:], y[1:], rtol=1e-14)
+    np.testing.assert_allclose(free_run(early, record).y[1:], y[1:], rtol=1e-14)
 
 
 def test_a_short_warm_up_and_a_bad_interval_are_refused() -> None:
     record = make_coupled_record(TWO_MASSES)
     with pytest.raises(SettingsError, match="reads 2 samples back"):
-        coupled_free_run(TWO_MASSES, record, warm_up=1)
+        free_run(TWO_MASSES, record, warm_up=1)
     with pytest.raises(SettingsError, match="at least 1 sample"):
-        CoupledSimulator(TWO_MASSES, record, 0)
+        multiple_shooting(TWO_MASSES, record, 0)
 
 
 # Preprocessing: the measured record gives the simulation of the search with the offsets of the outputs.
@@ -145,7 +142,7 @@ def preprocessed(steps, average=1):
     )
     without = CoupledModel(tuple(replace(single, preprocessing=None, average=1) for single in model.models))
     offsets = [each.preprocessing.output_offset for each in prepared.records]
-    return prepared, model, coupled_free_run(without, prepared).y + offsets
+    return prepared, model, free_run(without, prepared).y + offsets
 
 
 def written_and_read(model, folder):
@@ -169,15 +166,15 @@ def run_block(run, model, record, folder):
 
 
 COUPLED_PATHS = {
-    "measured record": lambda model, record, _: coupled_free_run(model, record).y,
+    "measured record": lambda model, record, _: free_run(model, record).y,
     "at the rate of the model": lambda model, record, _: (
-        coupled_free_run(model, record.map(lambda each: match_rate(model, each))).y
+        free_run(model, record.map(lambda each: match_rate(model, each))).y
     ),
     "outputs in another order": lambda model, record, _: (
-        coupled_free_run(model, CoupledRecord(record.records[::-1])).y
+        free_run(model, CoupledRecord(record.records[::-1])).y
     ),
-    "file": lambda model, record, folder: coupled_free_run(written_and_read(model, folder), record).y,
-    "measured units": lambda model, record, _: coupled_free_run(measured_coupled_model(model), record).y,
+    "file": lambda model, record, folder: free_run(written_and_read(model, folder), record).y,
+    "measured units": lambda model, record, _: free_run(measured_coupled_model(model), record).y,
     "python": run_python,
     "fmu": pytest.param(
         partial(run_block, partial(run_fmu, kind="fmu")), marks=[pytest.mark.ci, needs_compiler]

@@ -1,0 +1,83 @@
+"""Prediction bands of a model of several outputs."""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+import numpy as np
+
+from islands.data.coupled_record import CoupledSplit
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import Model
+from islands.progress import Steps
+from islands.simulation.predictors import free_run
+from islands.validation.ensemble import ValidatedModel, make_ensemble, mean_squares
+from islands.validation.prediction_bands import PredictionBands, calibrate_output_bands
+
+#: Name of the step.
+_BANDS = "prediction bands"
+
+
+def make_bands(
+    model: CoupledModel,
+    ranked: Sequence[Sequence[Model]],
+    ranks: Sequence[int],
+    data: CoupledSplit,
+    constraints: str,
+    warm_up: int,
+    seed: int,
+    steps: Steps,
+) -> tuple[PredictionBands, ...]:
+    """Return the prediction bands of every output; none if the model diverges or a stop is requested.
+
+    The ensemble has the structure of the model, and those in which one equation is another of its output. The
+    parameters of its members are from a block bootstrap of the error of the common free run.
+
+    Parameters
+    ----------
+    model : CoupledModel
+        Chosen equations, with their final parameters.
+    ranked : sequence of sequence of Model
+        Models of every output, best first.
+    ranks : sequence of int
+        Chosen rank of every output, from 1.
+    data : CoupledSplit
+    constraints : str
+        Constraints of every equation.
+    warm_up : int
+        Number of samples before the first prediction.
+    seed : int
+    steps : Steps
+        The bands are an optional step.
+    """
+    if steps.skip(_BANDS):
+        return ()
+    steps.report(_BANDS, 1.0)
+    skip = partial(steps.skip, _BANDS)
+    candidates = [
+        ValidatedModel(each, None, _validate(each, data, warm_up))
+        for each in _list_rivals(model, ranked, ranks)
+    ]
+    ensemble = make_ensemble(candidates, data, constraints, warm_up, seed, skip)
+    if ensemble is None or skip():
+        return ()
+    return calibrate_output_bands(model, ensemble, data, warm_up)
+
+
+def _list_rivals(
+    model: CoupledModel, ranked: Sequence[Sequence[Model]], ranks: Sequence[int]
+) -> Iterator[CoupledModel]:
+    """Yield the model, and those with another equation for one of its outputs."""
+    yield model
+    for place, (models, chosen) in enumerate(zip(ranked, ranks, strict=True)):
+        for rank, other in enumerate(models, start=1):
+            if rank != chosen:
+                yield CoupledModel((*model.models[:place], other, *model.models[place + 1 :]))
+
+
+def _validate(model: CoupledModel, data: CoupledSplit, warm_up: int) -> float:
+    """Return the error on the validation data; infinite if the free run diverges."""
+    run = free_run(model, data.validation, warm_up)
+    if not run.outcome:
+        return np.inf
+    predicted = ~np.isnan(run.y[:, 0])
+    return float(mean_squares(data.validation, run.y[None], predicted)[0])
