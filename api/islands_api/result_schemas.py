@@ -28,6 +28,26 @@ class IdentificationResult(ResponseModel):
     )
 
 
+class CoupledIdentificationResult(ResponseModel):
+    """Result of an identification of several outputs, as in ``result.json``."""
+
+    schema_version: Literal["islands.coupled-result/1"] = Field(alias="schema")
+    dt: float
+    average: int
+    warm_up: int
+    refined: bool = Field(description="Whether all parameters were refined together.")
+    seed: int
+    settings: dict[str, Any] = Field(description="What determines the result besides the record.")
+    equation: str = Field(description="One line for each output.")
+    outputs: tuple[dict[str, Any], ...] = Field(description="Name, unit, errors and bands of each output.")
+    models: tuple[ModelView, ...] = Field(description="The model of all outputs.")
+    ensemble: list[dict[str, Any]] | None = Field(
+        default=None, description="Structures with their weights and parameters."
+    )
+    estimation: dict[str, Any] = Field(description="Hash, length, names and units of the estimation data.")
+    validation: dict[str, Any] = Field(description="Hash, length, names and units of the validation data.")
+
+
 class FindingView(ResponseModel):
     """Cause of a discrepancy, or property of the noise."""
 

@@ -212,14 +212,16 @@ class ModelView(ResponseModel):
         description="Regressor, parameter, standard error and inclusion probability of each term."
     )
     bands: dict[str, Any] | None = Field(default=None, description="Width of the prediction bands.")
-    metrics: dict[str, Any] = Field(description="For example metrics.validation.free_run.mape.")
-    outcomes: dict[str, Any]
+    metrics: dict[str, Any] = Field(
+        description="For example metrics.validation.free_run.mape; of several outputs the means."
+    )
+    outcomes: dict[str, Any] = Field(default_factory=dict)
     warm_up: int | None = Field(
         default=None, description="Samples before the first prediction of the simulations in metrics."
     )
-    information: dict[str, Any]
-    physics: dict[str, Any]
-    residual_tests: dict[str, Any]
+    information: dict[str, Any] = Field(default_factory=dict)
+    physics: dict[str, Any] = Field(default_factory=dict)
+    residual_tests: dict[str, Any] = Field(default_factory=dict)
 
 
 class ModelPage(ResponseModel):

@@ -17,21 +17,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.averaging import average_samples
+from islands.data.coupled_record import couple, match_coupled, split_coupled
+from islands.data.dataset import Dataset
 from islands.data.split import average_split, match_split, split_data
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import AUTO, resolve_settings
 from islands.evolution.search_result import SearchResult, SearchStatistics
+from islands.facade.coupled.result import read_fitted_model
+from islands.figures.free_run import draw_free_run
 from islands.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
 from islands.figures.style import save
 from islands.io.checkpoints import history_from_document
 from islands.io.ensembles import bands_from_document, ensemble_from_document
-from islands.io.models import model_from_json
+from islands.io.models import any_model_from_json, model_from_json
 from islands.io.result_models import read_shooting_interval
+from islands.models.coupled_narx import CoupledModel
+from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
-from islands.simulation.predictors import free_run
-from islands.validation.assessment import Assessment, assess
+from islands.simulation.predictors import Simulation, free_run
+from islands.validation.assessment import assess
+from islands.validation.prediction_bands import PredictionBand
 from islands_service.domain.job import REPORT, Job
-from islands_service.domain.job_spec import parse_identification
+from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
@@ -39,6 +47,7 @@ from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError, Blobs, DataFolderUnavailableError
 from islands_service.store.database import StorageFullError, StoreError
+from islands_service.store.results import StoredModel
 
 #: Largest number of samples of a simulation that is returned as numbers: a screen shows no more.
 MAX_POINTS = 4000
@@ -64,9 +73,13 @@ def main() -> int:
     try:
         with Store(settings.url) as store:
             job = store.jobs.get(arguments.owner, arguments.job)
-            found = read_search_result(job, store, blobs, arguments.rank)
             rank = arguments.rank
-            made = render_figures(job, found) if rank is None else render_model_figures(found, rank)
+            if len(parse_identification(job.spec).outputs) > 1:
+                made = render_outputs(job, store, blobs)
+            elif rank is None:
+                made = render_figures(job, read_search_result(job, store, blobs, rank))
+            else:
+                made = render_model_figures(read_search_result(job, store, blobs, rank), rank)
             store.results.keep(arguments.job, {name: blobs.write(data) for name, data in made.items()})
     except StorageFullError as error:
         return _report_failure(error, ENOSPC)
@@ -107,13 +120,8 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     IslandsError
         The job, its data or the model no longer exists.
     """
-    spec = parse_identification(job.spec)
-    datasets = {name: store.datasets.get(job.owner, name, deleted=True) for name in spec.datasets}
-    record, validation = read_record_and_validation(spec, datasets, blobs)
-    document = store.results.document(job.id)
-    stored = store.results.models(job.id, rank)
-    if document is None or not stored:
-        raise SettingsError(f"job {job.id} has no such model: wait until it has succeeded")
+    spec, document, stored = _read_result(job, store, rank)
+    record, validation = _read_records(spec, job, store, blobs)
     models = [model_from_json(entry.file, f"model {entry.rank}") for entry in stored]
     average, shooting = models[0].average, read_shooting_interval(document)
     split = match_split(models[0], average_split(split_data(record, validation), average))
@@ -133,6 +141,24 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     return SearchResult(
         record, split, spec.seed, document["settings"], search, tuple(assessed), ensemble, average
     )
+
+
+def _read_result(
+    job: Job, store: Store, rank: int | None
+) -> tuple[Identification, dict[str, Any], list[StoredModel]]:
+    """Return the specification, the result document and the models of a finished job."""
+    document = store.results.document(job.id)
+    stored = store.results.models(job.id, rank)
+    if document is None or not stored:
+        raise SettingsError(f"job {job.id} has no such model: wait until it has succeeded")
+    return parse_identification(job.spec), document, stored
+
+
+def _read_records(
+    spec: Identification, job: Job, store: Store, blobs: Blobs
+) -> tuple[Dataset, Dataset | float]:
+    datasets = {name: store.datasets.get(job.owner, name, deleted=True) for name in spec.datasets}
+    return read_record_and_validation(spec, datasets, blobs)
 
 
 def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStatistics:
@@ -162,7 +188,43 @@ def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     """Render the figures and the free run of a model; return them by artefact name."""
     entry = found.models[0]
     made = {f"{rank}/{name}.svg": _svg(FIGURES[name](entry, found.split)) for name in model_figures(found)}
-    made[f"{rank}/free-run.json"] = _free_run_document(entry, found)
+    data = found.split.validation
+    bands = entry.bands
+    band = None if bands is None else bands.predict(entry.model, data, warm_up=entry.warm_up)
+    run = free_run(entry.model, data, entry.warm_up)
+    made[f"{rank}/free-run.json"] = _free_run_document(data, run, band)
+    return made
+
+
+def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
+    """Render the free run of every output of the model of a job, and its report.
+
+    Raises
+    ------
+    IslandsError
+        The job, its data or the model no longer exists.
+    """
+    spec, document, (stored, *_) = _read_result(job, store, None)
+    model = any_model_from_json(stored.file)
+    assert isinstance(model, CoupledModel)
+    fitted = read_fitted_model(model, document, f"the result of job {job.id}")
+    record, held_out = _read_records(spec, job, store, blobs)
+    outputs = len(spec.outputs)
+    parts = split_coupled(
+        couple(record, outputs), couple(held_out, outputs) if isinstance(held_out, Dataset) else held_out
+    )
+    data = match_coupled(model, parts.validation.map(lambda each: average_samples(each, model.average)))
+    run = fitted.simulate(data)
+    bands = fitted.bands(data) if fitted.prediction_bands else (None,) * outputs
+    made, figures = {}, []
+    for number, (each, y, band) in enumerate(zip(data.records, run.y.T, bands, strict=True), start=1):
+        figures.append(_svg(draw_free_run(each, y, band=band)))
+        made[f"1/free-run-{number}.svg"] = figures[-1]
+        made[f"1/free-run-{number}.json"] = _free_run_document(each, Simulation(y, (), run.outcome), band)
+    words = str((job.summary or {}).get("words", "")).splitlines()
+    sentences = [*words[:1], *words[2:]]  # the second one is the equations
+    terms = stored.document["terms"]
+    made[REPORT] = coupled_report(job.name or job.id, model, document, terms, sentences, figures)
     return made
 
 
@@ -172,10 +234,8 @@ def _svg(figure: Any) -> bytes:
     return stream.getvalue()
 
 
-def _free_run_document(entry: Assessment, found: SearchResult) -> bytes:
-    """Return the validation data and the free run of a model as JSON, downsampled to `MAX_POINTS`."""
-    data = found.split.validation
-    simulated = free_run(entry.model, data, entry.warm_up)
+def _free_run_document(data: Dataset, simulated: Simulation, band: PredictionBand | None) -> bytes:
+    """Return the validation data and a free run of one output as JSON, downsampled to `MAX_POINTS`."""
     every = max(1, -(-data.samples // MAX_POINTS))
     kept = slice(None, None, every)
     time = data.start + data.dt * np.arange(data.samples)
@@ -187,8 +247,7 @@ def _free_run_document(entry: Assessment, found: SearchResult) -> bytes:
         "measured": data.y[kept].tolist(),
         "free_run": _finite_values(simulated.y[kept]),
     }
-    if entry.bands is not None:
-        band = entry.bands.predict(entry.model, data, warm_up=entry.warm_up)
+    if band is not None:
         document["band"] = {
             "level": band.level,
             "lower": _finite_values(band.lower[kept]),

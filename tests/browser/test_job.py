@@ -300,8 +300,8 @@ def test_an_equation_contains_only_mathematics(blank: Screen, source: str) -> No
         """async (source) => {
           const { parseMath } = await import("/dashboard/components/equation.js");
           try {
-            const math = parseMath(source);
-            const all = [math, ...math.querySelectorAll("*")];
+            const [math, ...others] = parseMath(source);
+            const all = [math, ...math.querySelectorAll("*"), ...others];
             const names = all.flatMap((node) => [...node.attributes].map((each) => each.name));
             return { text: math.textContent, names, own: all.every((node) => node instanceof MathMLElement) };
           } catch (error) {

@@ -4,11 +4,13 @@ import json
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.settings import ServiceSettings
 from islands_service.store.blobs import Blobs
+from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.job_runs import make_run
 from support.played import stored
 from support.processes import eventually
@@ -168,6 +170,42 @@ def test_the_models_panel_has_sufficient_contrast(
     expect(page.locator(".equation math")).to_be_visible()
     expect(page.locator(".gallery .rendered")).to_have_count(4)
     assert unreadable(page) == []
+
+
+@pytest.fixture(scope="module")
+def coupled(service: Service) -> str:
+    """A succeeded job of two outputs, executed by the test process."""
+    record = make_coupled_record(TWO_MASSES, samples=200, noise=0.01)
+    rows = zip(0.1 * np.arange(200).round(3), record.records[0].u[:, 0], *record.y.T, strict=True)
+    text = "\n".join(["t_s,u_N,y1_mm,y2_mm", *(",".join(map(repr, map(float, row))) for row in rows)])
+    answer = service.ask("POST", "/v1/datasets", files={"file": ("masses.csv", text.encode())})
+    spec = {"dataset": answer.json()["id"], "inputs": ["u_N"], "output": ["y1_mm", "y2_mm"]}
+    settings = {"population": 8, "generations": 1, "max_terms": 4, "library_degree": 1}
+    submitted = service.ask("POST", "/v1/jobs", json={**spec, "settings": settings})
+    assert submitted.status_code == 202, submitted.text
+    job: str = submitted.json()["id"]
+    with stored(service) as store:
+        lease = taken(store, job)
+        blobs = Blobs(ServiceSettings(data_dir=service.folder).blobs)
+        store.leases.finish(lease, run_identification_job(make_run(lease, store, blobs, lambda: None, LONG)))
+    return job
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_job_of_two_outputs_shows_both(
+    opened: Callable[..., Any], coupled: str, expect: Any, scheme: str
+) -> None:
+    page = opened(f"#/jobs/{coupled}", color_scheme=scheme)
+    expect(page.locator(".equation math")).to_have_count(2)
+    outputs = page.get_by_role("table", name="Errors of the outputs").locator("tbody tr th")
+    assert outputs.all_text_contents() == ["y1: y1_mm (mm)", "y2: y2_mm (mm)"]
+    expect(page.locator(".gallery .rendered")).to_have_count(2)
+    # The errors of two outputs have no common scale.
+    expect(page.get_by_text("Convergence")).to_have_count(0)
+    assert unreadable(page) == []
+    page.locator(".gallery .rendered").last.scroll_into_view_if_needed()
+    expect(page.locator(".gallery img")).to_have_count(2, timeout=60_000)
 
 
 @pytest.mark.ci

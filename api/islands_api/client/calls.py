@@ -64,7 +64,7 @@ class RequestSpec(Generic[T]):
 def submit(
     dataset: DatasetRef,
     inputs: str | Sequence[str],
-    output: str,
+    output: str | Sequence[str],
     *,
     preset: str = AUTO,
     model: str = NARX,
@@ -86,8 +86,8 @@ def submit(
     ----------
     inputs : str or sequence of str
         Input columns.
-    output : str
-        Output column.
+    output : str or sequence of str
+        Output column; several for a model that couples them.
     model : str
         Class of the models; others than ``narx`` are fitted without a search, and have no settings.
     dt : float, optional
@@ -109,7 +109,7 @@ def submit(
     given: dict[str, Any] = {
         "dataset": get_id(dataset),
         "inputs": as_list(inputs),
-        "output": output,
+        "output": output if isinstance(output, str) else list(output),
         "preset": preset,
         "model": None if model == NARX else model,
         "seed": seed,

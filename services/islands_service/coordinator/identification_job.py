@@ -8,14 +8,17 @@ from typing import Any
 
 import structlog
 
+from islands.data.coupled_record import couple
 from islands.data.dataset import Dataset
 from islands.evolution.engine import Engine
 from islands.evolution.presets import AUTO
 from islands.evolution.search_result import SearchResult
-from islands.evolution.search_state import SearchState
+from islands.evolution.search_state import SearchState, sum_searches
 from islands.evolution.settings import Settings
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
+from islands.facade.coupled.identification import identify_coupled
+from islands.facade.coupled.result import CoupledResult
 from islands.facade.fit import fit
 from islands.facade.identify import identify
 from islands.facade.results.identification import Result
@@ -59,8 +62,11 @@ def run_identification_job(run: JobRun) -> JobOutcome:
     checkpoints = JobCheckpoints(run.job, run.blobs)
     start = checkpoints.read()
     stop = SearchStop(run.check)
-    reporter = ProgressReporter(run, checkpoints, stop, start)
+    reporter = ProgressReporter(run, checkpoints, stop, start, len(spec.outputs))
     try:
+        if len(spec.outputs) > 1:
+            coupled = _identify_outputs(record, validation, spec, start, run.engine, reporter, stop)
+            return _end_outputs(coupled, start.note, stop)
         found = _identify(record, validation, spec, start, run.engine, reporter, stop)
     except StoppedError as stopped:
         raise stop.reason or stopped from stopped
@@ -68,12 +74,25 @@ def run_identification_job(run: JobRun) -> JobOutcome:
         return make_outcome(found, start.note)
     if not isinstance(stop.reason, RunTimeLimitError):
         return replace(make_outcome(found, start.note), state=JobState.CANCELLED)
-    note = (
-        f"the search ended at the limit of the run time of one job, {stop.reason.limit} s, with its "
+    ended = replace(found, search=replace(found.search, ended_by=RUN_TIME))
+    return make_outcome(ended, _explain_limit(start.note, stop.reason))
+
+
+def _explain_limit(note: str, reason: RunTimeLimitError) -> str:
+    limit = (
+        f"the search ended at the limit of the run time of one job, {reason.limit} s, with its "
         "best models so far; the operator can raise the limit"
     )
-    ended = replace(found, search=replace(found.search, ended_by=RUN_TIME))
-    return make_outcome(ended, "; ".join(filter(None, [start.note, note])))
+    return "; ".join(filter(None, [note, limit]))
+
+
+def _end_outputs(found: CoupledResult, note: str, stop: "SearchStop") -> JobOutcome:
+    """Return the outcome of the searches of several outputs."""
+    if not found.left_out:
+        return make_coupled_outcome(found, note)
+    if not isinstance(stop.reason, RunTimeLimitError):
+        return replace(make_coupled_outcome(found, note), state=JobState.CANCELLED)
+    return make_coupled_outcome(found, _explain_limit(note, stop.reason), RUN_TIME)
 
 
 class SearchStop:
@@ -148,6 +167,54 @@ def _identify(
     return result.with_wall_time(reporter.spent).search_result
 
 
+def _identify_outputs(
+    record: Dataset,
+    validation: Dataset | float,
+    spec: Identification,
+    start: JobStart,
+    engine: Engine,
+    reporter: "ProgressReporter",
+    stop: SearchStop,
+) -> CoupledResult:
+    outputs = len(spec.outputs)
+    result = identify_coupled(
+        couple(record, outputs),
+        validation=couple(validation, outputs) if isinstance(validation, Dataset) else validation,
+        preset=spec.preset,
+        seed=spec.seed,
+        progress=reporter.report_stage,
+        on_epoch=reporter,
+        stop=stop,
+        start=start.state,
+        engine=engine,
+        **spec.changes,
+    )
+    reporter.flush()
+    return result.with_wall_time(reporter.spent)
+
+
+def make_coupled_outcome(found: CoupledResult, note: str = "", ended_by: str = "") -> JobOutcome:
+    """Return the part of a result of several outputs that the store keeps; see `make_outcome`."""
+    document = found.document()
+    (model,) = models = document.pop("models")
+    searches = [result.search_result.search for result in found.results]
+    summary = {
+        "models": 1,
+        "rank": 1,
+        "reasons": [],
+        "words": "\n".join([*found.sentences(), *([f"Note: {note}."] if note else [])]),
+        "equation": "; ".join(found.equation.splitlines()),
+        "size": model["size"],
+        "metrics": model["metrics"]["validation"]["free_run"],
+        "property_1": False,
+        "evaluations": sum(search.evaluations for search in searches),
+        "wall_s": found.wall_s,
+        "ended_by": ended_by or searches[-1].ended_by,
+        **({"note": note} if note else {}),
+    }
+    return JobOutcome(JobState.SUCCEEDED, document, ((models[0], model_json(found.model)),), summary)
+
+
 def make_outcome(found: SearchResult, note: str = "") -> JobOutcome:
     """Return the part of a search result that the store keeps, with a note for the owner in its summary."""
     document = result_document(found)
@@ -176,11 +243,17 @@ class ProgressReporter:
     """Progress callback that stores progress, history and checkpoints of a search."""
 
     def __init__(
-        self, run: JobRun, checkpoints: JobCheckpoints, stop: Callable[[], object], start: JobStart
+        self,
+        run: JobRun,
+        checkpoints: JobCheckpoints,
+        stop: Callable[[], object],
+        start: JobStart,
+        outputs: int = 1,
     ) -> None:
+        self._outputs = outputs
         self._run, self._checkpoints, self._stop = run, checkpoints, stop
         self._started_at = monotonic() - start.spent
-        state = start.state
+        state = start.state and sum_searches(start.state)
         self._first = (monotonic(), 0 if state is None else state.evaluations)
         self._note = {"note": start.note} if start.note else {}
         # Number of stored points that will not change. The last point of a history is replaced until the best
@@ -228,7 +301,8 @@ class ProgressReporter:
     def _report(self, state: SearchState, settings: Settings) -> bool:
         """Store the progress of the search; return whether the store accepted it."""
         started = monotonic()
-        points, after = self._points(state)
+        summed = sum_searches(state)
+        points, after = self._points(summed)
         progress = self._run.notes.complete(self._progress(state, settings))
         report = ProgressReport(progress, points, after=after)
         try:
@@ -243,7 +317,7 @@ class ProgressReporter:
                 self._checkpoints.remember(report.checkpoint)
             self._schedule(started)
             return False
-        self._stored_points = len(state.history) - 1
+        self._stored_points = len(summed.history) - 1
         if report.checkpoint is not None:
             self._checkpoints.supersede(report.checkpoint)
         self._schedule(started)
@@ -257,16 +331,17 @@ class ProgressReporter:
             # Also after a failure: a checkpoint of thousands of islands takes long, and may fail at its end.
             self._checkpoint_at = now + max(self._run.checkpoint_every, (now - started) / CHECKPOINT_SHARE)
 
-    def _progress(self, state: SearchState, settings: Settings) -> dict[str, Any]:
-        last = state.history[-1]
+    def _progress(self, searched: SearchState, settings: Settings) -> dict[str, Any]:
+        state = sum_searches(searched)
+        last, generations = state.history[-1], (settings.generations + 1) * self._outputs - 1
         since, before = self._first
         rate = (state.evaluations - before) / max(monotonic() - since, 1e-9)
-        left = (settings.generations - last.generation) * settings.population * settings.islands
+        left = (generations - last.generation) * settings.population * settings.islands
         best = {size: error**0.5 for size, error in last.best.items()}
         return {
             "phase": "search",
             "generation": last.generation,
-            "generations": settings.generations,
+            "generations": generations,
             "evaluations": state.evaluations,
             "evaluations_per_second": rate,
             "seconds_left": left / rate if rate > 0.0 else None,

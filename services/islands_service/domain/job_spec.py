@@ -27,6 +27,11 @@ from islands.simulators.specification.table import ColumnSpec, SimulationSpec, i
 S = TypeVar("S", bound=BaseModel)
 
 
+def _unwrap_single(given: Any) -> Any:
+    """Return a list of one output as its name."""
+    return given[0] if isinstance(given, list | tuple) and len(given) == 1 else given
+
+
 def _check_rows(text: str) -> str:
     if not re.fullmatch(_ROWS, text):
         raise ValueError(f"cannot read the rows {text[:40]!r}: write START:STOP, for example 0:5000")
@@ -98,6 +103,8 @@ class Part(BaseModel):
 _FURTHER = "Further recordings of the same system with the same columns."
 Recordings = Annotated[tuple[Part, ...], Field(max_length=MAX_RECORDINGS - 1, description=_FURTHER)]
 
+Outputs = Annotated[tuple[Name, ...], Field(min_length=2, max_length=8)]
+
 #: Description of the field ``dt``.
 _DT = "Sampling time in seconds, if the record does not contain it."
 
@@ -111,7 +118,10 @@ class Identification(BaseModel):
     inputs: Annotated[tuple[Name, ...], Field(min_length=1, max_length=16, examples=[["u_V"]])] = Field(
         description="Columns that are inputs; u_V+1 for the column u_V one sample early."
     )
-    output: Name = Field(description="Column that is the output.", examples=["y_um"])
+    output: Annotated[Name | Outputs, BeforeValidator(_unwrap_single)] = Field(
+        description="Column that is the output; a list of several for a model that couples them.",
+        examples=["y_um"],
+    )
     dt: Seconds | None = Field(default=None, description=_DT)
     rows: Rows | None = Field(default=None, description="Samples that estimate; all by default.")
     recordings: Recordings = ()
@@ -127,6 +137,16 @@ class Identification(BaseModel):
     )
     seed: Seed = 0
     settings: SettingsChanges = Field(default_factory=SettingsChanges)  # type: ignore[valid-type]
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Columns that are outputs."""
+        return (self.output,) if isinstance(self.output, str) else self.output
+
+    @property
+    def columns(self) -> tuple[tuple[str, ...], str]:
+        """Inputs and output of the record to read. The outputs after the first one are its last inputs."""
+        return (*self.inputs, *self.outputs[1:]), self.outputs[0]
 
     @property
     def changes(self) -> dict[str, Any]:
@@ -194,6 +214,11 @@ class Discrepancy(BaseModel):
     def inputs(self) -> tuple[str, ...]:
         """Columns to read in addition to the output; the first one drives the simulation."""
         return (self.input, *self.channels, *self.recorded_columns)
+
+    @property
+    def columns(self) -> tuple[tuple[str, ...], str]:
+        """Inputs and output of the record to read."""
+        return self.inputs, self.output
 
     @property
     def estimation(self) -> tuple[Part, ...]:

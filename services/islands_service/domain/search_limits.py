@@ -5,7 +5,7 @@ from functools import lru_cache
 from islands.errors import SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_delays import expand_delays
-from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
+from islands.evolution.presets import AUTO, resolve_coupled_settings, resolve_kinds, resolve_settings
 from islands.evolution.settings import Settings
 from islands.models.candidate_library import candidates, count_inputs
 from islands_service.domain.job_spec import Identification
@@ -56,10 +56,17 @@ def resolve_job_settings(
             raise SettingsError(f"{name} has {len(value)} entries, and {_MAX_ENTRIES} is the most")
     if any(shift > MAX_SHIFT for shift in changes.get("shifts", ())):
         raise SettingsError(f"back-shifts are at most {MAX_SHIFT} on this service, got {changes['shifts']}")
-    kinds = tuple(resolve_kinds(changes).values()) if spec.preset == AUTO else ()
-    found = kinds or (resolve_settings(spec.preset, changes),)
+    if len(spec.outputs) > 1:
+        found: tuple[Settings, ...] = (resolve_coupled_settings(spec.preset, changes),)
+        # One search for each output.
+        max_evaluations //= len(spec.outputs)
+    elif spec.preset == AUTO:
+        found = tuple(resolve_kinds(changes).values())
+    else:
+        found = (resolve_settings(spec.preset, changes),)
+    inputs, _ = spec.columns
     for settings in found:
-        _check_settings(settings, len(spec.inputs), max_evaluations)
+        _check_settings(settings, len(inputs), max_evaluations)
     return found
 
 

@@ -9,6 +9,7 @@ from math import prod
 from typing import Any
 
 from islands.data.compatibility import check_dt
+from islands.data.coupled_record import check_outputs
 from islands.errors import RecordError, SettingsError, lookup, suggest
 from islands.io.models import MODEL_CLASSES, NARX, model_from_json
 from islands.io.records.column_names import find_column
@@ -74,7 +75,7 @@ def validate_job(
         if not _is_readable(spec, part, dataset.preview, dataset.name):
             reading = dataset.preview.get("reading", {})
             is_diagnosis = isinstance(spec, Discrepancy)
-            request = InspectionRequest(spec.inputs, spec.output, spec.dt, part.rows, reading, is_diagnosis)
+            request = InspectionRequest(*spec.columns, spec.dt, part.rows, reading, is_diagnosis)
             pending.append(PendingInspection(dataset, request))
     return ValidJob(islands, tuple(pending))
 
@@ -84,8 +85,12 @@ def _check_spec(spec: Identification | Discrepancy, settings: ServiceSettings) -
     if isinstance(spec, Discrepancy):
         check_discrepancy(spec)
         return 1
+    if len(spec.outputs) > 1:
+        check_outputs(spec.inputs, spec.outputs)
     if spec.model != NARX:
         lookup(MODEL_CLASSES, spec.model, "class of models")
+        if len(spec.outputs) > 1:
+            raise SettingsError(f"models {spec.model} have one output: name one, or take the model {NARX}")
         if spec.changes:
             listed = ", ".join(spec.changes)
             raise SettingsError(f"{listed}: settings are those of a search for models {NARX}, leave them out")
@@ -198,9 +203,10 @@ def _is_readable(
     A preview describes each column separately. If the combination may fail, the answer is False.
     """
     columns = {column["name"]: column for column in preview["columns"]}
-    sources = [find_column(given, tuple(columns)) for given in spec.inputs]
-    check_choice(tuple(columns), sources, spec.output, name)
-    chosen = (*sources, spec.output)
+    inputs, output = spec.columns
+    sources = [find_column(given, tuple(columns)) for given in inputs]
+    check_choice(tuple(columns), sources, output, name)
+    chosen = (*sources, output)
     clean = not any(columns[name]["problem"] for name in chosen)
     alike = len({columns[name]["samples"] for name in chosen}) == 1 and not any(
         "." in name for name in chosen

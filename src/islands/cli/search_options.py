@@ -11,8 +11,18 @@ import typer
 from islands.cli.option_groups import group_options, make_option
 from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings, get_text_type
+from islands.io.models import MODEL_CLASSES, NARX
 
 Preset = Annotated[str, typer.Option("--preset", help=", ".join(PRESET_NAMES))]
+ModelClass = Annotated[
+    str,
+    typer.Option(
+        "--model",
+        help=f"Class of the models: {', '.join([NARX, *MODEL_CLASSES])}.",
+        # An option with one value is of no use.
+        hidden=not MODEL_CLASSES,
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")]
 
 

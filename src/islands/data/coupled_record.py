@@ -215,6 +215,19 @@ def check_outputs(inputs: Sequence[str], outputs: Sequence[str]) -> None:
             raise RecordError(f"{name} is an input and an output: remove one of them")
 
 
+def join_columns(inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[str], str]:
+    """Return the inputs and the output of one record with all columns, for `couple`.
+
+    Raises
+    ------
+    RecordError
+        With several outputs, one is given twice or is also an input.
+    """
+    if len(outputs) > 1:
+        check_outputs(inputs, outputs)
+    return [*inputs, *outputs[1:]], outputs[0]
+
+
 def couple(record: Dataset, outputs: int) -> CoupledRecord:
     """Return the coupled record of a record whose last inputs are the outputs after the first.
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any
 
-from islands.errors import SettingsError, lookup
-from islands.estimation.parameter_constraints import constraint
+from islands.errors import SettingsError, lookup, suggest
+from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.evolution.settings import Settings
 
 #: Section 6.1, theoretical piezo: shooting over 500 steps, tolerance 1e-5. What the paper leaves open is as
@@ -102,6 +102,9 @@ PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
 #: Preset that is chosen among `KINDS` by trials on the record. It is the default of all commands.
 AUTO = "auto"
 
+#: Preset of several outputs, unless another one is chosen.
+COUPLED_PRESET = "narx"
+
 #: Names of the presets that a user may choose, the default first.
 PRESET_NAMES = (AUTO, *PRESETS)
 
@@ -194,6 +197,44 @@ def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
     if "max_height" in changes and "initial_height" not in changes:
         changes = {**changes, "initial_height": max(0, min(base.initial_height, changes["max_height"]))}
     return replace(base, **changes)
+
+
+def resolve_coupled_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
+    """Return the settings of the search of every output of several; the preset auto is `COUPLED_PRESET`.
+
+    Raises
+    ------
+    SettingsError
+        As for `resolve_settings`, or a setting is for one output.
+    """
+    name = COUPLED_PRESET if preset == AUTO else preset
+    settings = resolve_settings(name, {"feedthrough": "no", **changes})
+    check_coupled_settings(settings.constraints, settings.feedthrough)
+    if settings.select != "validation":
+        raise SettingsError(
+            "select is 'validation' with several outputs: equations are chosen by their free run together"
+        )
+    return settings
+
+
+def check_coupled_settings(constraints: str | None, feedthrough: str) -> None:
+    """Check settings that hold for every equation of several outputs.
+
+    Raises
+    ------
+    SettingsError
+        The settings are for one output.
+    """
+    if constraints is not None and constraints not in CONSTRAINTS:
+        raise SettingsError(
+            f"the constraints {constraints!r} are for one output: with several, each equation numbers its "
+            f"inputs differently; take {', '.join(CONSTRAINTS)}{suggest(constraints, CONSTRAINTS)}"
+        )
+    if feedthrough != "no":
+        raise SettingsError(
+            "feedthrough is 'no' with several outputs, so that they do not depend on each other within a "
+            "sample: name the inputs that act within the sample with +1, as u+1"
+        )
 
 
 def with_tuples(changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -70,6 +70,27 @@ def _has_equal_fitness(one: HistoryPoint, other: HistoryPoint) -> bool:
     return one.best == other.best and one.islands == other.islands
 
 
+def sum_searches(state: SearchState) -> SearchState:
+    """Return the state with the evaluations and the history of the searches before it as well.
+
+    The generations of a search follow those of the search before it.
+    """
+    history: list[HistoryPoint] = []
+    generation = evaluations = 0
+    for search in (*state.earlier, state):
+        history += [
+            replace(
+                point,
+                generation=generation + point.generation,
+                evaluations=evaluations + point.evaluations,
+            )
+            for point in search.history
+        ]
+        generation += search.history[-1].generation + 1
+        evaluations += search.evaluations
+    return replace(state, history=tuple(history), evaluations=evaluations)
+
+
 def keep_hall(state: SearchState) -> SearchState:
     """Return the state of a search that has ended without its populations, which nothing reads any more."""
     first, *others = state.archipelago.islands

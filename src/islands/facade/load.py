@@ -9,12 +9,11 @@ from typing import Any, TypeAlias
 from islands.errors import ModelError
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
-from islands.facade.coupled.result import FittedCoupledModel
+from islands.facade.coupled.result import FittedCoupledModel, read_fitted_model
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
 from islands.facade.results.reader import read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
-from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import read_coupled_model, read_model
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.equations import OdeSpec
@@ -125,14 +124,7 @@ def _load_coupled(file: Path, document: _Document, primitives: Mapping[str, Prim
     model = read_coupled_model(file.parent if is_result else file, primitives)
     if not is_result:
         return FittedCoupledModel(model, model.maximum_lag, ())
-    try:
-        # Results of earlier versions have no ensemble and no warm-up.
-        ensemble = ensemble_from_document(document.get("ensemble"), model, primitives)
-        bands = [bands_from_document(each.get("bands"), ensemble) for each in document["outputs"]]
-        warm_up = int(document.get("warm_up") or model.maximum_lag)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ModelError(f"{file} is damaged: {error!r} is missing or wrong") from error
-    return FittedCoupledModel(model, warm_up, tuple(each for each in bands if each is not None))
+    return read_fitted_model(model, document, str(file), primitives)
 
 
 def _load_extended(file: Path, _document: _Document, _primitives: Mapping[str, Primitive]) -> SavedSimulation:

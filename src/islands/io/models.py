@@ -19,7 +19,7 @@ from islands.io.narx_documents import (
     read_narx,
 )
 from islands.io.result_models import read_preprocessing
-from islands.models.coupled_narx import CoupledModel
+from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.narx import Model, require_narx
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel
@@ -34,7 +34,7 @@ _CLASSES: dict[str, type[ParametricModel]] = {}
 MODEL_CLASSES: Mapping[str, type[ParametricModel]] = MappingProxyType(_CLASSES)
 
 
-def model_json(model: DynamicModel | CoupledModel) -> str:
+def model_json(model: AnyModel) -> str:
     """Return a model as JSON text.
 
     Raises
@@ -54,7 +54,7 @@ def model_json(model: DynamicModel | CoupledModel) -> str:
         raise ModelError(f"the model cannot be written: {error}") from error
 
 
-def terms_document(model: DynamicModel) -> list[dict[str, Any]]:
+def terms_document(model: AnyModel) -> list[dict[str, Any]]:
     """Return the parameters of a model in the form of ``result.json``; a regressor is a term or a name."""
     if isinstance(model, Model):
         return list(model.document()["terms"])
@@ -65,7 +65,7 @@ def terms_document(model: DynamicModel) -> list[dict[str, Any]]:
     ]
 
 
-def write_model(model: DynamicModel | CoupledModel, path: str | Path) -> None:
+def write_model(model: AnyModel, path: str | Path) -> None:
     """Write a model file.
 
     Raises
@@ -117,6 +117,19 @@ def model_from_json(
     if isinstance(document, dict) and "kind" in document:
         return lookup(MODEL_CLASSES, str(document["kind"]), f"class of models of {name}").read(document, name)
     return read_narx(text, name, primitives)
+
+
+def any_model_from_json(
+    text: str, name: str = "model", primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> AnyModel:
+    """Parse the text of a file of a model of one or several outputs; see `model_from_json`."""
+    try:
+        document = json.loads(text)
+    except ValueError:
+        document = None
+    if isinstance(document, dict) and document.get("schema") == COUPLED_SCHEMA:
+        return read_coupled(document, name, primitives)
+    return model_from_json(text, name, primitives)
 
 
 def narx_from_json(text: str, name: str, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Model:

@@ -70,7 +70,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
         ],
         "ensemble": ensemble_document(found.ensemble),
     }
-    described: dict[str, Any] = _finite(document)
+    described: dict[str, Any] = finite(document)
     return described
 
 
@@ -195,11 +195,12 @@ def write_result(found: SearchResult, folder: Path) -> None:
     (folder / "result.json").write_text(result_json(found), encoding="utf-8")
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """Return JSON values with null in place of NaN and infinity."""
     if isinstance(value, np.generic):
-        return _finite(value.item())
+        return finite(value.item())
     if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     return None if isinstance(value, float) and not isfinite(value) else value

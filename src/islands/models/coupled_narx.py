@@ -1,7 +1,7 @@
 """Coupled model: one equation per output, each of which may read the past of all outputs."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from typing import Any, ClassVar, TypeAlias
@@ -157,9 +157,11 @@ class CoupledModel:
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Names of the parameters: the output of the equation, and the text of the term."""
+        """Names of the parameters: the output of the equation, and the term with the signals of the block."""
         return tuple(
-            f"{model.output_name}: {name}" for model in self.models for name in model.parameter_names
+            f"y{place + 1}: {_name_signals(name, equation_signals(self, place))}"
+            for place, model in enumerate(self.models)
+            for name in model.parameter_names
         )
 
     def block(self) -> Block:
@@ -186,10 +188,7 @@ class CoupledModel:
 
     def _equation(self, place: int) -> str:
         """Return the text of one equation with the signals of the block."""
-        names = equation_signals(self, place)
-        return re.sub(
-            r"\b(y|u\d*)\(k(?=[-)])", lambda leaf: f"{names[leaf[1]]}(k", equation(self.models[place])
-        )
+        return _name_signals(equation(self.models[place]), equation_signals(self, place))
 
     def equation(self) -> EquationText:
         """Return the equations as text, one line for each output."""
@@ -267,6 +266,11 @@ def equation_signals(model: CoupledModel, place: int) -> dict[str, str]:
         name: names[channel]
         for name, channel in zip(symbols(model.models[place].inputs), channels, strict=True)
     }
+
+
+def _name_signals(text: str, names: Mapping[str, str]) -> str:
+    """Replace the signals of one equation by those of the block."""
+    return re.sub(r"\b(y|u\d*)\(k(?=[-)])", lambda leaf: f"{names[leaf[1]]}(k", text)
 
 
 def coupled_equation(model: CoupledModel) -> str:

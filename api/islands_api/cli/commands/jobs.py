@@ -11,8 +11,10 @@ from islands.cli import options
 from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
 from islands.cli.record_options import with_reading_options
-from islands.cli.search_options import DEFAULTS, SearchOptions, Seed, with_search_options
+from islands.cli.search_options import DEFAULTS, ModelClass, SearchOptions, Seed, with_search_options
+from islands.data.coupled_record import join_columns
 from islands.errors import SettingsError
+from islands.io.models import NARX
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands_api.cli.service import job_views as views
 from islands_api.cli.service.client_options import LOCAL, ApiKey, Json, Url, open_client, read_pages
@@ -47,7 +49,7 @@ _MAX_NAME_LENGTH = 200
 def submit(
     records: options.Records,
     inputs: options.Inputs,
-    output_column: options.Output,
+    output_columns: options.Outputs,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     reading: ReadingOptions = DEFAULT_READING,
@@ -55,6 +57,7 @@ def submit(
         str | None,
         typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
     ] = None,
+    model: ModelClass = NARX,
     search: SearchOptions = DEFAULTS,
     name: Name = "",
     priority: Priority = 0,
@@ -65,18 +68,19 @@ def submit(
     as_json: Json = False,
 ) -> None:
     """Upload recordings and submit a job that identifies one model of them."""
-    names = options.columns(inputs)
+    names, outputs = options.columns(inputs), options.columns(output_columns)
+    read, output_column = join_columns(names, outputs)
     held_out = _parse_validation(validation)
     if isinstance(held_out, str) and len(records) > 1:
         raise SettingsError(f"--validation {held_out}: with several recordings, give a file or a fraction")
     with open_client(url, key) as client:
         whole = output_column if rows is None else None
-        dataset, *others = (client.upload(record, names, whole, dt, reading.changes()) for record in records)
+        dataset, *others = (client.upload(record, read, whole, dt, reading.changes()) for record in records)
         validation_data: float | dict[str, Any] | None
         match held_out:
             case Path():
                 validation_data = {
-                    "dataset": client.upload(held_out, names, output_column, dt, reading.changes()).id
+                    "dataset": client.upload(held_out, read, output_column, dt, reading.changes()).id
                 }
             case str():
                 validation_data = {"dataset": dataset.id, "rows": held_out}
@@ -85,7 +89,8 @@ def submit(
         job = client.submit(
             dataset,
             names,
-            output_column,
+            outputs if len(outputs) > 1 else output_column,
+            model=model,
             preset=search.preset,
             seed=search.seed,
             dt=dt,

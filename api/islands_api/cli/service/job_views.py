@@ -13,9 +13,11 @@ from rich.table import Table
 
 from islands.cli.console import output
 from islands.cli.progress_display import progress
-from islands.io.models import model_from_json
+from islands.io.models import any_model_from_json
 from islands.io.result_text.model_table import LEGEND, MARK
 from islands.io.result_text.text_layout import term_table, wrap
+from islands.models.coupled_narx import CoupledModel
+from islands.models.protocol import DynamicModel
 from islands.simulators.specification.table import EXTENDED_FILE
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
@@ -108,12 +110,12 @@ def show_models(client: Client, job: JobView, models: Sequence[ModelView]) -> No
     for line in _describe_recommended(client, job, models):
         output.print(line, markup=False)
     # Only models of hysteresis have Property 1; the drift of others is no defect.
-    hysteresis = any(model.physics["property_1"] for model in models)
+    hysteresis = any(model.physics.get("property_1") for model in models)
     claims = ("drift %", "Property 1") if hysteresis else ()
     table = Table("rank", "terms", "MAPE est. %", "MAPE val. %", *claims, "residuals")
     for model in models:
         mape = [model.metrics[part]["free_run"]["mape"] for part in ("estimation", "validation")]
-        drift = _format_number(model.physics["hold_drift_percent"])
+        drift = _format_number(model.physics.get("hold_drift_percent"))
         table.add_row(
             f"{model.rank}{MARK if model.recommended else ''}",
             str(model.size),
@@ -132,7 +134,9 @@ def _describe_recommended(client: Client, job: JobView, models: Sequence[ModelVi
         return
     # Results of earlier versions recommend no model.
     rank = next((model.rank for model in models if model.recommended), 1)
-    terms = term_table(model_from_json(client.export(job.id, rank, "json"), f"model {rank}"))
+    model = any_model_from_json(client.export(job.id, rank, "json"), f"model {rank}")
+    singles: Sequence[DynamicModel] = model.models if isinstance(model, CoupledModel) else (model,)
+    terms = [line for single in singles for line in term_table(single)]
     # Results of earlier versions have no sentences. The second one is the equation in one line.
     words = str((job.summary or {}).get("words", "")).splitlines()
     choice, sentences = "".join(words[:1]), words[2:]
@@ -191,6 +195,9 @@ def download(client: Client, job: str, document: dict[str, Any], folder: Path) -
         for done, (name, rank) in enumerate(names):
             show(name, done / len(names))
             (folder / "figures" / f"{name}.svg").write_bytes(client.figure(job, name, rank))
+    if "outputs" in document:
+        # As `islands fit` writes it.
+        (folder / "model.json").write_text(client.export(job, 1, "json"), encoding="utf-8")
     _write_document(document, folder / "result.json")
 
 

@@ -10,11 +10,21 @@ const STATISTICS = ["Minimum", "Maximum", "Mean", "Std. deviation"];
 /** Return the input columns of a job; none for a record, whose monitor names them. */
 const getInputs = ({ inputs, input }) => inputs ?? (input === undefined ? [] : [input]);
 
+/** Return the output columns of a job; none for a record, whose monitor names it. */
+const getOutputs = ({ output }) => (output === undefined ? [] : [output].flat());
+
+/** Return the unit of the output; empty if it is unknown, or if several outputs have different units. */
+function findUnit(columns, spec) {
+  const names = getOutputs(spec);
+  const units = new Set(columns.filter(({ name }) => names.includes(name)).map(({ unit }) => unit));
+  return units.size === 1 ? [...units][0] : "";
+}
+
 function makeColumnTable({ preview }, spec) {
   const hasRemarks = preview.columns.some((column) => column.problem);
   const role = (name) => {
     if (name === preview.time) return "time";
-    if (name === spec.output) return "output";
+    if (getOutputs(spec).includes(name)) return "output";
     // `u_V+1` is the column `u_V` advanced by one sample.
     const includesColumn = (names = []) =>
       names.some((each) => each === name || each.replace(/\+\d+$/, "") === name);
@@ -82,7 +92,7 @@ export function makeDatasetPanel(spec, onUnitKnown, signal) {
     try {
       const dataset = await getJson(`v1/datasets/${encodeURIComponent(spec.dataset)}`, { signal });
       body.replaceChildren(...describeDataset(dataset, spec));
-      onUnitKnown(dataset.preview.columns.find((column) => column.name === spec.output)?.unit ?? "");
+      onUnitKnown(findUnit(dataset.preview.columns, spec));
     } catch (error) {
       if (!(error instanceof Problem) || error.status !== 404) throw error;
       body.replaceChildren(el("p", { class: "soft" }, "The data set has been deleted."));
@@ -141,7 +151,7 @@ export function makeSettingsPanel(spec) {
       ["Record", spec.name],
       ["Time", spec.time],
       ["Inputs", getInputs(spec).join(", ")],
-      ["Output", spec.output],
+      ["Output", getOutputs(spec).join(", ") || null],
       ...(spec.simulation ? listDiagnosisFacts(spec) : []),
       ...(spec.simulation || spec.monitor ? [] : listSearchFacts(spec)),
       ["Seed", spec.monitor ? null : String(spec.seed ?? "default")],

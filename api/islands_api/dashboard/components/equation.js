@@ -27,19 +27,20 @@ function copyMath(source) {
 }
 
 /**
- * Parse an equation.
- * @throws {Error} if it is not MathML
+ * Parse the equations of a model, one `math` element for each.
+ * @throws {Error} if they are not MathML
  */
 export function parseMath(source) {
   // Without its namespace it is plain XML, which the browser neither styles nor runs.
-  const plain = source.replace(/\sxmlns="[^"]*"/, "");
-  const parsed = new DOMParser().parseFromString(plain, "application/xml");
-  if (parsed.querySelector("parsererror") || parsed.documentElement.localName !== "math")
+  const plain = source.replace(/\sxmlns="[^"]*"/g, "");
+  const parsed = new DOMParser().parseFromString(`<equations>${plain}</equations>`, "application/xml");
+  const equations = [...parsed.documentElement.children];
+  if (parsed.querySelector("parsererror") || !equations.length || equations.some((each) => each.localName !== "math"))
     throw new Error("the equation is not MathML");
-  return copyMath(parsed.documentElement);
+  return equations.map(copyMath);
 }
 
-/** Load the equation of a model. */
-export async function loadEquation(model, signal) {
+/** Load the equations of a model. */
+export async function loadEquations(model, signal) {
   return parseMath(await getText(`${model}/export?format=mathml`, { signal }));
 }

@@ -28,7 +28,7 @@ function enqueue(task) {
 
 /** Make the figure at a path. */
 export function makeFigure(path, name, signal) {
-  const title = TITLES[name] ?? name;
+  const title = TITLES[name] ?? name.replace(/^free-run-(\d)$/, "Free run of output $1");
   const link = el("a", { class: "small", hidden: true, download: `${name}.svg` }, "SVG");
   const paper = el("div", { class: "paper" });
   const node = el("figure", { class: "rendered" }, el("figcaption", {}, el("h4", {}, title), link), paper);

@@ -5,7 +5,7 @@ import { el, makeFacts, makeScrollable, makeTable, runOnceAtATime } from "../lib
 import { NONE, formatNumber, formatPercent, formatShort } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
 import { showProblem } from "./banner.js";
-import { loadEquation } from "./equation.js";
+import { loadEquations } from "./equation.js";
 import { makeFigure } from "./figures.js";
 import { makeReportButtons } from "./report.js";
 
@@ -162,11 +162,19 @@ function makeExportButtons(path, rank) {
     el("button", { type: "button", "data-format": form, on: { click: save(form) } }, name));
 }
 
+const makeExportRow = (path, rank) =>
+  el(
+    "div",
+    { class: "row exports", role: "group", "aria-label": "Export the model as" },
+    el("span", { class: "soft", "aria-hidden": "true" }, "Export as"),
+    makeExportButtons(path, rank),
+  );
+
 function makeEquation(path, model, signal) {
   const host = makeScrollable("Equation", el("code", { class: "plain" }, model.equation));
   host.classList.add("equation");
-  loadEquation(path, signal).then(
-    (math) => host.replaceChildren(math),
+  loadEquations(path, signal).then(
+    (equations) => host.replaceChildren(...equations),
     // The plain text of the equation stays visible.
     (error) => signal.aborted || showProblem(error),
   );
@@ -190,12 +198,7 @@ function makeDetail(job, model, hysteresis, signal) {
   return [
     el("h3", { id: "model" }, `Model ${model.rank}`),
     makeEquation(path, model, signal),
-    el(
-      "div",
-      { class: "row exports", role: "group", "aria-label": "Export the model as" },
-      el("span", { class: "soft", "aria-hidden": "true" }, "Export as"),
-      makeExportButtons(path, model.rank),
-    ),
+    makeExportRow(path, model.rank),
     el(
       "div",
       { class: "pair" },
@@ -216,6 +219,72 @@ function makeDetail(job, model, hysteresis, signal) {
     ]),
     makeGallery(path, signal),
   ];
+}
+
+/** Make the table of the errors of every output in the common free run. */
+function makeOutputTable(outputs) {
+  const getErrors = (output, part, mode) => output.metrics[part][mode];
+  return makeTable(
+    "Errors of the outputs",
+    [
+      "Output",
+      ...["MAPE est. %", "MAPE val. %", "R² val.", "RMSE val.", "One-step RMSE val.", "90 % band ±"].map(
+        (name) => [name, "figure"],
+      ),
+    ],
+    outputs.map((output, place) => {
+      const run = getErrors(output, "validation", "free_run");
+      return [
+        el("span", {}, `y${place + 1}: `, el("bdi", {}, output.name), output.unit ? ` (${output.unit})` : ""),
+        makeExactValue(getErrors(output, "estimation", "free_run").mape, formatNumber),
+        makeExactValue(run.mape, formatNumber),
+        makeExactValue(run.r2, formatR2),
+        makeExactValue(run.rmse, formatNumber),
+        makeExactValue(getErrors(output, "validation", "one_step_ahead").rmse, formatNumber),
+        makeExactValue(getHalfWidth(output.bands), formatNumber),
+      ];
+    }),
+  );
+}
+
+/** Return the median half-width of the 90 % band; null without bands. */
+function getHalfWidth(bands) {
+  const at = bands?.levels.indexOf(0.9) ?? -1;
+  return at < 0 ? null : bands.factors[at] * bands.width;
+}
+
+/** Make the model of several outputs: equations, errors, terms and the free run of every output. */
+function makeCoupledDetail(job, model, outputs, signal) {
+  const path = `v1/jobs/${encodeURIComponent(job)}/models/${model.rank}`;
+  return [
+    el("h3", { id: "model" }, "Equations"),
+    makeEquation(path, model, signal),
+    makeExportRow(path, model.rank),
+    el("h4", {}, "Outputs"),
+    makeScrollable("Errors of the outputs", makeOutputTable(outputs)),
+    el("h4", {}, "Terms"),
+    makeScrollable("Terms", makeTermTable(model)),
+    makeGallery(path, signal),
+  ];
+}
+
+/** Make the panel of the model of several outputs. */
+export function makeCoupledPanel(job, signal) {
+  const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
+  const article = el("article", { class: "model", "aria-labelledby": "model" });
+  poll(async () => {
+    const { models: [model], outputs } = await getJson(`v1/jobs/${encodeURIComponent(job.id)}/result`, { signal });
+    article.replaceChildren(...makeCoupledDetail(job.id, model, outputs, signal));
+    const note = el(
+      "p",
+      { class: "soft small" },
+      "All outputs are simulated together. The validation data selected the equations, so these errors are not "
+        + "an independent test.",
+    );
+    body.replaceChildren(makeSentences(job), note, article);
+    return Infinity;
+  }, signal);
+  return { node: el("section", { class: "card" }, el("h2", {}, "Model"), body), select() {} };
 }
 
 /** Make the figures of the whole search, loaded when the section is opened. */

@@ -13,7 +13,7 @@ import {
   makeBadge,
   makeProgressBar,
 } from "../components/job_state.js";
-import { makeModelsPanel } from "../components/models.js";
+import { makeCoupledPanel, makeModelsPanel } from "../components/models.js";
 import { download, getJson, sendRequest } from "../lib/api.js";
 import { formatUtc, makeAge } from "../lib/clock.js";
 import { announce, el, makeFacts, runOnceAtATime, setText } from "../lib/dom.js";
@@ -100,11 +100,13 @@ function formatRunTime({ state, started, run_seconds: counted, max_run_seconds: 
   return Number.isFinite(limit) ? `${written} of ${formatDuration(limit)}` : written;
 }
 
+const hasSeveralOutputs = ({ spec }) => Array.isArray(spec.output);
+
 function makeJobFacts(job, unit) {
   const progress = job.progress ?? {};
   const { best_error: best, seconds_left: left, evaluations_per_second: rate } = progress;
   const running = job.state === "running";
-  const bestError = Number.isFinite(best)
+  const bestError = Number.isFinite(best) && !hasSeveralOutputs(job)
     ? el("data", { value: best }, `${formatNumber(best)} ${unit}`)
     : null;
   return makeFacts([
@@ -151,7 +153,8 @@ export function mountJob(host, { id, rank }, signal) {
   function build(job) {
     const onUnitKnown = (value) => {
       unit = value;
-      if (!isSearch(job)) return;
+      // The errors of several outputs have no common scale.
+      if (!isSearch(job) || hasSeveralOutputs(job)) return;
       convergence = makeConvergencePanel(id, unit, signal);
       convergenceHost.replaceChildren(convergence.node);
       if (current) show(current);
@@ -187,7 +190,9 @@ export function mountJob(host, { id, rank }, signal) {
       if (succeeded !== modelsHost.hasChildNodes())
         modelsHost.replaceChildren(...(succeeded ? [makeFindingsPanel(job)] : []));
     } else if (job.state === "succeeded" && models === null) {
-      models = makeModelsPanel(job, rank, signal);
+      models = hasSeveralOutputs(job)
+        ? makeCoupledPanel(job, signal)
+        : makeModelsPanel(job, rank, signal);
       modelsHost.replaceChildren(models.node);
     }
   }

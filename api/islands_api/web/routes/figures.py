@@ -8,7 +8,7 @@ from time import monotonic
 from typing import Annotated, Any
 
 import structlog
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Path, Query, Response
 
 from islands.errors import IslandsError, suggest
 from islands_api.result_schemas import FreeRun
@@ -68,9 +68,9 @@ _REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; 
 ModelFigure = Annotated[
     str,
     Path(
-        pattern=r"^[a-z-]{1,20}$",
-        description="One of the model's `figures`.",
-        json_schema_extra={"enum": list(MODEL_FIGURES)},
+        pattern=r"^[a-z-]{1,20}[0-9]?$",
+        description=f"One of the model's `figures`: {', '.join(MODEL_FIGURES)}; of several outputs "
+        "free-run-1, free-run-2, ...",
     ),
 ]
 SearchFigure = Annotated[
@@ -147,12 +147,22 @@ async def model_figure(
 
 
 @router.get("/{job}/models/{rank}/simulation", response_model=FreeRun)
-async def simulation(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Response:
+async def simulation(
+    job: Id,
+    rank: Rank,
+    caller: Reader,
+    state: AppStateDep,
+    output: Annotated[int, Query(ge=1, le=8, description="Number of the output, if there are several.")] = 1,
+) -> Response:
     """Return the free run of a model over the validation data, and its 90 % band, as numbers for a screen."""
     await get_model(state, caller, job, rank)
-    return await _figure_response(
-        state, caller, job, f"{rank}/{SIMULATION_ARTEFACT}", rank, "application/json"
-    )
+    outputs = await _count_outputs(state, job)
+    if output > outputs:
+        raise ResourceNotFoundError(
+            f"the model has {outputs} output{'s' * (outputs > 1)}, there is no {output}"
+        )
+    name = f"{rank}/free-run-{output}.json" if outputs > 1 else f"{rank}/{SIMULATION_ARTEFACT}"
+    return await _figure_response(state, caller, job, name, rank, "application/json")
 
 
 @router.get("/{job}/report", response_class=Response, responses=_HTML_RESPONSES)
@@ -175,6 +185,8 @@ async def report(job: Id, caller: Reader, state: AppStateDep) -> Response:
 
 async def _list_search_figures(state: AppState, caller: Principal, job: str) -> tuple[str, ...]:
     document = await get_result(state, await get_job_of_kind(state, caller, job, IDENTIFICATION))
+    if "outputs" in document:
+        return ()
     several = document["settings"]["islands"] > 1
     return tuple(name for name in SEARCH_FIGURES if several or name != _MULTI_ISLAND_FIGURE)
 
@@ -182,8 +194,15 @@ async def _list_search_figures(state: AppState, caller: Principal, job: str) -> 
 async def _list_model_figures(state: AppState, job: str) -> tuple[str, ...]:
     # Results of earlier versions do not say whether there is a loop, and have the figure.
     document = await state.run_blocking(state.store.results.document, job) or {}
+    if "outputs" in document:
+        return tuple(f"free-run-{number + 1}" for number in range(len(document["outputs"])))
     loop = document.get("loop", True)
     return tuple(name for name in MODEL_FIGURES if loop or name != _LOOP_FIGURE)
+
+
+async def _count_outputs(state: AppState, job: str) -> int:
+    document = await state.run_blocking(state.store.results.document, job) or {}
+    return len(document["outputs"]) if "outputs" in document else 1
 
 
 def _check_figure(figure: str, figures: tuple[str, ...]) -> None:

@@ -5,8 +5,13 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Response
 
 from islands.export import EXPORTS, export
-from islands.io.models import model_from_json
-from islands_api.result_schemas import DiscrepancyResult, IdentificationResult, MonitoredRecordResult
+from islands.io.models import any_model_from_json
+from islands_api.result_schemas import (
+    CoupledIdentificationResult,
+    DiscrepancyResult,
+    IdentificationResult,
+    MonitoredRecordResult,
+)
 from islands_api.schemas import ModelPage, ModelView
 from islands_api.web.auth import Principal, Reader
 from islands_api.web.dependencies import AppState, AppStateDep
@@ -18,6 +23,9 @@ from islands_service.domain.job import IDENTIFICATION
 from islands_service.store.results import StoredModel
 
 router = APIRouter(prefix="/v1/jobs", tags=["models"], responses=RESPONSES)
+
+#: Results of all kinds of jobs.
+AnyResult = IdentificationResult | CoupledIdentificationResult | DiscrepancyResult | MonitoredRecordResult
 
 #: Path parameter: the rank of a model in its result.
 Rank = Annotated[int, Path(ge=1, le=10_000, description="1 has the least error on the validation data.")]
@@ -85,7 +93,7 @@ async def exported(
 ) -> Response:
     """Export a model as a program, a block for a simulator, an equation, or a model file."""
     found = await get_model(state, caller, job, rank)
-    text = await state.run_blocking(export, model_from_json(found.file, f"model {rank}"), form)
+    text = await state.run_blocking(export, any_model_from_json(found.file, f"model {rank}"), form)
     name = f"model-{rank:02d}.{_SUFFIXES.get(form, 'txt')}"
     return Response(
         text,
@@ -94,7 +102,13 @@ async def exported(
     )
 
 
-@router.get("/{job}/result", response_model=IdentificationResult | DiscrepancyResult | MonitoredRecordResult)
+@router.get(
+    "/{job}/result",
+    response_model=IdentificationResult
+    | CoupledIdentificationResult
+    | DiscrepancyResult
+    | MonitoredRecordResult,
+)
 async def result(job: Id, caller: Reader, state: AppStateDep) -> Any:
     """Return the whole result, in the form of `result.json` or `discrepancy.json`."""
     found = await state.run_blocking(state.store.jobs.get, caller.owner, job)

@@ -14,15 +14,17 @@ from islands.cli.preprocessing_options import with_preprocessing_options
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.record_options import with_reading_options
 from islands.cli.recordings import Recordings, measured_names
-from islands.cli.runs.coupled import couple_data, coupled_options, join_columns, search_outputs
+from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
+from islands.cli.search_options import ModelClass
 from islands.cli.stop_requests import REPEAT, stop_requests
 from islands.data.averaging import AUTO
+from islands.data.coupled_record import join_columns
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.io.models import MODEL_CLASSES, NARX
+from islands.io.models import NARX
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.models.candidate_library import LIBRARIES
 from islands.progress import Steps
@@ -48,15 +50,7 @@ def fit(
             "--validation", help="FILE, FRACTION of the record's end (default 0.25), or START:STOP."
         ),
     ] = None,
-    model: Annotated[
-        str,
-        typer.Option(
-            "--model",
-            help=f"Class of the models: {', '.join([NARX, *MODEL_CLASSES])}.",
-            # An option with one value is of no use.
-            hidden=not MODEL_CLASSES,
-        ),
-    ] = NARX,
+    model: ModelClass = NARX,
     library: Annotated[
         str,
         typer.Option(

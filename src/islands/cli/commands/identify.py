@@ -11,20 +11,16 @@ from islands.cli.engines import ENGINES
 from islands.cli.output_folder import check_folder
 from islands.cli.preprocessing_options import with_preprocessing_options
 from islands.cli.record_options import with_reading_options
-from islands.cli.runs.coupled import join_columns
 from islands.cli.runs.identify import RunOptions, load_run, run
 from islands.cli.search_options import DEFAULTS, SearchOptions, with_search_options
+from islands.data.coupled_record import join_columns
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError, lookup
-from islands.evolution.presets import AUTO
 from islands.io.records import fingerprint
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 
 #: Options of the run rather than of the search: allowed with ``--resume``.
 RUN_OPTIONS = ("resume", "engine", "ray_address", "wall_time", "verbose")
-
-#: Preset for several outputs, if none is given.
-COUPLED_PRESET = "narx"
 
 
 @with_reading_options
@@ -110,7 +106,7 @@ def identify(
             "rows": rows,
             "reading": reading.changes(),
             "preprocessing": asdict(steps),
-            "preset": COUPLED_PRESET if several and search.preset == AUTO else search.preset,
+            "preset": search.preset,
             "seed": search.seed,
             "changes": dict(search.changes),
         }

@@ -9,26 +9,13 @@ import islands
 from islands.cli.recordings import advance_as_named
 from islands.cli.stop_requests import REPEAT, StopRequests
 from islands.data.averaging import AUTO
-from islands.data.coupled_record import CoupledRecord, check_outputs, couple
+from islands.data.coupled_record import CoupledRecord, couple
 from islands.data.dataset import Dataset
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.facade.coupled.identification import StoppedCouplingError
 from islands.facade.coupled.result import list_folders
 from islands.progress import Steps
-
-
-def join_columns(inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[str], str]:
-    """Return the inputs and the output of one record with all columns, for `couple_data`.
-
-    Raises
-    ------
-    RecordError
-        With several outputs, one is given twice or is also an input.
-    """
-    if len(outputs) > 1:
-        check_outputs(inputs, outputs)
-    return [*inputs, *outputs[1:]], outputs[0]
 
 
 def couple_data(

@@ -24,7 +24,12 @@ from islands.data.coupled_record import CoupledRecord
 from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
-from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
+from islands.evolution.presets import (
+    AUTO,
+    resolve_coupled_settings,
+    resolve_kinds,
+    resolve_settings,
+)
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError, choice_from_document
@@ -119,7 +124,7 @@ def run(
                 for name in (CHECKPOINT, HALL, TEST):
                     (folder / name).unlink(missing_ok=True)
             preset = job["preset"]
-            if preset == AUTO:
+            if preset == AUTO and "outputs" not in job:
                 preset = _choose_preset(data, held_out, job, show, stop, folder)
                 # Checkpoints contain the job, so a resumed run does not choose again.
                 job = {**job, "choice": preset.to_document()}
@@ -212,6 +217,8 @@ def _choose_preset(
 
 def _resolve_possible(job: dict[str, Any]) -> tuple[Settings, ...]:
     """Return the settings of a job, or of every kind of record among which the preset auto chooses."""
+    if "outputs" in job:
+        return (resolve_coupled_settings(job["preset"], coupled_options(job["changes"])),)
     if job["preset"] == AUTO:
         return tuple(resolve_kinds(job["changes"]).values())
     return (resolve_settings(job["preset"], job["changes"]),)

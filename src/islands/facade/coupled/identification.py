@@ -10,11 +10,16 @@ from islands.data.averaging import AUTO, average_samples
 from islands.data.coupled_record import CoupledRecord, CoupledSplit, check_outputs, couple, split_coupled
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.errors import SettingsError, suggest
-from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.errors import SettingsError
 from islands.estimation.refinement import refine
 from islands.evolution.engine import Engine
-from islands.evolution.presets import resolve_settings
+from islands.evolution.presets import AUTO as AUTO_PRESET
+from islands.evolution.presets import (
+    COUPLED_PRESET,
+    check_coupled_settings,
+    resolve_coupled_settings,
+    with_tuples,
+)
 from islands.evolution.search_state import SearchState, keep_hall, stop_reason
 from islands.evolution.settings import Settings
 from islands.facade.coupled.bands import make_bands
@@ -138,8 +143,8 @@ def fit_coupled(
         The record is too short or incomplete, an output is given twice or is also an input, or the
         validation data has other columns or another sampling time.
     """
-    chosen: dict[str, Any] = {"library": "polynomial", **options}
-    _check_constraints(chosen.get("constraints"), chosen)
+    chosen: dict[str, Any] = {"library": "polynomial", "feedthrough": "no", **options}
+    check_coupled_settings(chosen.get("constraints"), chosen["feedthrough"])
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
     trial = take_library(chosen["library"], degree, lags, constraints)
     find = partial(fit, seed=seed, stop=stop)
@@ -173,7 +178,7 @@ def identify_coupled(
     record, inputs, outputs, dt, validation, refine_together
         As for `fit_coupled`.
     preset : str
-        An entry of ``PRESETS``.
+        An entry of ``PRESETS``; ``auto`` is ``narx``.
     seed : int
         Seed of the random generator; the same seed gives the same result, bit for bit.
     progress : callable, optional
@@ -199,16 +204,9 @@ def identify_coupled(
     SettingsError, RecordError, StoppedError
         As `fit_coupled`.
     """
-    chosen: dict[str, Any] = dict(changes)
-    settings = resolve_settings(
-        preset,
-        {name: tuple(value) if isinstance(value, list) else value for name, value in chosen.items()},
-    )
-    _check_constraints(settings.constraints, chosen)
-    if settings.select != "validation":
-        raise SettingsError(
-            "select is 'validation' with several outputs: equations are chosen by their free run together"
-        )
+    chosen: dict[str, Any] = {"feedthrough": "no", **with_tuples(changes)}
+    settings = resolve_coupled_settings(preset, chosen)
+    preset = COUPLED_PRESET if preset == AUTO_PRESET else preset
     chosen.setdefault("average", settings.average)
     find = _Searches(partial(identify, preset=preset, seed=seed, stop=stop, engine=engine), start, on_epoch)
     trial = make_trial_library(settings)
@@ -253,19 +251,6 @@ class _Searches:
         self._state = keep_hall(state) if stop_reason(state, settings) else state
         if self._on_epoch is not None:
             self._on_epoch(replace(state, earlier=self._ended), settings)
-
-
-def _check_constraints(constraints: str | None, options: dict[str, Any]) -> None:
-    if constraints is not None and constraints not in CONSTRAINTS:
-        raise SettingsError(
-            f"the constraints {constraints!r} are for one output: with several, each equation numbers its "
-            f"inputs differently; take {', '.join(CONSTRAINTS)}{suggest(constraints, CONSTRAINTS)}"
-        )
-    if options.setdefault("feedthrough", "no") != "no":
-        raise SettingsError(
-            "feedthrough is 'no' with several outputs, so that they do not depend on each other within a "
-            "sample: name the inputs that act within the sample with +1, as u+1"
-        )
 
 
 def _read_data(

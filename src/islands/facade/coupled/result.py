@@ -6,16 +6,25 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
 
 from islands.data.coupled_record import CoupledRecord, CoupledSplit, match_coupled
 from islands.data.signal_map import match_rate
 from islands.errors import ModelError
 from islands.export import export_or_write
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Primitive
 from islands.facade.results.identification import Result
-from islands.io.ensembles import bands_document, ensemble_document
-from islands.io.models import model_json
-from islands.io.result_folder import record_document
+from islands.io.ensembles import (
+    bands_document,
+    bands_from_document,
+    ensemble_document,
+    ensemble_from_document,
+)
+from islands.io.models import model_json, terms_document
+from islands.io.result_folder import finite, record_document
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.models.coupled_narx import CoupledModel, coupled_equation, coupled_signals
 from islands.progress import Steps
@@ -25,6 +34,9 @@ from islands.validation.prediction_bands import LEVEL, PredictionBand, Predictio
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+#: Errors by output, part and prediction.
+_Metrics: TypeAlias = Mapping[str, Mapping[str, Mapping[str, Metrics]]]
 
 COUPLED_RESULT_SCHEMA = "islands.coupled-result/1"
 
@@ -95,9 +107,9 @@ class FittedCoupledModel:
                 "the search was stopped before them"
             )
         first = self.warm_up if warm_up is None else warm_up
-        data = record.map(lambda each: match_rate(self.model, each))
+        data = match_coupled(self.model, record.map(lambda each: match_rate(self.model, each)))
         run = free_run(self.model, data, first).y
-        runs = self.prediction_bands[0].ensemble.simulate(match_coupled(self.model, data), first)
+        runs = self.prediction_bands[0].ensemble.simulate(data, first)
         return tuple(
             each.band(run[:, place], runs[..., place], level)
             for place, each in enumerate(self.prediction_bands)
@@ -110,6 +122,39 @@ class FittedCoupledModel:
     def __repr__(self) -> str:
         names, equations = ", ".join(self.model.output_names), "; ".join(self.equation.splitlines())
         return f"<{type(self).__name__} of {names}: {equations}>"
+
+
+def read_fitted_model(
+    model: CoupledModel,
+    document: Mapping[str, Any],
+    name: str,
+    primitives: Mapping[str, Primitive] = PRIMITIVES,
+) -> FittedCoupledModel:
+    """Return a model with the warm-up and the prediction bands of its ``result.json``.
+
+    Parameters
+    ----------
+    model : CoupledModel
+    document : mapping
+        Content of ``result.json``.
+    name : str
+        Name of the document, for messages.
+    primitives : mapping
+        Primitives that expressions may contain.
+
+    Raises
+    ------
+    ModelError
+        The document is damaged.
+    """
+    try:
+        # Results of earlier versions have no ensemble and no warm-up.
+        ensemble = ensemble_from_document(document.get("ensemble"), model, primitives)
+        bands = [bands_from_document(each.get("bands"), ensemble) for each in document["outputs"]]
+        warm_up = int(document.get("warm_up") or model.maximum_lag)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ModelError(f"{name} is damaged: {error!r} is missing or wrong") from error
+    return FittedCoupledModel(model, warm_up, tuple(each for each in bands if each is not None))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -148,7 +193,7 @@ class CoupledResult(FittedCoupledModel):
         return replace(self, wall_s=seconds)
 
     @property
-    def metrics(self) -> Mapping[str, Mapping[str, Mapping[str, Metrics]]]:
+    def metrics(self) -> _Metrics:
         """Errors by output, part and prediction: ``metrics["y1"]["validation"]["free_run"].rmse``.
 
         The free run is that of all equations together; one step ahead, all outputs are measured. NaN if the
@@ -196,7 +241,7 @@ class CoupledResult(FittedCoupledModel):
                 self._draw_figure(name, folder / "figures" / f"free-run-{directory}.svg")
         (folder / "model.json").write_text(model_json(self.model), encoding="utf-8")
         (folder / "summary.txt").write_text(f"{self}\n", encoding="utf-8")
-        (folder / "result.json").write_text(f"{json.dumps(self._document(), indent=2)}\n", encoding="utf-8")
+        (folder / "result.json").write_text(f"{json.dumps(self.document(), indent=2)}\n", encoding="utf-8")
         return folder
 
     def _draw_figure(self, output: str, path: Path) -> None:
@@ -205,14 +250,19 @@ class CoupledResult(FittedCoupledModel):
         path.parent.mkdir(exist_ok=True)
         save(self.plot(output), path)
 
-    def _document(self) -> dict[str, Any]:
-        return {
+    def document(self) -> dict[str, Any]:
+        """Return the content of ``result.json`` as JSON values."""
+        ensemble = self.prediction_bands[0].ensemble if self.prediction_bands else None
+        metrics = self.metrics
+        document = {
             "schema": COUPLED_RESULT_SCHEMA,
             "dt": self.model.dt,
             "average": self.model.average,
             "warm_up": self.warm_up,
             "refined": self.refined,
             "wall_s": self.wall_s,
+            "seed": self.results[0].search_result.seed,
+            "settings": dict(self.results[0].settings),
             "left_out": list(self.left_out),
             "equation": self.equation,
             "signals": coupled_signals(self.model),
@@ -224,18 +274,72 @@ class CoupledResult(FittedCoupledModel):
                     "rank": self.ranks[place],
                     "bands": bands_document(self.prediction_bands[place] if self.prediction_bands else None),
                     "metrics": {
-                        part: {mode: _finite(asdict(each)) for mode, each in by_mode.items()}
-                        for part, by_mode in self.metrics[name].items()
+                        part: {mode: asdict(each) for mode, each in by_mode.items()}
+                        for part, by_mode in metrics[name].items()
                     },
                 }
                 for place, name in enumerate(self.model.output_names)
             ],
-            "ensemble": ensemble_document(
-                self.prediction_bands[0].ensemble if self.prediction_bands else None
-            ),
+            "models": [self._model_document(metrics)],
+            "ensemble": ensemble_document(ensemble),
             "estimation": record_document(self.split.estimation.records[0]) | {"names": self._names()},
             "validation": record_document(self.split.validation.records[0]) | {"names": self._names()},
         }
+        described: dict[str, Any] = finite(document)
+        return described
+
+    def _model_document(self, metrics: _Metrics) -> dict[str, Any]:
+        ensemble = self.prediction_bands[0].ensemble if self.prediction_bands else None
+        written = self.model.equation()
+        return {
+            "rank": 1,
+            "recommended": True,
+            "size": self.model.size,
+            "equation": self.equation,
+            "latex": written.latex,
+            "signals": coupled_signals(self.model),
+            "terms": [
+                {**term, "inclusion": None if ensemble is None else ensemble.inclusion(term["regressor"])}
+                for term in terms_document(self.model)
+            ],
+            "metrics": {
+                part: {
+                    mode: _average([parts[part][mode] for parts in metrics.values()])
+                    for mode in ("one_step_ahead", "free_run")
+                }
+                for part in ("estimation", "validation")
+            },
+            "warm_up": self.warm_up,
+        }
+
+    def sentences(self) -> list[str]:
+        """Return the result in sentences; the second one is the equations."""
+        refined = "were refined together" if self.refined else "are those of separate searches"
+        counts = f"One equation for each of {len(self.model.models)} outputs, {self.model.size} terms"
+        metrics = self.metrics
+        return [
+            f"{counts}; the parameters {refined}.",
+            "; ".join(self.equation.splitlines()),
+            *(self._describe_output(place, metrics) for place in range(len(self.model.models))),
+        ]
+
+    def _describe_output(self, place: int, metrics: _Metrics) -> str:
+        name, record = self.model.output_names[place], self.split.validation.records[place]
+        errors = metrics[name]["validation"]
+        free, one = errors["free_run"], errors["one_step_ahead"]
+        unit = f" {record.output_unit}".rstrip()
+        if not isfinite(free.rmse):
+            return f"{name}: the common free run on the validation data diverges."
+        text = (
+            f"{name}: the common free run on the validation data has an error of {free.mape:.3g} % of the "
+            f"range (RMSE {free.rmse:.4g}{unit}, R2 {free.r2:.4f}), one step ahead RMSE {one.rmse:.4g}{unit}"
+        )
+        if self.prediction_bands:
+            half = self.prediction_bands[place].typical_half_width(LEVEL)
+            text += (
+                f"; a new measurement is within {half:.3g}{unit} of it in {100 * LEVEL:g} % of the samples"
+            )
+        return f"{text}."
 
     def _names(self) -> dict[str, list[str]]:
         return {"inputs": list(self.model.input_names), "outputs": list(self.model.output_names)}
@@ -261,10 +365,14 @@ class CoupledResult(FittedCoupledModel):
         return "\n".join(lines)
 
 
+def _average(metrics: Sequence[Metrics]) -> dict[str, float]:
+    """Return the means over the outputs of the errors that have no unit."""
+    return {
+        name: float(np.mean([getattr(each, name) for each in metrics]))
+        for name in ("mape", "r2", "fit_percent")
+    }
+
+
 def list_folders(outputs: Sequence[str]) -> list[str]:
     """Return the name of the folder of every output, such as ``1-level_cm``."""
     return [f"{place}-{re.sub(r'[^A-Za-z0-9_.-]', '_', name)}" for place, name in enumerate(outputs, start=1)]
-
-
-def _finite(values: Mapping[str, float]) -> dict[str, float | None]:
-    return {name: value if isfinite(value) else None for name, value in values.items()}

@@ -17,7 +17,7 @@ from islands_service.figure_worker import read_search_result
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreUnavailableError
-from support.job_runs import make_run
+from support.job_runs import Interruption, make_run
 from support.stores import ALICE
 
 Found = tuple[list[Any], list[Any]]
@@ -35,20 +35,6 @@ def run_job(lease: Lease, store: Any, blobs: Any, check: Callable[[], None] = la
 
 def get_models(outcome: JobOutcome) -> list[Any]:
     return [json.loads(json.dumps(document)) for document, _ in outcome.models]
-
-
-class Interruption:
-    """A check that raises when the progress of a job has reached a generation."""
-
-    def __init__(
-        self, store: Store, job: Job, at: int, reason: type[Exception] = CoordinatorStopping
-    ) -> None:
-        self._store, self._job, self._at, self._reason = store, job.id, at, reason
-
-    def __call__(self) -> None:
-        progress = self._store.jobs.get(ALICE, self._job).progress
-        if progress is not None and progress.get("generation", -1) >= self._at:
-            raise self._reason("enough")
 
 
 @pytest.mark.ci

@@ -1,0 +1,143 @@
+"""Jobs of several outputs: search, resumption, model, figures, report and download over REST."""
+
+import httpx
+import numpy as np
+import pytest
+
+import islands
+from islands.data.coupled_record import CoupledRecord
+from islands.facade.coupled.identification import identify_coupled
+from islands_api.client import Client
+from islands_service.coordinator import identification_job
+from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled
+from islands_service.coordinator.identification_job import run_identification_job
+from islands_service.domain.job import JobState
+from islands_service.store.blobs import Blobs
+from support.command_line import succeed
+from support.coupled_systems import TWO_MASSES, make_coupled_record
+from support.job_runs import Interruption, make_run
+from support.stores import taken
+
+pytestmark = pytest.mark.ci
+
+#: A search that takes a second.
+SETTINGS = {
+    "population": 8,
+    "generations": 2,
+    "max_terms": 4,
+    "library_degree": 1,
+    "average": 1,
+    "islands": 1,
+}
+
+
+@pytest.fixture(scope="module")
+def record():
+    return make_coupled_record(TWO_MASSES, samples=200, noise=0.01)
+
+
+@pytest.fixture
+def dataset(service, record, tmp_path):
+    columns = [0.1 * np.arange(200).round(3), record.records[0].u[:, 0], *record.y.T]
+    path = tmp_path / "masses.csv"
+    np.savetxt(path, np.transpose(columns), delimiter=",", header="t_s,u,y1,y2", comments="", fmt="%.17g")
+    with Client(service.url) as client:
+        yield client.upload(path)
+
+
+def run(service, job):
+    blobs, lease = Blobs(service.settings.blobs), taken(service.store, job.id)
+    outcome = run_identification_job(make_run(lease, service.store, blobs))
+    service.store.leases.finish(lease, outcome)
+    return outcome
+
+
+def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
+    with Client(service.url) as client:
+        job = client.submit(dataset, "u", ["y1", "y2"], seed=3, **SETTINGS)
+        run(service, job)
+        done = client.job(job)
+        assert done.state == JobState.SUCCEEDED
+        # Both searches have three generations each.
+        assert (done.progress["generation"], done.progress["generations"]) == (5, 5)
+        generations = [point.generation for point in client.history(job).items]
+        assert generations == sorted(set(generations))
+        succeed("jobs", "result", job.id, "--url", service.url, "--out", tmp_path / "result")
+        assert "y1(k) =" in succeed("jobs", "watch", job.id, "--url", service.url)
+        assert client.report(job).count(b"<img") == 2
+        assert "y2" in client.export(job, 1, "c")
+    files = CoupledRecord(
+        tuple(islands.read_record(tmp_path / "masses.csv", "u", name) for name in ("y1", "y2"))
+    )
+    expected = identify_coupled(files, seed=3, **SETTINGS)
+    loaded = islands.load(tmp_path / "result")
+    assert loaded.model == expected.model
+    for one, other in zip(loaded.bands(files), expected.bands(files), strict=True):
+        np.testing.assert_array_equal(one.upper, other.upper)
+    assert sorted(path.name for path in (tmp_path / "result" / "figures").iterdir()) == [
+        "free-run-1.svg",
+        "free-run-2.svg",
+    ]
+
+
+def test_a_job_continues_in_the_search_that_was_interrupted(service, dataset, monkeypatch):
+    monkeypatch.setattr(identification_job, "REPORT_EVERY", 0.0)
+    with Client(service.url) as client:
+        whole, part = (client.submit(dataset, "u", ["y1", "y2"], seed=3, **SETTINGS) for _ in range(2))
+        expected = run(service, whole)
+        blobs = Blobs(service.settings.blobs)
+        for generation in (1, 3):
+            lease = taken(service.store, part.id)
+            interruption = Interruption(service.store, lease.job, generation)
+            with pytest.raises(CoordinatorStopping):
+                run_identification_job(make_run(lease, service.store, blobs, interruption, 0.0))
+            service.store.leases.release(lease)
+        assert client.job(part).progress["generation"] == 3
+        found = run(service, part)
+        assert found.models == expected.models
+        assert client.history(part) == client.history(whole)
+
+
+def test_a_cancelled_job_says_what_is_missing(service, dataset):
+    with Client(service.url) as client:
+        job = client.submit(dataset, "u", ["y1", "y2"], **SETTINGS)
+        lease = taken(service.store, job.id)
+
+        def cancel():
+            raise JobCancelled("cancelled")
+
+        with pytest.raises(JobCancelled):
+            run_identification_job(make_run(lease, service.store, Blobs(service.settings.blobs), cancel))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"output": ["y1", "y1"]}, "y1 is given twice"),
+        ({"output": ["y1", "u"]}, "u is an input and an output"),
+        ({"output": ["y1", "y3"]}, "y3"),
+        ({"settings": {"feedthrough": "yes"}}, "as u+1"),
+        ({"settings": {"constraints": "gain = 2"}}, "are for one output"),
+        ({"settings": {"select": "fitness"}}, "by their free run together"),
+        ({"model": "gain-scheduled"}, "have one output"),
+    ],
+)
+@pytest.mark.usefixtures("toy_class")
+def test_a_job_that_can_only_fail_is_refused(service, dataset, given, message):
+    request = {"dataset": dataset.id, "inputs": ["u"], "output": ["y1", "y2"], **given}
+    answer = httpx.post(f"{service.url}/v1/jobs", json=request)
+    assert answer.status_code == 422
+    assert message in answer.json()["detail"]
+
+
+def test_the_figures_of_every_output_have_their_numbers(service, dataset):
+    with Client(service.url) as client:
+        job = client.submit(dataset, "u", ["y1", "y2"], **SETTINGS)
+        run(service, job)
+    path = f"{service.url}/v1/jobs/{job.id}/models/1"
+    assert httpx.get(f"{path}/figures").json()["items"] == ["free-run-1", "free-run-2"]
+    first, second = (httpx.get(f"{path}/simulation", params={"output": output}).json() for output in (1, 2))
+    assert first["measured"] != second["measured"]
+    assert second["band"]["level"] == 0.9
+    missing = httpx.get(f"{path}/simulation", params={"output": 3})
+    assert (missing.status_code, missing.json()["detail"]) == (404, "the model has 2 outputs, there is no 3")
