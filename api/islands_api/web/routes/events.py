@@ -30,7 +30,8 @@ _STREAM_RESPONSES: dict[int | str, dict[str, Any]] = {
         "description": f"Events: {', '.join(_EVENT_KINDS)}.",
         "content": {
             "text/event-stream": {
-                "schema": {"type": "string"},
+                # A type would be that of the text for some tools, and that of the list of events for others.
+                "schema": {"description": "Events as lines of text."},
                 "itemSchema": {
                     "type": "object",
                     "required": ["id", "event", "data"],
