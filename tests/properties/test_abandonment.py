@@ -83,7 +83,7 @@ def test_abandonment_does_not_change_halls_elites_and_genes(setting, history):
             else:
                 assert repr(each) == repr(known)
     # The test is meaningful only if individuals are abandoned.
-    assert sum(len(abandoned(island)) for island in history) > 15
+    assert sum(len(abandoned(island)) for island in history) > 5
 
 
 def test_abandoned_individuals_exceed_the_threshold_when_evaluated(setting, history):

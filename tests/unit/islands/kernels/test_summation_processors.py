@@ -85,7 +85,7 @@ for interval in (1, 3, 50, None):
     found[f"simulation, {interval}"] = np.append(simulated.y, simulated.mean_squared_error)
 for name, array in found.items():
     print(name, hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest())
-code = "".join(kernel._wide.inspect_asm().values())
+code = "".join(kernel.simulate.inspect_asm().values())
 print(max((name for name in ("xmm", "ymm", "zmm") if f"%{name}" in code), default="none"))
 """
 
