@@ -204,10 +204,11 @@ def run_fmu(case, folder, kind):
     path = folder / "model.fmu"
     write_export(case.exported, kind, path)
     assert validate_fmu(str(path)) == []
-    columns, count = case.block.columns, case.block.outputs
-    signals = np.empty(len(case.inputs), [(column, float) for column in ("time", *columns[count:])])
+    columns, outputs = case.block.columns, case.block.columns[: case.block.computed]
+    inputs = columns[case.block.computed :]
+    signals = np.empty(len(case.inputs), [(column, float) for column in ("time", *inputs)])
     signals["time"] = np.arange(len(case.inputs)) * case.block.dt
-    for column, values in zip(columns[count:], case.inputs.T, strict=True):
+    for column, values in zip(inputs, case.inputs.T, strict=True):
         signals[column] = values
     names = [f"start.{columns[channel]}[{lag}]" for channel, lag in case.block.samples]
     found = fmpy.simulate_fmu(
@@ -217,10 +218,10 @@ def run_fmu(case, folder, kind):
         output_interval=case.block.dt,
         start_values=dict(zip(names, case.past, strict=True)),
         input=signals,
-        output=columns[:count],
+        output=outputs,
     )
-    outputs = np.column_stack([found[column] for column in columns[:count]])
+    signals = np.column_stack([found[column] for column in outputs])
     if not any(case.block.feedthrough):
-        return outputs
-    np.testing.assert_array_equal(outputs[0], case.past[:1])
-    return outputs[1:]
+        return signals
+    np.testing.assert_array_equal(signals[0], case.past[:1])
+    return signals[1:]
