@@ -1,41 +1,26 @@
 /* Co-simulation interface of FMI 2.0 for a NARX model: https://fmi-standard.org */
 
+#include <stddef.h>
+
+typedef void (*Log)(
+    void *environment, const char *name, int status, const char *category, const char *text, ...);
+
 #include "instance.h"
 
-#if defined _WIN32
-#define EXPORT __declspec(dllexport)
-#elif defined __GNUC__
-#define EXPORT __attribute__((visibility("default")))
-#else
-#define EXPORT
-#endif
-
-typedef enum { OK, WARNING, DISCARD, ERROR, FATAL, PENDING } Status;
 typedef enum { DO_STEP_STATUS, PENDING_STATUS, LAST_SUCCESSFUL_TIME, TERMINATED_STATUS } StatusKind;
 typedef enum { MODEL_EXCHANGE, CO_SIMULATION } Kind;
 
 typedef struct {
-    void (*log)(void *environment, const char *name, Status status, const char *category, const char *text, ...);
+    Log log;
     void *(*allocate)(size_t count, size_t size);
     void (*release)(void *memory);
     void (*step_finished)(void *environment, Status status);
     void *environment;
 } Callbacks;
 
-typedef struct {
-    Model model;
-    Callbacks callbacks;
-    char name[256];
-} Instance;
-
-/* Return the status of a call, and log its message after a failure. */
-static Status report(const Instance *instance, const char *failure)
+static void log_error(const Instance *instance, const char *message)
 {
-    if (failure != NULL && instance->callbacks.log != NULL) {
-        instance->callbacks.log(
-            instance->callbacks.environment, instance->name, ERROR, "logStatusError", "%s", failure);
-    }
-    return failure == NULL ? OK : ERROR;
+    instance->log(instance->environment, instance->name, ERROR, "logStatusError", "%s", message);
 }
 
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -52,20 +37,9 @@ EXPORT void *fmi2Instantiate(
     const char *name, Kind kind, const char *guid, const char *resources, const Callbacks *callbacks,
     int visible, int logging)
 {
-    Instance *instance;
+    const Callbacks none = {0}, *given = callbacks == NULL ? &none : callbacks;
     (void)resources, (void)visible, (void)logging;
-    if (kind != CO_SIMULATION || strcmp(guid, TOKEN) != 0) {
-        return NULL;
-    }
-    instance = calloc(1, sizeof *instance);
-    if (instance != NULL) {
-        reset(&instance->model);
-        if (callbacks != NULL) {
-            instance->callbacks = *callbacks;
-        }
-        strncpy(instance->name, name, sizeof instance->name - 1);
-    }
-    return instance;
+    return kind == CO_SIMULATION ? make_instance(name, guid, given->log, given->environment) : NULL;
 }
 
 EXPORT void fmi2FreeInstance(void *c) { free(c); }
@@ -79,45 +53,22 @@ EXPORT Status fmi2SetupExperiment(
     return OK;
 }
 
-EXPORT Status fmi2EnterInitializationMode(void *c)
-{
-    Instance *instance = c;
-    instance->model.phase = INITIALISING;
-    return OK;
-}
+EXPORT Status fmi2EnterInitializationMode(void *c) { return set_phase(c, INITIALISING); }
 
-EXPORT Status fmi2ExitInitializationMode(void *c)
-{
-    Instance *instance = c;
-    initialise(&instance->model);
-    instance->model.phase = RUNNING;
-    return OK;
-}
+EXPORT Status fmi2ExitInitializationMode(void *c) { return exit_initialisation(c); }
 
-EXPORT Status fmi2Terminate(void *c)
-{
-    Instance *instance = c;
-    instance->model.phase = TERMINATED;
-    return OK;
-}
+EXPORT Status fmi2Terminate(void *c) { return set_phase(c, TERMINATED); }
 
-EXPORT Status fmi2Reset(void *c)
-{
-    Instance *instance = c;
-    reset(&instance->model);
-    return OK;
-}
+EXPORT Status fmi2Reset(void *c) { return reset_instance(c); }
 
 EXPORT Status fmi2GetReal(void *c, const unsigned references[], size_t count, double values[])
 {
-    Instance *instance = c;
-    return report(instance, get_values(&instance->model, references, count, values));
+    return read_variables(c, references, count, values);
 }
 
 EXPORT Status fmi2SetReal(void *c, const unsigned references[], size_t count, const double values[])
 {
-    Instance *instance = c;
-    return report(instance, set_values(&instance->model, references, count, values));
+    return write_variables(c, references, count, values);
 }
 
 /* All variables are real. */
@@ -137,33 +88,20 @@ NO_VARIABLES(fmi2SetString, const char *const)
 
 EXPORT Status fmi2DoStep(void *c, double time, double step, int is_final)
 {
-    Instance *instance = c;
     (void)is_final;
-    return report(instance, simulate(&instance->model, time, step));
+    return do_step(c, time, step);
 }
 
 EXPORT Status fmi2CancelStep(void *c) { return report(c, "a step cannot be cancelled"); }
 
-EXPORT Status fmi2GetFMUstate(void *c, void **state)
-{
-    Instance *instance = c;
-    *state = copy_model(&instance->model, *state);
-    return report(instance, *state == NULL ? "out of memory" : NULL);
-}
+EXPORT Status fmi2GetFMUstate(void *c, void **state) { return store_state(c, state); }
 
-EXPORT Status fmi2SetFMUstate(void *c, void *state)
-{
-    Instance *instance = c;
-    copy_model(state, &instance->model);
-    return OK;
-}
+EXPORT Status fmi2SetFMUstate(void *c, void *state) { return restore_state(c, state); }
 
 EXPORT Status fmi2FreeFMUstate(void *c, void **state)
 {
     (void)c;
-    free(*state);
-    *state = NULL;
-    return OK;
+    return free_state(state);
 }
 
 EXPORT Status fmi2SerializedFMUstateSize(void *c, void *state, size_t *size)
@@ -175,22 +113,12 @@ EXPORT Status fmi2SerializedFMUstateSize(void *c, void *state, size_t *size)
 
 EXPORT Status fmi2SerializeFMUstate(void *c, void *state, char bytes[], size_t size)
 {
-    if (size < sizeof(Model)) {
-        return report(c, "the memory for the serialised state is too small");
-    }
-    memcpy(bytes, state, sizeof(Model));
-    return OK;
+    return serialise_state(c, state, bytes, size);
 }
 
 EXPORT Status fmi2DeSerializeFMUstate(void *c, const char bytes[], size_t size, void **state)
 {
-    Model model;
-    if (size != sizeof model) {
-        return report(c, "the serialised state has another size");
-    }
-    memcpy(&model, bytes, sizeof model);
-    *state = copy_model(&model, *state);
-    return report(c, *state == NULL ? "out of memory" : NULL);
+    return deserialise_state(c, bytes, size, state);
 }
 
 EXPORT Status fmi2GetDirectionalDerivative(

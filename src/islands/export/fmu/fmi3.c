@@ -1,34 +1,16 @@
 /* Co-simulation interface of FMI 3.0 for a NARX model: https://fmi-standard.org */
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
+
+typedef void (*Log)(void *environment, int status, const char *category, const char *text);
 
 #include "instance.h"
 
-#if defined _WIN32
-#define EXPORT __declspec(dllexport)
-#elif defined __GNUC__
-#define EXPORT __attribute__((visibility("default")))
-#else
-#define EXPORT
-#endif
-
-typedef enum { OK, WARNING, DISCARD, ERROR, FATAL } Status;
-typedef void (*Log)(void *environment, Status status, const char *category, const char *text);
-
-typedef struct {
-    Model model;
-    Log log;
-    void *environment;
-} Instance;
-
-/* Return the status of a call, and log its message after a failure. */
-static Status report(const Instance *instance, const char *failure)
+static void log_error(const Instance *instance, const char *message)
 {
-    if (failure != NULL && instance->log != NULL) {
-        instance->log(instance->environment, ERROR, "logStatusError", failure);
-    }
-    return failure == NULL ? OK : ERROR;
+    instance->log(instance->environment, ERROR, "logStatusError", message);
 }
 
 EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
@@ -44,19 +26,9 @@ EXPORT void *fmi3InstantiateCoSimulation(
     bool early_return, const uint32_t intermediate[], size_t intermediates, void *environment, Log log,
     void (*update)(void *, double, bool, bool, bool, bool, bool *, double *))
 {
-    Instance *instance;
     (void)name, (void)resources, (void)visible, (void)logging, (void)early_return, (void)intermediate;
     (void)update;
-    if (strcmp(token, TOKEN) != 0 || event_mode || intermediates > 0) {
-        return NULL;
-    }
-    instance = calloc(1, sizeof *instance);
-    if (instance != NULL) {
-        reset(&instance->model);
-        instance->log = log;
-        instance->environment = environment;
-    }
-    return instance;
+    return event_mode || intermediates > 0 ? NULL : make_instance("", token, log, environment);
 }
 
 EXPORT void fmi3FreeInstance(void *c) { free(c); }
@@ -67,80 +39,49 @@ EXPORT Status fmi3EnterInitializationMode(
     Instance *instance = c;
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
     instance->model.values[TIME] = start;
-    instance->model.phase = INITIALISING;
-    return OK;
+    return set_phase(instance, INITIALISING);
 }
 
-EXPORT Status fmi3ExitInitializationMode(void *c)
-{
-    Instance *instance = c;
-    initialise(&instance->model);
-    instance->model.phase = RUNNING;
-    return OK;
-}
+EXPORT Status fmi3ExitInitializationMode(void *c) { return exit_initialisation(c); }
 
-EXPORT Status fmi3Terminate(void *c)
-{
-    Instance *instance = c;
-    instance->model.phase = TERMINATED;
-    return OK;
-}
+EXPORT Status fmi3Terminate(void *c) { return set_phase(c, TERMINATED); }
 
-EXPORT Status fmi3Reset(void *c)
-{
-    Instance *instance = c;
-    reset(&instance->model);
-    return OK;
-}
+EXPORT Status fmi3Reset(void *c) { return reset_instance(c); }
 
 EXPORT Status fmi3DoStep(
     void *c, double time, double step, bool is_final, bool *needs_event, bool *terminate, bool *is_early,
     double *last_time)
 {
     Instance *instance = c;
-    const char *failure = simulate(&instance->model, time, step);
+    Status status = do_step(instance, time, step);
     (void)is_final;
     *needs_event = *terminate = *is_early = false;
     *last_time = instance->model.values[TIME];
-    return report(instance, failure);
+    return status;
 }
 
 EXPORT Status fmi3GetFloat64(
     void *c, const uint32_t references[], size_t count, double values[], size_t value_count)
 {
-    Instance *instance = c;
     (void)value_count;
-    return report(instance, get_values(&instance->model, references, count, values));
+    return read_variables(c, references, count, values);
 }
 
 EXPORT Status fmi3SetFloat64(
     void *c, const uint32_t references[], size_t count, const double values[], size_t value_count)
 {
-    Instance *instance = c;
     (void)value_count;
-    return report(instance, set_values(&instance->model, references, count, values));
+    return write_variables(c, references, count, values);
 }
 
-EXPORT Status fmi3GetFMUState(void *c, void **state)
-{
-    Instance *instance = c;
-    *state = copy_model(&instance->model, *state);
-    return report(instance, *state == NULL ? "out of memory" : NULL);
-}
+EXPORT Status fmi3GetFMUState(void *c, void **state) { return store_state(c, state); }
 
-EXPORT Status fmi3SetFMUState(void *c, void *state)
-{
-    Instance *instance = c;
-    copy_model(state, &instance->model);
-    return OK;
-}
+EXPORT Status fmi3SetFMUState(void *c, void *state) { return restore_state(c, state); }
 
 EXPORT Status fmi3FreeFMUState(void *c, void **state)
 {
     (void)c;
-    free(*state);
-    *state = NULL;
-    return OK;
+    return free_state(state);
 }
 
 EXPORT Status fmi3SerializedFMUStateSize(void *c, void *state, size_t *size)
@@ -152,22 +93,12 @@ EXPORT Status fmi3SerializedFMUStateSize(void *c, void *state, size_t *size)
 
 EXPORT Status fmi3SerializeFMUState(void *c, void *state, uint8_t bytes[], size_t size)
 {
-    if (size < sizeof(Model)) {
-        return report(c, "the memory for the serialised state is too small");
-    }
-    memcpy(bytes, state, sizeof(Model));
-    return OK;
+    return serialise_state(c, state, bytes, size);
 }
 
 EXPORT Status fmi3DeserializeFMUState(void *c, const uint8_t bytes[], size_t size, void **state)
 {
-    Model model;
-    if (size != sizeof model) {
-        return report(c, "the serialised state has another size");
-    }
-    memcpy(&model, bytes, sizeof model);
-    *state = copy_model(&model, *state);
-    return report(c, *state == NULL ? "out of memory" : NULL);
+    return deserialise_state(c, bytes, size, state);
 }
 
 /* The remaining functions of the interface concern what this model does not have. */

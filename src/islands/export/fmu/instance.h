@@ -1,4 +1,8 @@
-/* Instance of an FMU around a NARX model, for FMI 2.0 and 3.0. model.h defines the model. */
+/*
+ * Instance of an FMU around a NARX model: all that FMI 2.0 and 3.0 have in common. model.h defines the model.
+ * The file of an interface defines Log, the type of its function for messages, before it includes this file,
+ * and log_error().
+ */
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,6 +12,16 @@
 
 /* Value references: time, outputs, inputs, start values of the state. */
 enum { TIME = 0, OUTPUT = 1, INPUT = OUTPUT + OUTPUTS, START = INPUT + INPUTS, VARIABLES = START + STATES };
+
+#if defined _WIN32
+#define EXPORT __declspec(dllexport)
+#elif defined __GNUC__
+#define EXPORT __attribute__((visibility("default")))
+#else
+#define EXPORT
+#endif
+
+typedef enum { OK, WARNING, DISCARD, ERROR, FATAL } Status;
 
 /* Phases of an instance. Start values can be set until the simulation runs. */
 typedef enum { PREPARING, INITIALISING, RUNNING, TERMINATED, FAILED } Phase;
@@ -19,7 +33,17 @@ typedef struct {
     Phase phase;
 } Model;
 
-/* Return the state in which an instance begins. */
+typedef struct {
+    Model model;
+    Log log;
+    void *environment;
+    char name[256];
+} Instance;
+
+/* Pass a message to the function for messages of an instance, which is not NULL. */
+static void log_error(const Instance *instance, const char *message);
+
+/* Return a model to the state in which an instance begins. */
 static void reset(Model *model)
 {
     memset(model, 0, sizeof *model);
@@ -129,4 +153,101 @@ static Model *copy_model(const Model *model, Model *into)
         *into = *model;
     }
     return into;
+}
+
+/*
+ * Calls of the interfaces, which begin with the instance. They return the status, and log a message after a
+ * failure.
+ */
+static Status report(const Instance *instance, const char *failure)
+{
+    if (failure != NULL && instance->log != NULL) {
+        log_error(instance, failure);
+    }
+    return failure == NULL ? OK : ERROR;
+}
+
+/* Return a new instance, or NULL if the token is that of another model or memory is missing. */
+static Instance *make_instance(const char *name, const char *token, Log log, void *environment)
+{
+    Instance *instance = strcmp(token, TOKEN) == 0 ? calloc(1, sizeof *instance) : NULL;
+    if (instance != NULL) {
+        reset(&instance->model);
+        instance->log = log;
+        instance->environment = environment;
+        strncpy(instance->name, name, sizeof instance->name - 1);
+    }
+    return instance;
+}
+
+static Status set_phase(Instance *instance, Phase phase)
+{
+    instance->model.phase = phase;
+    return OK;
+}
+
+static Status exit_initialisation(Instance *instance)
+{
+    initialise(&instance->model);
+    return set_phase(instance, RUNNING);
+}
+
+static Status reset_instance(Instance *instance)
+{
+    reset(&instance->model);
+    return OK;
+}
+
+static Status read_variables(Instance *instance, const unsigned *references, size_t count, double *values)
+{
+    return report(instance, get_values(&instance->model, references, count, values));
+}
+
+static Status write_variables(
+    Instance *instance, const unsigned *references, size_t count, const double *values)
+{
+    return report(instance, set_values(&instance->model, references, count, values));
+}
+
+static Status do_step(Instance *instance, double time, double duration)
+{
+    return report(instance, simulate(&instance->model, time, duration));
+}
+
+static Status store_state(const Instance *instance, void **state)
+{
+    *state = copy_model(&instance->model, *state);
+    return report(instance, *state == NULL ? "out of memory" : NULL);
+}
+
+static Status restore_state(Instance *instance, const void *state)
+{
+    copy_model(state, &instance->model);
+    return OK;
+}
+
+static Status free_state(void **state)
+{
+    free(*state);
+    *state = NULL;
+    return OK;
+}
+
+static Status serialise_state(const Instance *instance, const void *state, void *bytes, size_t size)
+{
+    if (size >= sizeof(Model)) {
+        memcpy(bytes, state, sizeof(Model));
+    }
+    return report(instance, size < sizeof(Model) ? "the memory for the serialised state is too small" : NULL);
+}
+
+static Status deserialise_state(const Instance *instance, const void *bytes, size_t size, void **state)
+{
+    Model model;
+    if (size != sizeof model) {
+        return report(instance, "the serialised state has another size");
+    }
+    memcpy(&model, bytes, sizeof model);
+    *state = copy_model(&model, *state);
+    return report(instance, *state == NULL ? "out of memory" : NULL);
 }
