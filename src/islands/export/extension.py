@@ -8,9 +8,9 @@ from islands.effects.catalogue import get_summary
 from islands.errors import ModelError
 from islands.export import export
 from islands.export.closed_form import closed_form
-from islands.export.equations.c.equations import c_equations
+from islands.export.equations.c.program import c_equations
 from islands.export.equations.collection import collect_equations
-from islands.export.equations.matlab.equations import matlab_equations
+from islands.export.equations.matlab.program import matlab_equations
 from islands.models.narx import Model
 from islands.simulators.ode.output_system import SYMBOL_MEANINGS
 from islands.simulators.specification.base import ValueSpec

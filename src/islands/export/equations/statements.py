@@ -2,13 +2,14 @@
 
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from islands.export.equations.common_parts import take_common_parts
 from islands.export.equations.extended_system import ExtendedEquations
 from islands.export.equations.identifiers import make_identifiers
+from islands.export.equations.language import Language
 from islands.expressions.primitives import POW
 from islands.expressions.printing import EQUATION_OPERATORS, ProgramPrinter, render
 from islands.expressions.tree import (
@@ -45,29 +46,10 @@ _WIDTH = 108
 
 @dataclass(frozen=True)
 class EquationCode:
-    """Writer of the parts of a program.
-
-    Attributes
-    ----------
-    equations : ExtendedEquations
-    member : str
-        Text between a structure and its member, if the structure is an argument.
-    functions : mapping
-        Names of functions of expressions in the language; the others have their own names.
-    declare : str
-        Text before the name of a new variable.
-    continuation : str
-        End of a line that continues.
-    power : callable
-        Writes a power.
-    """
+    """Writer of the parts of a program."""
 
     equations: ExtendedEquations
-    member: str
-    functions: Mapping[str, str]
-    declare: str
-    continuation: str
-    power: Callable[[str, str], str]
+    language: Language
 
     @cached_property
     def signals(self) -> tuple[Expression, ...]:
@@ -96,11 +78,11 @@ class EquationCode:
     @cached_property
     def _members(self) -> dict[str, str]:
         """Texts of all names in the equations."""
-        given, own = self.equations, self.identifiers
-        members = {name: f"p{self.member}{own[name]}" for name in given.values}
-        members |= {name: f"s{self.member}{own[name]}" for name in given.start}
+        given, own, member = self.equations, self.identifiers, self.language.member
+        members = {name: f"p{member}{own[name]}" for name in given.values}
+        members |= {name: f"s{member}{own[name]}" for name in given.start}
         members |= {name: f"w.{own[name]}" for name, _ in given.system.variables}
-        return members | {render(each): f"in{self.member}{own[render(each)]}" for each in self.signals}
+        return members | {render(each): f"in{member}{own[render(each)]}" for each in self.signals}
 
     def write(self, expression: Expression, local: Mapping[str, str] | None = None) -> str:
         """Write an expression; ``local`` has the texts of further names."""
@@ -110,9 +92,9 @@ class EquationCode:
 
     def _call(self, function: Primitive, arguments: Sequence[str]) -> str:
         if function == POW:
-            return self.power(*arguments)
+            return self.language.power.format(*arguments)
         name = function.name
-        return f"{self.functions.get(name, DEFINED.get(name, name))}({', '.join(arguments)})"
+        return f"{self.language.functions.get(name, DEFINED.get(name, name))}({', '.join(arguments)})"
 
     def assign(
         self, targets: Sequence[tuple[str, Expression]], local: Mapping[str, str] | None = None
@@ -122,7 +104,7 @@ class EquationCode:
         for number, (target, expression) in enumerate(targets, start=1):
             parts, (rest,) = take_common_parts([expression], f"part{number}_" if len(targets) > 1 else "part")
             for name, part in parts:
-                lines += self.wrap(f"{self.declare}{name} = {self.write(part, local)};")
+                lines += self.wrap(f"{self.language.declare}{name} = {self.write(part, local)};")
             lines += self.wrap(f"{target} = {self.write(rest, local)};")
         return lines
 
@@ -131,7 +113,7 @@ class EquationCode:
         found = textwrap.wrap(
             line, _WIDTH - 12, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
         )
-        return [f"{each}{self.continuation}" for each in found[:-1]] + found[-1:]
+        return [f"{each}{self.language.continuation}" for each in found[:-1]] + found[-1:]
 
     def assign_variables(self, readers: Iterable[Expression]) -> list[str]:
         """Write the variables that expressions read, each after those that it reads."""

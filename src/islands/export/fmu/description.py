@@ -97,14 +97,8 @@ def describe_fmi3(block: Block, token: str) -> str:
         SubElement(
             listed,
             "Float64",
-            {
-                "name": each.name,
-                "valueReference": str(reference),
-                "causality": each.causality,
-                "variability": each.variability,
-                "description": each.description,
-                **_optional(unit=each.unit, initial=each.initial, start=each.start_text),
-            },
+            _describe(each, reference)
+            | _optional(unit=each.unit, initial=each.initial, start=each.start_text),
         )
     structure = SubElement(root, "ModelStructure")
     # Value references of the outputs: those behind the time. No output depends on present inputs.
@@ -137,14 +131,7 @@ def describe_fmi2(block: Block, token: str) -> str:
         variable = SubElement(
             listed,
             "ScalarVariable",
-            {
-                "name": each.name,
-                "valueReference": str(reference),
-                "causality": each.causality,
-                "variability": each.variability,
-                "description": each.description,
-                **_optional(initial=each.initial),
-            },
+            _describe(each, reference) | _optional(initial=each.initial),
         )
         SubElement(variable, "Real", _optional(unit=each.unit, start=each.start_text))
     structure = SubElement(root, "ModelStructure")
@@ -184,6 +171,17 @@ def _add_units(root: Element, block: Block) -> None:
     listed = SubElement(root, "UnitDefinitions")
     for name in sorted(names):
         SubElement(listed, "Unit", name=name)
+
+
+def _describe(variable: FmuVariable, reference: int) -> dict[str, str]:
+    """Return the attributes of a variable that both standards have."""
+    return {
+        "name": variable.name,
+        "valueReference": str(reference),
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "description": variable.description,
+    }
 
 
 def _optional(**attributes: str) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Bodies of the functions of primitives in C and MATLAB."""
+"""Names of the functions of primitives, and their bodies in C and MATLAB."""
 
 import re
 
@@ -37,3 +37,9 @@ def body(primitive: Primitive, language: str) -> str:
             "characters A-Z, a-z, 0-9 and _"
         )
     return str(text)
+
+
+def function_name(primitive: Primitive) -> str:
+    """Return the name of a primitive's function in C, MATLAB and Modelica."""
+    # The prefix avoids names of libraries (tanh) and reserved names (leading underscore).
+    return f"f_{primitive.name}"

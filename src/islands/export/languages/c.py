@@ -2,7 +2,7 @@
 
 import textwrap
 
-from islands.export.languages.bodies import body
+from islands.export.languages.bodies import body, function_name
 from islands.expressions.tree import Primitive
 from islands.models.block import Block
 
@@ -110,8 +110,12 @@ def _write_starts(block: Block) -> str:
     """Return the statements that write the first samples of the states; empty without states."""
     if not block.starts:
         return ""
+
+    def write_sample(signal: str, _lag: int) -> str:
+        return f"{signal}[k]"
+
     lines = [
-        f"        {name}[k] = {block.start_text(place, lambda signal, _lag: f'{signal}[k]', c_name)};\n"
+        f"        {name}[k] = {block.start_text(place, write_sample, function_name)};\n"
         for place, name in enumerate(block.signals[block.outputs : block.computed])
     ]
     loop = "for (size_t k = 0; k < MAXIMUM_LAG && k < samples; ++k) {\n"
@@ -121,7 +125,7 @@ def _write_starts(block: Block) -> str:
 def _list_terms(block: Block, place: int) -> list[str]:
     # Compilers warn about unused parameters.
     unused = [f"(void){name};" for name in block.find_unread(place)]
-    terms = block.terms(place, lambda name, lag: f"{name}[{-lag}]", c_name)
+    terms = block.terms(place, lambda name, lag: f"{name}[{-lag}]", function_name)
     return unused + [f"total += {term};" for term in terms]
 
 
@@ -138,7 +142,7 @@ def define_functions(block: Block) -> str:
     ModelError
         A primitive has no C body.
     """
-    return "".join(f"{definition(primitive, c_name(primitive))}\n" for primitive in block.primitives)
+    return "".join(f"{definition(primitive, function_name(primitive))}\n" for primitive in block.primitives)
 
 
 def definition(primitive: Primitive, name: str) -> str:
@@ -151,12 +155,6 @@ def definition(primitive: Primitive, name: str) -> str:
     """
     arguments = ", ".join(f"double {argument}" for argument in "ab"[: primitive.arity])
     return f"static double {name}({arguments})\n{{\n{textwrap.indent(body(primitive, 'c'), '    ')}\n}}\n"
-
-
-def c_name(primitive: Primitive) -> str:
-    """Return the name of a primitive's C function."""
-    # The prefix avoids names of the C library (tanh) and reserved names (leading underscore).
-    return f"f_{primitive.name}"
 
 
 _C_BLOCK = """\
@@ -215,7 +213,7 @@ def c_block(block: Block) -> str:
 
     lines = ["(void)state;"]
     for place in block.order:
-        lines += ["total = 0.0;", *(f"total += {term};" for term in block.terms(place, read, c_name))]
+        lines += ["total = 0.0;", *(f"total += {term};" for term in block.terms(place, read, function_name))]
         lines.append(f"output[{place}] = total;")
     return _C_BLOCK.format(
         outputs=block.computed,

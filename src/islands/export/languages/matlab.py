@@ -2,7 +2,7 @@
 
 import textwrap
 
-from islands.export.languages.bodies import body
+from islands.export.languages.bodies import body, function_name
 from islands.expressions.tree import Primitive
 from islands.models.block import Block
 
@@ -72,17 +72,17 @@ def matlab_source(block: Block) -> str:
         "functions": "".join(f"\n{matlab_definition(primitive)}" for primitive in block.primitives),
     }
     if block.computed == 1:
-        terms = block.terms(0, _write_sample, matlab_name)
+        terms = block.terms(0, _write_sample, function_name)
         return _FILE.format(terms="\n    ".join(f"total = total + {term};" for term in terms), **shared)
     steps, allocations = [], []
     for place in block.order:
         name = block.signals[place]
-        terms = block.terms(place, _write_sample, matlab_name)
+        terms = block.terms(place, _write_sample, function_name)
         steps += [f"{name}(k) = 0;", *(f"{name}(k) = {name}(k) + {term};" for term in terms)]
     for output, start in zip(outputs, starts, strict=True):
         allocations += [f"{output} = zeros(size({inputs[0]}));", f"{output}(1:given) = {start}(1:given);"]
     for place, name in enumerate(block.signals[block.outputs : block.computed]):
-        start = block.start_text(place, _write_sample, matlab_name)
+        start = block.start_text(place, _write_sample, function_name)
         first = f"for k = 1:given, {name}(k) = {start}; end"
         allocations += [f"{name} = zeros(size({inputs[0]}));", first]
     name = "state_model" if block.starts else "coupled_narx_model"
@@ -112,9 +112,4 @@ def matlab_definition(primitive: Primitive) -> str:
     """
     arguments = ", ".join("ab"[: primitive.arity])
     text = textwrap.indent(body(primitive, "matlab"), "  ")
-    return f"function r = {matlab_name(primitive)}({arguments})\n{text}\nend\n"
-
-
-def matlab_name(primitive: Primitive) -> str:
-    """Return the name of a primitive's MATLAB function."""
-    return f"f_{primitive.name}"
+    return f"function r = {function_name(primitive)}({arguments})\n{text}\nend\n"

@@ -2,6 +2,7 @@
 
 import textwrap
 
+from islands.export.languages.bodies import function_name
 from islands.export.languages.matlab import matlab_definition
 from islands.models.block import Block
 
@@ -108,7 +109,7 @@ def matlab_system_source(block: Block) -> str:
             for term in block.terms(
                 place,
                 lambda signal, lag: _sample(block, signal, lag),
-                lambda primitive: f"narx_system.f_{primitive.name}",
+                lambda primitive: f"narx_system.{function_name(primitive)}",
             )
         ]
     read = [signal for signal, direct in zip(inputs, block.feedthrough, strict=True) if direct]

@@ -5,6 +5,7 @@ from types import MappingProxyType
 
 from islands.data.channel_names import parse_unit
 from islands.errors import ModelError
+from islands.export.languages.bodies import function_name
 from islands.expressions.primitives import LARGEST_EXPONENT
 from islands.expressions.tree import Primitive
 from islands.models.block import Block
@@ -67,7 +68,7 @@ def modelica_source(block: Block) -> str:
         functions="".join(_function(each) for each in block.primitives),
         dt=block.dt,
         equations="\n    ".join(
-            f"{name} = {_join_terms(block.terms(place, _sample, lambda primitive: f'f_{primitive.name}'))};"
+            f"{name} = {_join_terms(block.terms(place, _sample, function_name))};"
             for place, name in ((place, block.signals[place]) for place in block.order)
         ),
         shifts="\n    ".join(
@@ -106,9 +107,10 @@ def _function(primitive: Primitive) -> str:
             f"primitive {primitive.name!r} has no text in Modelica: only built-in primitives can be exported"
         )
     inputs = "".join(f"    input Real {name};\n" for name in "ab"[: primitive.arity])
+    name = function_name(primitive)
     return (
-        f"  function f_{primitive.name}\n{inputs}    output Real r;\n  algorithm\n"
-        f"    r := {_BODIES[primitive.name]};\n  end f_{primitive.name};\n"
+        f"  function {name}\n{inputs}    output Real r;\n  algorithm\n"
+        f"    r := {_BODIES[primitive.name]};\n  end {name};\n"
     )
 
 

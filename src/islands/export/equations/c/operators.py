@@ -6,7 +6,10 @@ Each function writes its result for the signal ``x`` to ``z``, or returns a numb
 from collections.abc import Mapping
 from types import MappingProxyType
 
-_LOW_PASS = """\
+#: Definition of each operator that is a function.
+C_OPERATORS: Mapping[str, str] = MappingProxyType(
+    {
+        "low-pass": """\
 /* First-order low-pass with a time constant; exact for a cubic through four neighbouring samples. */
 static void low_pass(const double *x, double *z, size_t samples, double tau)
 {
@@ -44,9 +47,8 @@ static void low_pass(const double *x, double *z, size_t samples, double tau)
         state = exp(-step)*state + weights[0]*before + weights[1]*here + weights[2]*next + weights[3]*after;
     }
 }
-"""
-
-_RESONANCE = """\
+""",
+        "resonance": """\
 /* Second-order mode in series, by the bilinear transform, prewarped at its frequency. */
 static void resonance(const double *x, double *z, size_t samples, double period, double zeta)
 {
@@ -67,9 +69,8 @@ static void resonance(const double *x, double *z, size_t samples, double period,
         }
     }
 }
-"""
-
-_PLAY = """\
+""",
+        "play": """\
 /* Play with a half width. */
 static void play(const double *x, double *z, size_t samples, double width)
 {
@@ -81,9 +82,8 @@ static void play(const double *x, double *z, size_t samples, double width)
         z[k] = at;
     }
 }
-"""
-
-_SLIDER = """\
+""",
+        "slider": """\
 /* Stick-slip slider: z is constant until x differs from it by the breakaway, and then jumps to x. */
 static void slider(const double *x, double *z, size_t samples, double breakaway)
 {
@@ -94,9 +94,8 @@ static void slider(const double *x, double *z, size_t samples, double breakaway)
         z[k] = at;
     }
 }
-"""
-
-_LIMIT_RATE = """\
+""",
+        "limit-rate": """\
 /* Rate limiter: z follows x, which is linear between samples, by at most a rate per second. */
 static void limit_rate(const double *x, double *z, size_t samples, double inverse_rate)
 {
@@ -112,9 +111,8 @@ static void limit_rate(const double *x, double *z, size_t samples, double invers
         z[k] = at;
     }
 }
-"""
-
-_LAG_UNEVENLY = """\
+""",
+        "lag-unevenly": """\
 /* First-order lag of x, which is linear between samples. Its time constants are those of falling fast,
    falling slowly, rising slowly and rising fast: z' is above a rate per second, or below. */
 static void lag_unevenly(const double *x, double *z, size_t samples, double slow, double falling_fast,
@@ -141,9 +139,8 @@ static void lag_unevenly(const double *x, double *z, size_t samples, double slow
         z[k] = x[k] - gap;
     }
 }
-"""
-
-_INTERPOLATE = """\
+""",
+        "interpolate": """\
 /* Signal at the time t*(1 + e) - tau, by Lagrange's polynomial through six samples; its ends are held. */
 static void interpolate_at(const double *x, double *z, size_t samples, double e, double tau)
 {
@@ -164,9 +161,8 @@ static void interpolate_at(const double *x, double *z, size_t samples, double e,
         z[k] = sum;
     }
 }
-"""
-
-_RESTS = """\
+""",
+        "rests": """\
 /* Whether a signal is constant over the estimation part of the record that was diagnosed. */
 static double rests(const double *x, size_t samples)
 {
@@ -177,18 +173,6 @@ static double rests(const double *x, size_t samples)
     }
     return most - least <= MAX_RANGE_AT_REST*fmax(fabs(least), fabs(most)) ? 1.0 : 0.0;
 }
-"""
-
-#: Definition of each operator that is a function.
-C_OPERATORS: Mapping[str, str] = MappingProxyType(
-    {
-        "low-pass": _LOW_PASS,
-        "resonance": _RESONANCE,
-        "play": _PLAY,
-        "slider": _SLIDER,
-        "limit-rate": _LIMIT_RATE,
-        "lag-unevenly": _LAG_UNEVENLY,
-        "interpolate": _INTERPOLATE,
-        "rests": _RESTS,
+""",
     }
 )

@@ -6,7 +6,10 @@ Each function returns its result for the signal ``x``, a column.
 from collections.abc import Mapping
 from types import MappingProxyType
 
-_LOW_PASS = """\
+#: Definition of each operator that is a function.
+MATLAB_OPERATORS: Mapping[str, str] = MappingProxyType(
+    {
+        "low-pass": """\
 function z = low_pass(x, tau, c)
 % First-order low-pass with a time constant; exact for a cubic through four neighbouring samples.
   z = x;
@@ -33,9 +36,8 @@ function z = low_pass(x, tau, c)
     state = exp(-step)*state + near(:).'*weights;
   end
 end
-"""
-
-_RESONANCE = """\
+""",
+        "resonance": """\
 function z = resonance(x, period, zeta, c)
 % Second-order mode in series, by the bilinear transform, prewarped at its frequency.
   z = x;
@@ -46,9 +48,8 @@ function z = resonance(x, period, zeta, c)
   b = w*w/scale;
   z = x(1) + filter([b, 2*b, b], [1, 2*(w*w - q*q)/scale, (q*q - 2*zeta*w*q + w*w)/scale], x - x(1));
 end
-"""
-
-_PLAY = """\
+""",
+        "play": """\
 function z = play(x, width)
 % Play with a half width.
   z = x;
@@ -57,9 +58,8 @@ function z = play(x, width)
     z(k) = min(max(z(k-1), x(k) - width), x(k) + width);
   end
 end
-"""
-
-_SLIDER = """\
+""",
+        "slider": """\
 function z = slider(x, breakaway)
 % Stick-slip slider: z is constant until x differs from it by the breakaway, and then jumps to x.
   z = x;
@@ -68,9 +68,8 @@ function z = slider(x, breakaway)
     z(k) = z(k-1) + breakaway*fix((x(k) - z(k-1))/breakaway);
   end
 end
-"""
-
-_LIMIT_RATE = """\
+""",
+        "limit-rate": """\
 function z = limit_rate(x, inverse_rate, c)
 % Rate limiter: z follows x, which is linear between samples, by at most a rate per second.
   z = x;
@@ -89,9 +88,8 @@ function z = limit_rate(x, inverse_rate, c)
     end
   end
 end
-"""
-
-_LAG_UNEVENLY = """\
+""",
+        "lag-unevenly": """\
 function z = lag_unevenly(x, slow, falling_fast, falling, rising, rising_fast, c)
 % First-order lag of x, which is linear between samples. Its time constants are those of falling fast, falling
 % slowly, rising slowly and rising fast: z' is above a rate per second, or below.
@@ -128,9 +126,8 @@ function z = lag_unevenly(x, slow, falling_fast, falling, rising, rising_fast, c
     z(k) = x(k) - gap;
   end
 end
-"""
-
-_INTERPOLATE = """\
+""",
+        "interpolate": """\
 function z = interpolate_at(x, e, tau, c)
 % Signal at the time t*(1 + e) - tau, by Lagrange's polynomial through six samples; its ends are held.
   last = numel(x) - 1;
@@ -145,26 +142,13 @@ function z = interpolate_at(x, e, tau, c)
     z = z + weight;
   end
 end
-"""
-
-_RESTS = """\
+""",
+        "rests": """\
 function yes = rests(x, c)
 % Whether a signal is constant over the estimation part of the record that was diagnosed.
   x = x(1:min(c.fitted, numel(x)));
   yes = double(max(x) - min(x) <= c.max_range_at_rest*max(abs(x)));
 end
-"""
-
-#: Definition of each operator that is a function.
-MATLAB_OPERATORS: Mapping[str, str] = MappingProxyType(
-    {
-        "low-pass": _LOW_PASS,
-        "resonance": _RESONANCE,
-        "play": _PLAY,
-        "slider": _SLIDER,
-        "limit-rate": _LIMIT_RATE,
-        "lag-unevenly": _LAG_UNEVENLY,
-        "interpolate": _INTERPOLATE,
-        "rests": _RESTS,
+""",
     }
 )
