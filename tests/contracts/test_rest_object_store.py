@@ -68,6 +68,32 @@ def test_a_service_without_its_object_store_is_alive_but_not_ready(
     assert service.client.get("/readyz").status_code == 200
 
 
+def test_requests_that_are_repeated_during_an_outage_are_logged_once_a_minute(
+    serve: Any, objects: MemoryObjects, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the probe of readiness, and by clients that repeat an upload."""
+    with serve(**STORE) as service:
+        monkeypatch.setattr(objects, "away", True)
+        for _ in range(4):
+            assert service.client.get("/readyz").status_code == 503
+            assert service.upload(csv(300)).status_code == 503
+        assert service.client.get("/v1/jobs").status_code == 200
+        monkeypatch.setattr(objects, "away", False)
+        assert service.client.get("/readyz").status_code == 200
+        assert service.upload(csv(300)).status_code == 201
+    logged = [
+        (entry["event"], entry.get("route"), entry.get("failures"))
+        for entry in service.logs
+        if entry["event"] in ("request failed", "requests succeed again")
+    ]
+    assert logged == [
+        ("request failed", "GET /readyz", None),
+        ("request failed", "POST /v1/datasets", None),
+        ("requests succeed again", "GET /readyz", 4),
+        ("requests succeed again", "POST /v1/datasets", 4),
+    ]
+
+
 @pytest.mark.ci
 def test_an_upload_without_the_object_store_stores_nothing_and_can_be_repeated(
     service: Service, absent: MemoryObjects

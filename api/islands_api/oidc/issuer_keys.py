@@ -12,6 +12,7 @@ from joserfc.errors import JoseError
 from joserfc.jwk import JWKRegistry
 
 from islands_api.oidc.bearer_token import IssuerUnavailableError
+from islands_service.outage_log import OutageLog
 from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
 from islands_service.outbound.checked_client import CheckedClient, read_body
 
@@ -57,6 +58,7 @@ class IssuerKeys:
         self._read_at = self._tried_at = -inf
         self._failure = ""
         self._reading: asyncio.Task[None] | None = None
+        self._outage = OutageLog("keys of the issuer not read", "the issuer answers again", clock)
 
     async def find(self, identity: str) -> Any:
         """Return the key with an id; None if the issuer has no such key.
@@ -110,8 +112,9 @@ class IssuerKeys:
             keys = _import_keys(document.get("keys"))
         except (OutboundRefusedError, OutboundFailedError, ValueError, RecursionError) as error:
             self._failure = str(error)
-            log.warning("keys of the issuer not read", issuer=self._issuer, reason=self._failure)
+            self._outage.fail(error, issuer=self._issuer)
             return
+        self._outage.succeed(issuer=self._issuer)
         self._keys, self._read_at, self._failure = keys, self._clock(), ""
         log.info("keys of the issuer read", issuer=self._issuer, keys=len(keys))
 

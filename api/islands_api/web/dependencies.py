@@ -1,8 +1,10 @@
 """State shared by the routes of one application, and the dependency that injects it."""
 
+from collections import defaultdict
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
+from logging import ERROR
 from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar
 
 from fastapi import Depends, Request
@@ -16,6 +18,7 @@ from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.responses import QueuePlaces
 from islands_api.web.uploads.admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
+from islands_service.outage_log import OutageLog
 from islands_service.outbound.checked_client import CheckedClient, make_checked_client
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -61,6 +64,11 @@ class AppState:
     drawings: OwnerCounts = field(default_factory=lambda: OwnerCounts("requests for figures"))
     streams: OwnerCounts = field(default_factory=lambda: OwnerCounts("event streams"))
     places: QueuePlaces = field(default_factory=QueuePlaces)
+    outages: defaultdict[str, OutageLog] = field(
+        default_factory=lambda: defaultdict(
+            lambda: OutageLog("request failed", "requests succeed again", level=ERROR)
+        )
+    )
 
     async def quotas(self, owner: str) -> Quotas:
         """Return the quotas of an owner."""

@@ -10,6 +10,7 @@ import structlog
 
 from islands_api.web.concurrency import BlockingExecutor
 from islands_service.domain.job import TERMINAL, Event
+from islands_service.outage_log import OutageLog
 from islands_service.store import Store
 from islands_service.store.database import StoreError
 
@@ -55,6 +56,7 @@ class JobEventHub:
         self._feeds: dict[str, JobFeed] = {}
         self._has_subscribers = asyncio.Event()
         self.closed = False
+        self._outage = OutageLog("event hub cannot read", "event hub reads again")
 
     async def run(self) -> None:
         """Poll for changes until cancelled."""
@@ -62,9 +64,10 @@ class JobEventHub:
             await self._has_subscribers.wait()
             try:
                 await self._poll()
+                self._outage.succeed()
                 await asyncio.sleep(POLL_SECONDS)
             except StoreError as error:
-                log.warning("event hub cannot poll", reason=str(error))
+                self._outage.fail(error)
                 await asyncio.sleep(RETRY_SECONDS)
             except Exception as error:
                 # Continue: without the hub, all subscribers would wait for ever.
@@ -133,11 +136,13 @@ class JobEventHub:
             return [event for event in feed.recent if event.number > last]
         # These events may be newer than the feed, but are not added to it: the next poll adds them.
         try:
-            return list(await self._executor.run(self._store.jobs.events, job, last))
+            events = list(await self._executor.run(self._store.jobs.events, job, last))
         except StoreError as error:
-            log.warning("event hub cannot read", job=job, reason=str(error))
+            self._outage.fail(error, job=job)
             await asyncio.sleep(RETRY_SECONDS)
             return []
+        self._outage.succeed()
+        return events
 
     async def _poll(self) -> None:
         feeds = dict(self._feeds)

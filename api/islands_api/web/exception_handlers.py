@@ -13,6 +13,7 @@ from pydantic_core import ErrorDetails
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.routing import Match
+from starlette.types import Scope
 
 from islands.document_problems import explain_problem
 from islands.errors import IslandsError
@@ -97,7 +98,10 @@ async def _handle_islands_error(request: Request, error: Exception) -> JSONRespo
         headers["WWW-Authenticate"] = 'Bearer realm="islands"'
     if isinstance(error, TokenRefusedError):
         headers["WWW-Authenticate"] = 'Bearer realm="islands", error="invalid_token"'
-    if problem.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
+    if isinstance(error, StoreError):
+        route = " ".join(name_route(request.scope))
+        request.app.state.islands.outages[route].fail(error, route=route, type=problem.type)
+    elif problem.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
         log.error("request failed", type=problem.type, reason=str(error))
     return problem_response(request, problem, _public_detail(error), headers=headers)
 
@@ -169,6 +173,12 @@ def _allowed_methods(request: Request) -> list[str]:
     if "GET" in allowed:
         allowed.add("HEAD")
     return [method for method in METHODS if method in allowed]
+
+
+def name_route(scope: Scope) -> tuple[str, str]:
+    """Return the method and the route of a request, of which there is a limited number."""
+    method = scope["method"] if scope["method"] in METHODS else "other"
+    return method, getattr(scope.get("route"), "path", "none")
 
 
 def internal_error(request: Request, error: Exception) -> JSONResponse:

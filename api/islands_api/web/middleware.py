@@ -4,6 +4,7 @@ import asyncio
 import re
 import secrets
 from dataclasses import dataclass
+from http import HTTPStatus
 from time import perf_counter
 from typing import Any
 from urllib.parse import urlsplit
@@ -14,7 +15,7 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from islands_api.web.auth import Principal
-from islands_api.web.exception_handlers import METHODS, internal_error, problem_response
+from islands_api.web.exception_handlers import internal_error, name_route, problem_response
 from islands_api.web.problems import CrossOriginError, PayloadTooLargeError, lookup_problem
 from islands_service.settings import LOOPBACK, ServiceSettings
 
@@ -103,12 +104,19 @@ class RequestLogging:
     def _observe(self, scope: Scope, entry: "_Entry") -> None:
         state: Any = getattr(scope["app"].state, "islands", None)
         if state is not None:
-            method = scope["method"] if scope["method"] in METHODS else "other"
-            state.metrics.latency.labels(method, _get_route(scope), entry.status).observe(entry.seconds)
+            method, route = name_route(scope)
+            state.metrics.latency.labels(method, route, entry.status).observe(entry.seconds)
+            outage = state.outages.get(f"{method} {route}")
+            if outage is not None and entry.status is not None and entry.status < HTTPStatus.BAD_REQUEST:
+                outage.succeed(route=f"{method} {route}")
 
     def _log(self, scope: Scope, entry: "_Entry") -> None:
         # Health checks and metrics scrapes would fill the log.
-        if entry.status is None or entry.logged or _get_route(scope) in ("/healthz", "/readyz", "/metrics"):
+        if (
+            entry.status is None
+            or entry.logged
+            or name_route(scope)[1] in ("/healthz", "/readyz", "/metrics")
+        ):
             return
         entry.logged = True
         caller: Principal | None = scope["state"].get("caller")
@@ -135,10 +143,6 @@ class _Entry:
     received: int = 0
     sent: int = 0
     logged: bool = False
-
-
-def _get_route(scope: Scope) -> str:
-    return getattr(scope.get("route"), "path", "none")
 
 
 class BodyLimit:

@@ -16,6 +16,7 @@ from islands.errors import IslandsError
 from islands_service.coordinator.job_failures import make_problem_document
 from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError
 from islands_service.liveness import StopRequest
+from islands_service.outage_log import OutageLog
 from islands_service.store import Store
 from islands_service.store.database import StoreError
 
@@ -99,6 +100,7 @@ class Heartbeat:
         self._store, self._lease, self._seconds, self._stopping = store, lease, seconds, stopping
         self._abandon, self._max_run_seconds = abandon, max_run_seconds
         self._over = Event()
+        self._outage = OutageLog("heartbeat failed", "heartbeat works again")
         self._lost = self._cancelled = self._completed = self._abandoned = False
         self._searching = self._waiting = False
         # The limit of run time, once it is reached.
@@ -197,7 +199,9 @@ class Heartbeat:
                 self._lost, end_by = True, min(end_by, now + CANCEL_GRACE)
             except StoreError as error:
                 # The lease may expire meanwhile. Then the next renewal raises `LeaseLostError`.
-                log.warning("heartbeat failed", job=self._lease.job.id, reason=str(error))
+                self._outage.fail(error, job=self._lease.job.id)
+            else:
+                self._outage.succeed(job=self._lease.job.id)
 
     def _renew(self, now: float) -> None:
         """Renew the lease, and count the run time since the last renewal."""

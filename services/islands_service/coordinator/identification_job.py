@@ -6,8 +6,6 @@ from math import isfinite
 from time import monotonic, sleep
 from typing import Any
 
-import structlog
-
 from islands.data.coupled_record import couple
 from islands.data.dataset import Dataset
 from islands.evolution.engine import Engine
@@ -34,10 +32,9 @@ from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import RUN_TIME, JobOutcome, JobState, ProgressReport
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
+from islands_service.outage_log import OutageLog
 from islands_service.runtime.errors import ClusterError
 from islands_service.store.database import StoreError
-
-log = structlog.get_logger()
 
 #: Seconds between two reports of progress.
 REPORT_EVERY = 0.5
@@ -261,6 +258,7 @@ class ProgressReporter:
         self._stored_points = 0 if state is None else len(state.history) - 1
         self._report_at = self._checkpoint_at = monotonic()  # store the first populations immediately
         self._last: tuple[SearchState, Settings] | None = None
+        self._outage = OutageLog("report failed", "reports stored again")
         #: Choice of the preset auto, which checkpoints contain.
         self.choice: Choice | None = None
 
@@ -285,7 +283,7 @@ class ProgressReporter:
             self._run.store.leases.report(self._run.lease, ProgressReport(progress))
         except StoreError as error:
             # Continue the search. The next report has the progress.
-            log.warning("report failed", job=self._run.job.id, reason=str(error))
+            self._outage.fail(error, job=self._run.job.id)
 
     def _reached_before(self) -> dict[str, Any]:
         """Return the progress of earlier attempts, without their note."""
@@ -312,11 +310,12 @@ class ProgressReporter:
             self._run.store.leases.report(self._run.lease, report)
         except (StoreError, ClusterError) as error:
             # Continue the search. The next report contains the same points.
-            log.warning("report failed", job=self._run.job.id, reason=str(error))
+            self._outage.fail(error, job=self._run.job.id)
             if report.checkpoint is not None:
                 self._checkpoints.remember(report.checkpoint)
             self._schedule(started)
             return False
+        self._outage.succeed(job=self._run.job.id)
         self._stored_points = len(summed.history) - 1
         if report.checkpoint is not None:
             self._checkpoints.supersede(report.checkpoint)

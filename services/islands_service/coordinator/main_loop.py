@@ -28,6 +28,7 @@ from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.coordinator.sweeper import Sweeper
 from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
 from islands_service.liveness import StopRequest, stop_on_signals
+from islands_service.outage_log import OutageLog
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -86,7 +87,9 @@ class Coordinator:
         self._blobs.observe_object = self._metrics.observe_object
         self._traces = Traces(settings.telemetry, "coordinator")
         self._ray = ExitStack()
-        self._connected = self._store_away = False
+        self._connected = False
+        self._cluster_outage = OutageLog("no cluster", "cluster back")
+        self._store_outage = OutageLog("store unavailable", "store back")
         self._sweeper = Sweeper(settings, self._store, self._blobs, POLL_SECONDS)
 
     def run(self) -> None:
@@ -112,8 +115,9 @@ class Coordinator:
         if self._settings.ray_address is not None and not self._connected:
             try:
                 self._connect()
+                self._cluster_outage.succeed()
             except ClusterError as error:
-                log.warning("no cluster", reason=str(error))
+                self._cluster_outage.fail(error)
                 self._stopping.wait(10 * RETRY_SECONDS)
         return self._connected or self._settings.ray_address is None
 
@@ -129,14 +133,10 @@ class Coordinator:
             if lease is None:
                 self._idle()
         except StoreError as error:
-            if not self._store_away:
-                log.warning("store unavailable", reason=str(error))
-            self._store_away = True
+            self._store_outage.fail(error)
             self._stopping.wait(RETRY_SECONDS)
         else:
-            if self._store_away:
-                log.info("store back")
-            self._store_away = False
+            self._store_outage.succeed()
             if lease is not None:
                 self._process(lease)
 
@@ -211,13 +211,16 @@ class Coordinator:
     def _finish(self, lease: Lease, outcome: JobOutcome, heartbeat: Heartbeat) -> None:
         """Store the outcome of a job. Retry while the store is unavailable or full: the work is done."""
         heartbeat.complete()
+        outage = OutageLog("cannot finish yet", "job can be finished")
         while True:
             try:
-                return self._store.leases.finish(lease, outcome)
+                self._store.leases.finish(lease, outcome)
             except StoreError as error:
-                log.warning("cannot finish yet", reason=str(error))
+                outage.fail(error)
                 heartbeat.check()
                 self._stopping.wait(RETRY_SECONDS)
+            else:
+                return outage.succeed()
 
     def _leave(self, _lease: Lease, _error: Exception) -> None:
         """Leave a job to the process that has its lease now."""

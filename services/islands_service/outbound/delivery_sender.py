@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import structlog
 
 from islands_service.domain.webhook import DueDelivery
+from islands_service.outage_log import OutageLog
 from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
 from islands_service.outbound.checked_client import CheckedClient
 from islands_service.store.database import StoreError
@@ -62,6 +63,7 @@ class DeliverySender:
         self._deliveries, self._client = deliveries, client
         self._run_blocking, self._observe = run_blocking, observe
         self._sending: set[asyncio.Task[None]] = set()
+        self._outage = OutageLog("deliveries not read", "deliveries read again")
 
     async def run(self) -> None:
         """Send deliveries. A request that is being sent when this is cancelled is repeated later."""
@@ -89,9 +91,10 @@ class DeliverySender:
         try:
             due = await self._run_blocking(self._deliveries.claim, LEASE_SECONDS, free)
         except StoreError as error:
-            log.warning("deliveries not read", reason=str(error))
+            self._outage.fail(error)
             await asyncio.sleep(POLL_SECONDS)
             return False
+        self._outage.succeed()
         for each in due:
             task = asyncio.create_task(self._deliver(each))
             self._sending.add(task)

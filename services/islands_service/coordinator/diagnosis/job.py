@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from time import sleep
 
-import structlog
-
 from islands.diagnosis.interim_findings import InterimFindings
 from islands.diagnosis.procedure import diagnose
 from islands.facade.explain_residual import FORMULA, explain_residual
@@ -18,11 +16,10 @@ from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState
 from islands_service.domain.job_spec import parse_discrepancy
 from islands_service.intake.job_inputs import read_record_and_columns
+from islands_service.outage_log import OutageLog
 from islands_service.runtime.parallel_map import ray_map
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
-
-log = structlog.get_logger()
 
 #: Seconds between two attempts to store what a diagnosis has found.
 _RETRY_SECONDS = 1.0
@@ -92,13 +89,17 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
 
 def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
     """Store a blob. Retry while the store is unavailable: the work is done."""
+    outage = OutageLog("cannot store yet", "stored")
     while True:
         try:
-            return blobs.write(data)
+            blob = blobs.write(data)
         except StoreError as error:
-            log.warning("cannot store yet", reason=str(error))
+            outage.fail(error)
             check()
             sleep(_RETRY_SECONDS)
+        else:
+            outage.succeed()
+            return blob
 
 
 def _make_summary(found: DiagnosisResult, simulation: str, note: str) -> dict[str, object]:

@@ -4,8 +4,6 @@ from collections.abc import Callable, Iterable, Iterator
 from time import monotonic
 from typing import TypeVar
 
-import structlog
-
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.parallel import ParallelMap
@@ -13,9 +11,8 @@ from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.diagnosis.checkpoints import DiagnosisCheckpoints, DiagnosisState
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import ProgressReport
+from islands_service.outage_log import OutageLog
 from islands_service.store.database import StoreError
-
-log = structlog.get_logger()
 
 #: Seconds between two reports within a step.
 REPORT_EVERY = 0.5
@@ -51,6 +48,8 @@ class DiagnosisProgress:
         self._started_at = self._reported_at - state.spent
         self._stored = state.reached
         self._phase, self._begin = "", 0.0
+        self._report_outage = OutageLog("report failed", "reports stored again")
+        self._checkpoint_outage = OutageLog("no checkpoint", "checkpoints stored again")
 
     @property
     def spent(self) -> float:
@@ -97,11 +96,12 @@ class DiagnosisProgress:
             self._run.store.leases.report(self._run.lease, ProgressReport(progress, checkpoint=checkpoint))
         except StoreError as error:
             # Continue the analysis. The next report has the progress.
-            log.warning("report failed", job=self._run.job.id, reason=str(error))
+            self._report_outage.fail(error, job=self._run.job.id)
             if checkpoint is not None:
                 self._checkpoints.remember(checkpoint)
                 self._checkpoint_at = monotonic() + self._run.checkpoint_every
             return
+        self._report_outage.succeed(job=self._run.job.id)
         if checkpoint is not None:
             self._checkpoints.supersede(checkpoint)
             self._stored, now = reached, monotonic()
@@ -110,8 +110,10 @@ class DiagnosisProgress:
     def _write_checkpoint(self) -> str | None:
         """Write a checkpoint; return its blob, or None if that is not possible now."""
         try:
-            return self._checkpoints.write(self._state, self.spent)
+            blob = self._checkpoints.write(self._state, self.spent)
         except StoreError as error:
-            log.warning("no checkpoint", job=self._run.job.id, reason=str(error))
+            self._checkpoint_outage.fail(error, job=self._run.job.id)
             self._checkpoint_at = monotonic() + self._run.checkpoint_every
             return None
+        self._checkpoint_outage.succeed(job=self._run.job.id)
+        return blob

@@ -224,25 +224,29 @@ def test_a_defect_during_a_poll_does_not_stop_the_hub(store, monkeypatch):
     assert asyncio.run(scenario()) == [1, 2]
 
 
-def test_a_stream_survives_a_database_outage(store, monkeypatch):
+@pytest.mark.parametrize("name", ["events", "versions"])
+def test_a_stream_survives_a_database_outage_which_is_logged_once(store, monkeypatch, name):
     async def scenario():
         job = submitted(store)
-        answer, calls = store.jobs.events, []
+        answer, calls = getattr(store.jobs, name), []
 
-        def away(job, after=0):
-            calls.append(job)
-            if len(calls) < 4:
+        def away(*arguments):
+            calls.append(arguments)
+            # The first call opens the stream.
+            if len(calls) < 6 and (name == "events" or len(calls) > 1):
                 raise StoreUnavailableError("gone: try again")
-            return answer(job, after)
+            return answer(*arguments)
 
-        monkeypatch.setattr(store.jobs, "events", away)
+        monkeypatch.setattr(store.jobs, name, away)
         async with running_hub(store) as hub:
             watcher = asyncio.create_task(collect(open_stream(hub, store, job), []))
             await asyncio.sleep(0.05)
             store.jobs.cancel(job.owner, job.id)
             return await asyncio.wait_for(watcher, 25.0)
 
-    assert asyncio.run(scenario()) == [1, 2]
+    with structlog.testing.capture_logs() as logs:
+        assert asyncio.run(scenario()) == [1, 2]
+    assert [entry["log_level"] for entry in logs] == ["warning", "info"]
 
 
 def test_waiting_ends_at_a_change_or_the_timeout(store):

@@ -5,6 +5,7 @@ from threading import Event
 from typing import Any
 
 import pytest
+import structlog
 
 from islands_service.coordinator import heartbeat as heartbeats
 from islands_service.coordinator.heartbeat import (
@@ -304,12 +305,17 @@ class Away:
         return getattr(self._store.leases, name)
 
 
-def test_short_database_outage_does_not_lose_the_lease(store: Store, lease: Lease) -> None:
+def test_short_database_outage_does_not_lose_the_lease_and_is_logged_once(store: Store, lease: Lease) -> None:
     away = Away(store, 5)
-    with Heartbeat(away, lease, SECONDS, StopRequest()) as heartbeat:  # type: ignore[arg-type]
+    with (
+        structlog.testing.capture_logs() as logs,
+        Heartbeat(away, lease, SECONDS, StopRequest()) as heartbeat,  # type: ignore[arg-type]
+    ):
         eventually(lambda: not away.left, seconds=20.0)
         store.jobs.cancel(ALICE, lease.job.id)
         eventually(lambda: raised_by_check(heartbeat) is JobCancelled, seconds=20.0)
+    assert [entry["event"] for entry in logs] == ["heartbeat failed", "heartbeat works again"]
+    assert logs[1]["failures"] == 5
 
 
 def test_long_database_outage_loses_the_lease_to_another(store: Store, lease: Lease) -> None:

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 import pytest
+import structlog
 
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled, RunTimeLimitError
@@ -271,8 +272,14 @@ def test_failed_reports_do_not_affect_the_result(
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
     # The failing reports include the last ones.
     flaky = Flaky(store, lambda number: number % 3 != 0 or 30 < number < 36)
-    outcome = run_job(claim(store), flaky, blobs)
+    with structlog.testing.capture_logs() as logs:
+        outcome = run_job(claim(store), flaky, blobs)
     assert flaky.reports > 9
+    # The later failures are within a minute.
+    assert [entry["event"] for entry in logs if "report" in entry["event"]] == [
+        "report failed",
+        "reports stored again",
+    ]
     assert get_models(outcome) == undisturbed[0]
     assert store.results.history(job.id) == undisturbed[1]
 

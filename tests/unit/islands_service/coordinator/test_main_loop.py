@@ -8,6 +8,7 @@ from threading import Thread
 from typing import Any
 
 import pytest
+import structlog
 
 from islands_service.coordinator import main_loop as coordinator_module
 from islands_service.coordinator import sweeper as sweeper_module
@@ -138,9 +139,13 @@ def test_outcome_is_stored_as_soon_as_the_disk_has_space(
     """The job is not run again: it is one attempt, and a cancel request in the meantime is too late."""
     replace_runner(monkeypatch, lambda _run: DONE)
     monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.1)
-    coordinator(Full)
-    ended = wait_until_finished(store, job)
+    with structlog.testing.capture_logs() as logs:
+        coordinator(Full)
+        ended = wait_until_finished(store, job)
+        eventually(lambda: any(entry["event"] == "job finished" for entry in logs))
     assert (ended.state, ended.attempt, ended.summary) == (JobState.SUCCEEDED, 1, {"done": True})
+    logged = [entry["event"] for entry in logs if "finish" in entry["event"]]
+    assert logged == ["cannot finish yet", "job can be finished", "job finished"]
 
 
 def test_unavailable_store_during_a_job_is_not_an_attempt(

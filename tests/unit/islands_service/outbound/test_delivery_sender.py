@@ -5,6 +5,8 @@ from collections import Counter
 from contextlib import asynccontextmanager, suppress
 from types import SimpleNamespace
 
+import structlog
+
 from islands_service.domain.webhook import DueDelivery
 from islands_service.outbound import delivery_sender
 from islands_service.outbound.delivery_sender import DeliverySender, sign_request
@@ -110,7 +112,9 @@ def test_a_defect_of_one_request_is_a_failed_attempt(monkeypatch):
     assert "unexpected error" in error
 
 
-def test_the_sender_continues_when_the_database_is_back(monkeypatch):
+def test_the_sender_continues_after_an_outage_of_the_database_and_logs_it_once(monkeypatch):
     deliveries = _Deliveries(1)
     deliveries.away = 3
-    assert send(deliveries, _Client(), monkeypatch, lambda: deliveries.recorded) == {"delivered": 1}
+    with structlog.testing.capture_logs() as logs:
+        assert send(deliveries, _Client(), monkeypatch, lambda: deliveries.recorded) == {"delivered": 1}
+    assert [entry["event"] for entry in logs] == ["deliveries not read", "deliveries read again", "delivery"]

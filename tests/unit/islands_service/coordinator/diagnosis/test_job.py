@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import structlog
 
 from islands.diagnosis.inference import noise_floor
 from islands.errors import RecordError, SettingsError
@@ -184,7 +185,9 @@ def test_finished_work_waits_for_an_object_store_that_is_away(monkeypatch: pytes
                 raise failures.pop()
             return data.decode()
 
-    assert diagnosis_job._keep(b"report", Away(), lambda: None) == "report"  # type: ignore[arg-type]
+    with structlog.testing.capture_logs() as logs:
+        assert diagnosis_job._keep(b"report", Away(), lambda: None) == "report"  # type: ignore[arg-type]
+    assert [entry["event"] for entry in logs] == ["cannot store yet", "stored"]
 
     def cancel() -> None:
         raise JobCancelled("cancelled")

@@ -1,0 +1,57 @@
+"""Log of an outage: a line at its begin, one each minute, and one at its end."""
+
+from collections.abc import Callable
+from logging import WARNING
+from time import monotonic
+
+import structlog
+
+log = structlog.get_logger()
+
+#: Least number of seconds between two lines about failures.
+EVERY = 60.0
+
+
+class OutageLog:
+    """Log of the failures of an operation that is repeated until it succeeds.
+
+    The first failure is logged, the next one after `EVERY` seconds with the number of failures, and the first
+    success. An outage that begins less than `EVERY` seconds after such a line is logged only if it lasts
+    longer, so that an operation that fails now and then does not fill the log either.
+
+    Parameters
+    ----------
+    failing, working : str
+        Events at the begin and at the end.
+    clock : callable
+        Returns seconds.
+    level : int
+        Level of failures.
+    """
+
+    def __init__(
+        self, failing: str, working: str, clock: Callable[[], float] = monotonic, level: int = WARNING
+    ) -> None:
+        self._failing, self._working, self._clock, self._level = failing, working, clock, level
+        self._failures, self._began, self._is_logged = 0, 0.0, False
+        self._next_line: float | None = None
+
+    def fail(self, error: Exception, **details: object) -> None:
+        """Log a failure, unless another one was logged less than a minute ago."""
+        now = self._clock()
+        self._failures += 1
+        if self._failures == 1:
+            self._began = now
+        if self._next_line is None or now >= self._next_line:
+            repeated = {} if self._failures == 1 else self._summary(now)
+            log.log(self._level, self._failing, reason=str(error), **details, **repeated)
+            self._next_line, self._is_logged = now + EVERY, True
+
+    def succeed(self, **details: object) -> None:
+        """Log the end of an outage, if its failures were logged."""
+        if self._is_logged:
+            log.info(self._working, **details, **self._summary(self._clock()))
+        self._failures, self._is_logged = 0, False
+
+    def _summary(self, now: float) -> dict[str, float]:
+        return {"failures": self._failures, "seconds": round(now - self._began, 1)}
