@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -18,11 +19,11 @@ def explain_problem(problem: ErrorDetails, form: Any) -> str:
     problem : ErrorDetails
         An entry of ``ValidationError.errors()``.
     form : type
-        Type of the document: a model, or a union of models.
+        Type of the document: a model, a union of models, or a data class.
     """
     message = problem["msg"].removeprefix("Value error, ")
     match problem["type"]:
-        case "extra_forbidden":
+        case "extra_forbidden" | "unexpected_keyword_argument":
             *place, name = problem["loc"]
             return message + suggest(str(name), _find_names(form, place))
         case "literal_error" | "enum":
@@ -46,6 +47,8 @@ def _read_names(text: str) -> list[str]:
 
 def _find_names(form: Any, place: Sequence[int | str]) -> list[str]:
     """Return the names of the fields of the models at a place of a document."""
+    if is_dataclass(form):
+        return [each.name for each in fields(form)]
     forms = list(_expand(form))
     for part in place:
         # A part that names no field is an index, a key, or the tag of a member of a union.

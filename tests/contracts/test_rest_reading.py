@@ -35,7 +35,18 @@ def test_the_same_bytes_read_in_another_way_are_another_data_set(service):
 
 
 @pytest.mark.parametrize(
-    "reading", ["", "[]", "{", '{"sheets": "a"}', '{"header": "no"}', '{"resample": -1}', '{"names": "a,b"}']
+    "reading",
+    [
+        *("", "[]", "{", '{"sheets": "a"}', '{"header": "no"}', '{"resample": -1}', '{"names": "a,b"}'),
+        *('{"resample": true}', f'{{"resample": 1{400 * "0"}}}', '{"names": ["\\ud800"]}', 9_000 * "["),
+    ],
 )
 def test_invalid_options_are_refused(service, reading):
     assert service.upload(b"t,u,y", reading=reading or "null").status_code == 422
+
+
+def test_an_unknown_option_has_similar_names(service):
+    answer = service.upload(b"t,u,y", reading='{"sheets": "a"}')
+    assert problem_of(answer, 422, "invalid-settings").endswith(
+        "sheets: Unexpected keyword argument. Did you mean 'sheet'?"
+    )

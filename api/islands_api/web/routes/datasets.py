@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Annotated, Any
 
 import fastapi
 from fastapi import APIRouter, File, Form, UploadFile
-from pydantic import FiniteFloat
+from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
+from islands.document_problems import find_problem
 from islands.errors import SettingsError
 from islands.io.records.reading_options import ReadingOptions
 from islands_api.dataset_schemas import DatasetPage, DatasetView, FetchRequest
@@ -28,6 +28,8 @@ router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSE
 
 #: The same path for requests in JSON.
 fetching = APIRouter(prefix=router.prefix, tags=["data sets"], responses=RESPONSES, route_class=JSONRoute)
+
+_READING = TypeAdapter(ReadingOptions)
 
 _LOCATION_HEADER = {"Location": {"description": "Path of the data set.", "schema": {"type": "string"}}}
 _UPLOAD_RESPONSES: dict[int | str, dict[str, Any]] = {
@@ -82,7 +84,7 @@ async def upload(
     the same data set: the status is then 200 instead of 201.
     """
     name, compressed = parse_file_name(file.filename)
-    request = InspectionRequest(tuple(inputs), output, dt, reading=_parse_reading(reading))
+    request = InspectionRequest(tuple(inputs), output, dt, reading=_read_options(reading))
     stored, new = await store_dataset(state, caller, file.file, name, compressed, request)
     return await _make_response(state, stored, new)
 
@@ -96,7 +98,7 @@ async def fetch_dataset(asked: FetchRequest, caller: Writer, state: AppStateDep)
     """
     source = check_source(asked.url, state.settings)
     name, compressed = parse_file_name(asked.name or find_file_name(source))
-    reading = _check_reading(asked.reading)
+    reading = _read_options(json.dumps(asked.reading))
     request = InspectionRequest(tuple(asked.inputs), asked.output, asked.dt, reading=reading)
     async with fetch(state, caller, asked.url) as file:
         stored, new = await store_dataset(state, caller, file, name, compressed, request, source)
@@ -109,8 +111,8 @@ async def _make_response(state: AppState, stored: StoredDataset, new: bool) -> J
     return JSONDocument(dataset_document(stored, retention), 201 if new else 200, headers)
 
 
-def _parse_reading(text: str) -> Mapping[str, Any]:
-    """Read the options of reading.
+def _read_options(text: str) -> Mapping[str, Any]:
+    """Read the options of reading a record; return those that are not at their defaults.
 
     Raises
     ------
@@ -118,37 +120,13 @@ def _parse_reading(text: str) -> Mapping[str, Any]:
         They are not a JSON object, or an option is unknown or invalid.
     """
     try:
-        given = json.loads(text)
-    except (ValueError, RecursionError):
-        given = None
-    return _check_reading(given)
-
-
-def _check_reading(given: Any) -> Mapping[str, Any]:
-    """Return the options of reading that are not at their defaults.
-
-    Raises
-    ------
-    SettingsError
-    """
-    if not isinstance(given, dict) or not all(_is_option(name, value) for name, value in given.items()):
-        raise SettingsError(
+        return _READING.validate_json(text, strict=True, extra="forbid").changes()
+    except ValidationError as error:
+        example = (
             'reading is a JSON object of options, for example {"names": ["t", "u", "y"], "gaps": "split"}'
         )
-    return ReadingOptions(**given).changes()
-
-
-def _is_option(name: str, value: Any) -> bool:
-    """Return whether an option exists and the value has its type."""
-    match name:
-        case "names":
-            return isinstance(value, list) and all(isinstance(each, str) for each in value)
-        case "header":
-            return isinstance(value, bool)
-        case "resample":
-            return isinstance(value, int | float) and not isinstance(value, bool)
-        case _:
-            return isinstance(value, str) and name in {option.name for option in fields(ReadingOptions)}
+        place, problem = find_problem(error, ReadingOptions)
+        raise SettingsError(": ".join(filter(None, (example, place, problem)))) from error
 
 
 @router.get("", response_model=DatasetPage)
