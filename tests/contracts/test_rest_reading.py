@@ -29,7 +29,7 @@ def test_the_same_bytes_read_in_another_way_are_another_data_set(service):
     content = "\n".join(lines()).encode()
     ids = [
         service.upload(content, reading=json.dumps(reading)).json()["id"]
-        for reading in ({}, {"resample": 0.02}, {"resample": 0.02}, {})
+        for reading in ({}, {"resample": 1}, {"resample": 1.0}, {})
     ]
     assert ids[0] == ids[3] != ids[1] == ids[2]
 
@@ -42,7 +42,7 @@ def test_the_same_bytes_read_in_another_way_are_another_data_set(service):
     ],
 )
 def test_invalid_options_are_refused(service, reading):
-    assert service.upload(b"t,u,y", reading=reading or "null").status_code == 422
+    problem_of(service.upload(b"t,u,y", reading=reading or "null"), 422, "invalid-settings")
 
 
 def test_an_unknown_option_has_similar_names(service):
