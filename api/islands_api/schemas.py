@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from islands.io.models import NARX
 from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, PRIORITIES, JobState
 from islands_service.domain.job_spec import Discrepancy, Identification
 
@@ -197,6 +198,9 @@ class OwnedJobPage(ResponseModel):
 class ModelView(ResponseModel):
     """Model with its metrics, physics checks and residual tests, as in ``result.json``."""
 
+    kind: str = Field(
+        default=NARX, description="Class of the model: narx, coupled-narx for several outputs, or another."
+    )
     rank: int = Field(description="1 is the model with the least error on the validation data.")
     recommended: bool = Field(
         default=False, description="Whether this is the recommended model of the job, one of all its models."

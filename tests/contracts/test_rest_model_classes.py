@@ -35,6 +35,7 @@ def test_a_job_of_a_class_has_the_model_and_its_exports(service, dataset):
         service.store.leases.finish(lease, outcome)
         assert client.job(job).state == JobState.SUCCEEDED
         (model,) = client.models(job)
+        assert model.kind == "gain-scheduled"
         document = json.loads(client.export(job, model.rank, "json"))
         found = GainScheduledModel.read(document, "model")
         np.testing.assert_allclose(found.parameters, TRUE, rtol=0.01)

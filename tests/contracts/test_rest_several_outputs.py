@@ -58,6 +58,7 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
         run(service, job)
         done = client.job(job)
         assert done.state == JobState.SUCCEEDED
+        assert client.models(job)[0].kind == "coupled-narx"
         # Both searches have three generations each.
         assert (done.progress["generation"], done.progress["generations"]) == (5, 5)
         generations = [point.generation for point in client.history(job).items]

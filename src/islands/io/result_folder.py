@@ -16,6 +16,7 @@ from islands.io.certificates import certificates_document
 from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
+from islands.models.narx import Model
 from islands.models.signal_statement import describe_signals
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.ensemble import Ensemble
@@ -106,6 +107,7 @@ def _model_document(
         for term, name in zip(terms_document(model), model.parameter_names, strict=True)
     ]
     return {
+        **({} if isinstance(model, Model) else {"kind": model.kind}),
         "rank": rank,
         "recommended": recommended,
         "size": model.size,

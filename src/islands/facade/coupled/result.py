@@ -292,6 +292,7 @@ class CoupledResult(FittedCoupledModel):
         ensemble = self.prediction_bands[0].ensemble if self.prediction_bands else None
         written = self.model.equation()
         return {
+            "kind": self.model.kind,
             "rank": 1,
             "recommended": True,
             "size": self.model.size,
