@@ -16,6 +16,7 @@ from threading import current_thread, main_thread
 
 import ray
 from filelock import FileLock, Timeout
+from ray._private.node import Node
 from ray.exceptions import (
     LocalRayletDiedError,
     NodeDiedError,
@@ -189,6 +190,34 @@ def _check_reachable(address: str) -> None:
     socket.create_connection((host, int(port)), timeout=_CONNECT_TIMEOUT).close()
 
 
+class _LocalNode(Node):  # type: ignore[misc]
+    """Node of Ray without the processes that a single machine does not need.
+
+    They are the autoscaler, the log monitor, which sends the output of actors to drivers that ask for it, and
+    the server of the dashboard, which Ray starts even without a dashboard. Each of them imports for a second,
+    and Ray waits for the last one.
+    """
+
+    def start_monitor(self) -> None:
+        pass
+
+    def start_log_monitor(self) -> None:
+        pass
+
+    def start_api_server(self, **_options: object) -> None:
+        pass
+
+
+@contextmanager
+def _without_unused_processes() -> Iterator[None]:
+    """Replace the class of nodes of `ray.init`, which has no options for this."""
+    ray._private.node.Node = _LocalNode
+    try:
+        yield
+    finally:
+        ray._private.node.Node = Node
+
+
 @contextmanager
 def _local_ray(cpus: int, jobs: int) -> Iterator[None]:
     # Ray's processes listen on all interfaces: the token keeps other users out.
@@ -201,18 +230,19 @@ def _local_ray(cpus: int, jobs: int) -> Iterator[None]:
     lock = FileLock(Path(folder) / _LOCK)
     with lock:
         try:
-            # Without "local" Ray would attach to any cluster on the machine.
-            ray.init(
-                address="local",
-                namespace=NAMESPACE,
-                num_cpus=cpus,
-                resources={_JOBS: jobs},
-                object_store_memory=OBJECT_STORE_BYTES,
-                include_dashboard=False,
-                log_to_driver=False,
-                configure_logging=False,
-                _temp_dir=str(Path(folder) / _SESSIONS),
-            )
+            with _without_unused_processes():
+                # Without "local" Ray would attach to any cluster on the machine.
+                ray.init(
+                    address="local",
+                    namespace=NAMESPACE,
+                    num_cpus=cpus,
+                    resources={_JOBS: jobs},
+                    object_store_memory=OBJECT_STORE_BYTES,
+                    include_dashboard=False,
+                    log_to_driver=False,
+                    configure_logging=False,
+                    _temp_dir=str(Path(folder) / _SESSIONS),
+                )
         except Exception as error:  # Ray raises plain exceptions, too, for example after a timeout
             raise ClusterError(
                 f"Ray does not start on this machine ({error}): try --engine serial"

@@ -1,11 +1,13 @@
 """Connection to Ray."""
 
+import os
 import signal
 import sys
 
 import pytest
 
 from islands.progress import StoppedError
+from support.processes import descendants
 
 
 @pytest.mark.parametrize(
@@ -35,6 +37,17 @@ def test_start_of_ray_that_times_out_is_reported_as_a_cluster_error(monkeypatch)
     monkeypatch.setattr(ray, "init", time_out)
     with pytest.raises(ClusterError, match="does not start on this machine"), cluster(None):
         pass
+
+
+@pytest.mark.ci
+def test_local_ray_starts_no_autoscaler_log_monitor_or_dashboard(ray_address):
+    """Each of them would import for a second of CPU before Ray answers."""
+    (head,) = (pid for pid, line in descendants(os.getpid()).items() if "islands_service.runtime.ray_head" in line)
+    lines = " ".join(descendants(head).values())
+    assert "gcs_server" in lines
+    assert "raylet" in lines
+    for script in ("monitor.py", "log_monitor.py", "dashboard.py"):
+        assert f"{script} " not in lines
 
 
 def end_by_rays_handler(**_options):
