@@ -178,9 +178,21 @@ def remove_shifts(expression: Expression, samples: int = 0) -> Expression:
 
 def lags(expression: Expression) -> frozenset[tuple[int, int]]:
     """Return the pairs (channel, lag) that the expression reads."""
-    return frozenset(
-        (node.channel, node.lag) for node in walk(remove_shifts(expression)) if isinstance(node, Lagged)
-    )
+    found: list[tuple[int, int]] = []
+    _add_lags(expression, 0, found)
+    return frozenset(found)
+
+
+def _add_lags(expression: Expression, samples: int, found: list[tuple[int, int]]) -> None:
+    """Add the pairs of the leaves, without building the tree that has no back-shifts."""
+    match expression:
+        case Lagged(channel, lag):
+            found.append((channel, lag + samples))
+        case Apply(_, arguments):
+            for argument in arguments:
+                _add_lags(argument, samples, found)
+        case Shift(more, argument):
+            _add_lags(argument, samples + more, found)
 
 
 def find_symbols(expression: Expression) -> Iterator[str]:
