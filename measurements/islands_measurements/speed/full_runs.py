@@ -11,6 +11,7 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, Population
 from islands.evolution.island import first_generation, step
 from islands.evolution.settings import Settings
+from islands.processes.pool import prepare_process
 from islands_measurements.speed import kernel_evaluator
 from islands_measurements.speed.clock import cpu, wall
 
@@ -92,7 +93,7 @@ def run_in_processes(
         Whether to run two generations before the timed run, so that its time excludes the loading of kernels.
     """
     began = wall()
-    with ProcessPoolExecutor(len(indices), get_context("spawn")) as processes:
+    with ProcessPoolExecutor(len(indices), get_context("spawn"), prepare_process) as processes:
         job = partial(_warm_run if warm else run_island, record, settings)
         runs = tuple(processes.map(job, indices))
     return wall() - began, runs

@@ -5,9 +5,10 @@ from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import lru_cache, partial
-from multiprocessing import active_children, forkserver, get_context
+from multiprocessing import active_children, forkserver, get_context, parent_process
 from os import kill
-from signal import SIG_IGN, SIGINT, SIGKILL, signal
+from signal import SIG_IGN, SIGINT, SIGKILL, raise_signal, signal
+from threading import Thread
 from time import monotonic
 from typing import Any, TypeVar
 
@@ -76,7 +77,7 @@ def process_pool(
     # it starts with the signal blocked.
     with block_sigint():
         forkserver.ensure_running()
-    pool = ProcessPoolExecutor(workers, context, initializer=signal, initargs=(SIGINT, SIG_IGN))
+    pool = ProcessPoolExecutor(workers, context, initializer=prepare_process)
 
     def parallel_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
         waiting = iter(arguments)
@@ -96,6 +97,21 @@ def process_pool(
         pool.shutdown(wait=False, cancel_futures=True)
         for process in set(active_children()) - others:
             process.kill()  # its result is not needed any more
+
+
+def prepare_process() -> None:
+    """Let this process ignore Ctrl-C, and end with the process that has started it.
+
+    Otherwise it would wait for calls for ever after that process is killed, and so would the fork server.
+    """
+    signal(SIGINT, SIG_IGN)
+
+    def wait() -> None:
+        if parent := parent_process():
+            parent.join()
+            raise_signal(SIGKILL)
+
+    Thread(target=wait, daemon=True).start()
 
 
 def _end_server() -> None:

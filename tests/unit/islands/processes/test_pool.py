@@ -15,6 +15,7 @@ from islands import available_cpus
 from islands.processes import pool
 from islands.processes.pool import ProcessPoolError, process_pool
 from islands.progress import StoppedError
+from support.processes import alive, descendants, eventually
 
 pytestmark = pytest.mark.ci
 
@@ -111,6 +112,23 @@ def test_fork_server_starts_with_sigint_blocked_and_ends_at_an_error() -> None:
     blocked, is_alive = done.stdout.split()
     assert int(blocked, 16) & 1 << signal.SIGINT - 1
     assert is_alive == "False"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_processes_end_with_the_one_that_started_them(number: signal.Signals) -> None:
+    code = (
+        "import time; from islands.processes import pool; pool._PRELOADED = []\n"
+        "with pool.process_pool(2, start_after=0.0) as parallel_map:\n"
+        "    for seconds in parallel_map(lambda seconds: time.sleep(seconds) or seconds, (0.0, 0.0, 60.0)):\n"
+        "        print(seconds, flush=True)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert [process.stdout.readline() for _ in range(2)] == ["0.0\n", "0.0\n"]
+        others = descendants(process.pid)
+        process.send_signal(number)
+    assert len(others) >= 4  # the resource tracker, the server and two processes
+    eventually(lambda: not alive(others), seconds=10.0)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
