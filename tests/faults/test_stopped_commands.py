@@ -19,7 +19,7 @@ from support.command_line import ISLANDS, succeed, write_offset
 #: Options of an evolution that takes some seconds.
 SEARCH = ("--generations", "40", "--population", "60", "--max-terms", "6")
 
-PIEZO = ("piezo.csv", "--input", "u_V", "--output", "y_um")
+PIEZO = ("piezo.csv", "--input", "u_V", "--output", "y_um", "--rows", "0:1000")
 TWO = ("two.csv", "--input", "u_V", "--output", "x_V,y_V")
 OUT = ("--out", "out")
 
@@ -32,7 +32,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "identify-ray": ("identify", *PIEZO, *SEARCH, "--preset", "hysteresis", "--islands", "2", *OUT),
     "identify-outputs": ("identify", *TWO, *SEARCH, "--engine", "serial", *OUT),
     "diagnose": (
-        *("diagnose", "motor.csv", "--input", "drive_V", "--output", "speed_rad_s"),
+        *("diagnose", "motor.csv", "--input", "drive_V", "--output", "speed_rad_s", "--rows", "0:500"),
         *("--simulation", "linear:1", *OUT),
     ),
     "self-test": (
