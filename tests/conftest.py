@@ -1,5 +1,6 @@
 """Fixtures and settings of all tests: the hypothesis profile, compiled kernels, databases."""
 
+import gc
 import os
 import shutil
 from contextlib import ExitStack
@@ -47,11 +48,17 @@ def pytest_configure(config):
         warm_up()
 
 
-def pytest_collection_finish():
-    """Exclude the collected tests from garbage collection: visiting them all takes a fifth of a second."""
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collect without garbage collection, and exclude the tests from it: visiting all takes a fifth of a second."""
     from islands.processes.settings import freeze_garbage_collector
 
-    freeze_garbage_collector()
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        freeze_garbage_collector()
+        gc.enable()
 
 
 @pytest.fixture(scope="session")
