@@ -63,7 +63,9 @@ def progress(title: str) -> Iterator[Display]:
     )
     bar = Progress(*columns, console=errors)
     task = bar.add_task("", total=1.0, title=title)
-    with Live(bar, console=errors, transient=True, refresh_per_second=10) as live:
+    # The thread that refreshes the bar takes time from the command; a file or a pipe shows no bar.
+    shown = errors.is_terminal
+    with Live(bar, console=errors, transient=True, refresh_per_second=10, auto_refresh=shown) as live:
 
         def show(message: str, fraction: float | None = None, /, lines: Sequence[str] = ()) -> None:
             bar.update(task, description=message, completed=fraction)

@@ -11,7 +11,7 @@ from functools import partial
 from math import inf
 
 import numpy as np
-from scipy.special import betaincinv
+import scipy
 
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
@@ -185,8 +185,10 @@ def self_test(
 
 def estimate_rate(count: int, of: int) -> DetectionRate:
     """Estimate a proportion and its confidence interval."""
-    low = float(betaincinv(count, of - count + 1, _SIGNIFICANCE / 2)) if count else 0.0
-    high = float(betaincinv(count + 1, of - count, 1 - _SIGNIFICANCE / 2)) if count < of else 1.0
+    low = float(scipy.special.betaincinv(count, of - count + 1, _SIGNIFICANCE / 2)) if count else 0.0
+    high = (
+        float(scipy.special.betaincinv(count + 1, of - count, 1 - _SIGNIFICANCE / 2)) if count < of else 1.0
+    )
     return DetectionRate(count / of if of else 0.0, (low, high), of)
 
 

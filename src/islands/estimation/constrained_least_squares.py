@@ -5,8 +5,8 @@ any data. The result equals equation (4) but needs none of its three inverses.
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import qr
 
 from islands.estimation.least_squares import Estimate, factorise, failed_estimate, solve
 from islands.simulation.outcome import EvaluationOutcome, Status
@@ -68,7 +68,7 @@ def null_space(
         row = int(np.flatnonzero(norms == 0.0)[0])
         return EvaluationOutcome(Status.INFEASIBLE, f"constraint {row + 1} names no regressor")
     scaled, targets = S / norms[:, None], c / norms
-    q, r, order = qr(scaled.T, pivoting=True)
+    q, r, order = scipy.linalg.qr(scaled.T, pivoting=True)
     diagonal = np.abs(np.diag(r))
     rank = int(np.sum(diagonal > _REDUNDANT))
     particular = q[:, :rank] @ np.linalg.solve(r[:rank, :rank].T, targets[order[:rank]])

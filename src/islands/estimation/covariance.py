@@ -12,9 +12,8 @@ is positive semidefinite and takes one pass over the rows, whatever the bandwidt
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.special import stdtrit
 
 from islands.kernels.qr import orthogonalise
 from islands.kernels.summation import dot
@@ -73,7 +72,7 @@ def sandwich(
         scores = np.diff(np.cumsum(scores, axis=1)[:, ends], axis=1, prepend=0.0)
     covariance, freedom = long_run_variance(np.ascontiguousarray(scores), weights)
     freedom = max(1.0, min(freedom, rows - count))
-    student = float(stdtrit(freedom, _PROBABILITY)) / _QUANTILE
+    student = float(scipy.special.stdtrit(freedom, _PROBABILITY)) / _QUANTILE
     corrected: NDArray[np.float64] = covariance * (rows / max(1, rows - count) * student**2)
     return corrected
 
@@ -97,8 +96,8 @@ def sandwich_of_jacobian(
     covariance: NDArray[np.float64] = np.zeros((count, count))
     if kept:
         inner = sandwich(q, residual, intervals)
-        half = solve_triangular(triangle, inner)
-        covariance[np.ix_(kept, kept)] = solve_triangular(triangle, half.T)
+        half = scipy.linalg.solve_triangular(triangle, inner)
+        covariance[np.ix_(kept, kept)] = scipy.linalg.solve_triangular(triangle, half.T)
     return covariance
 
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from math import log
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from islands.estimation.constrained_least_squares import constrained_least_squares, null_space
 from islands.estimation.covariance import sandwich_of_jacobian
@@ -198,7 +198,7 @@ def _minimise(
         triangle, projection = np.empty((count, count)), np.empty(count)
         if orthogonalise(sensitivities, error.copy(), triangle, projection, DEPENDENT) >= 0:
             break
-        step = solve_triangular(triangle, projection)
+        step = scipy.linalg.solve_triangular(triangle, projection)
         for _ in range(_MAX_HALVINGS):
             candidate = parameters + step
             step = step / 2.0

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import qr, solve_triangular
 
 from islands.errors import RecordError
 from islands.estimation.covariance import sandwich
@@ -141,20 +141,20 @@ def solve(
     remainder = factors.projection - factors.triangle @ particular
     if not free:
         return _make_estimate(factors, particular, np.zeros(terms), float(remainder @ remainder), 0)
-    q, r = qr(factors.triangle @ basis, mode="economic")
+    q, r = scipy.linalg.qr(factors.triangle @ basis, mode="economic")
     if np.abs(np.diag(r)).min() <= DEPENDENT:
         return failed_estimate(
             terms, EvaluationOutcome(Status.SINGULAR, "the free directions depend on each other")
         )
     right = q.T @ remainder
-    scaled = particular + basis @ solve_triangular(r, right)
+    scaled = particular + basis @ scipy.linalg.solve_triangular(r, right)
     unexplained = remainder - q @ right
     if not standard_errors:
         undefined = np.full(terms, np.nan)
         return _make_estimate(factors, scaled, undefined, float(unexplained @ unexplained), free)
     residual = factors.orthogonal + combine(unexplained[:, None], factors.columns)[0]
     covariance = sandwich(factors.columns, residual, weights=q)
-    spread = solve_triangular(r, basis.T, trans="T")
+    spread = scipy.linalg.solve_triangular(r, basis.T, trans="T")
     variances = np.einsum("it,ij,jt->t", spread, covariance, spread)
     return _make_estimate(factors, scaled, variances, float(unexplained @ unexplained), free)
 

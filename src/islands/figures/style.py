@@ -15,6 +15,7 @@ from typing import IO, Any
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogFormatter
 
@@ -126,7 +127,10 @@ def blank(height: float, title: str = "") -> Figure:
 
 def finish(figure: Figure) -> Figure:
     """Lay out a figure and freeze the layout, because each new layout moves parts slightly."""
-    figure.draw_without_rendering()
+    engine = figure.get_layout_engine()
+    # A figure without axes has no layout.
+    if engine is not None and figure.axes:
+        engine.execute(figure)
     figure.set_layout_engine("none")
     return figure
 
@@ -152,8 +156,14 @@ def save(figure: Figure, path: str | Path | IO[bytes]) -> None:
     path : str, Path or stream
         File in an existing folder, or binary stream.
     """
-    with house_style():
-        figure.savefig(path, format="svg", metadata={"Date": None, "Creator": "islands"})
+    canvas = figure.canvas
+    try:
+        with house_style():
+            # `Figure.savefig` draws twice, since it does not know that the layout is done.
+            drawing: Any = FigureCanvasSVG(figure)
+            drawing.print_svg(path, metadata={"Date": None, "Creator": "islands"})
+    finally:
+        figure.set_canvas(canvas)
 
 
 def set_log_scale(axes: Axes) -> None:

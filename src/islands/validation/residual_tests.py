@@ -21,8 +21,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc, ndtri
 
 from islands.errors import SettingsError
 
@@ -151,7 +151,7 @@ def residual_tests(residual: NDArray[np.float64], u: NDArray[np.float64], max_la
     for index in range(inputs.shape[1]):
         tests += _test_input(noise, inputs[:, index], index, inputs.shape[1], max_lag, level)
     ljung_box = _compute_ljung_box(tests[0].values[1:], len(xi))
-    whiteness_p = float(chdtrc(max_lag, ljung_box))
+    whiteness_p = float(scipy.special.chdtrc(max_lag, ljung_box))
     return ResidualTests(
         tests=tuple(tests),
         whiteness_p=whiteness_p,
@@ -239,7 +239,7 @@ def _test(
     # The autocorrelation at lag 0 is 1 for every model and does not count.
     counted = np.abs(values[1:] if past is present else values)
     one_lag = 1.0 - (1.0 - level) ** (1.0 / len(counted))
-    limit = -float(ndtri(one_lag / 2.0)) / math.sqrt(len(past.values))
+    limit = -float(scipy.special.ndtri(one_lag / 2.0)) / math.sqrt(len(past.values))
     band = 1.96 / math.sqrt(len(past.values))
     constant = [signal.name for signal in (past, present) if not signal.values.any()]
     for array in (lags, values):

@@ -13,8 +13,6 @@ from islands.data.coupled_record import CoupledRecord, couple
 from islands.data.dataset import Dataset
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import PreprocessingSteps
-from islands.facade.coupled.identification import StoppedCouplingError
-from islands.facade.coupled.result import list_folders
 from islands.progress import Steps
 
 
@@ -71,6 +69,10 @@ def search_outputs(
 
     The results of its first outputs are kept.
     """
+    # The search loads the kernels, which the help of a command does not need.
+    from islands.facade.coupled.identification import StoppedCouplingError  # noqa: PLC0415
+    from islands.facade.coupled.result import list_folders  # noqa: PLC0415
+
     drawing = Steps(stop=stop)
     try:
         return search()

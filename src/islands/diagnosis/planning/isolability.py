@@ -10,9 +10,8 @@ from dataclasses import dataclass, field
 from math import inf, log, nan, sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.cluster.hierarchy import fcluster, linkage
-from scipy.spatial.distance import squareform
 
 from islands.diagnosis.planning.cause import Cause, CauseScale
 from islands.diagnosis.planning.experiment import Experiment
@@ -121,7 +120,9 @@ class Isolability:
         misfits = self.misfits[np.ix_(kept, kept)]
         is_separable = np.isfinite(np.minimum(misfits, misfits.T)).astype(float)
         np.fill_diagonal(is_separable, 0.0)
-        labels = fcluster(linkage(squareform(is_separable), "complete"), 0.5, "distance")
+        distances = scipy.spatial.distance.squareform(is_separable)
+        tree = scipy.cluster.hierarchy.linkage(distances, "complete")
+        labels = scipy.cluster.hierarchy.fcluster(tree, 0.5, "distance")
         groups = (
             tuple(self.names[kept[place]] for place in np.flatnonzero(labels == label))
             for label in dict.fromkeys(labels.tolist())

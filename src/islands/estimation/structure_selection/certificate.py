@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.cluster.hierarchy import average
-from scipy.spatial.distance import squareform
 
 from islands.estimation.forward_selection import SelectionProblem, Structure
 from islands.estimation.structure_selection.froe import froe
@@ -126,7 +125,9 @@ def _make_tree(gram: NDArray[np.float64]) -> tuple[NDArray[np.int64], Tree]:
     width, left, right = np.ones(size, np.int64), np.full(size, -1), np.full(size, -1)
     if count > 1:
         distances = np.sqrt(np.maximum(0.0, 1.0 - gram**2))
-        for node, (one, other, *_) in enumerate(average(squareform(distances, checks=False)), start=count):
+        pairs = scipy.spatial.distance.squareform(distances, checks=False)
+        # A module of SciPy is loaded at its first use: this one takes a tenth of a second.
+        for node, (one, other, *_) in enumerate(scipy.cluster.hierarchy.average(pairs), start=count):
             left[node], right[node] = int(one), int(other)
             width[node] = width[left[node]] + width[right[node]]
     first = np.zeros(size, np.int64)
