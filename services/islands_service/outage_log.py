@@ -17,7 +17,8 @@ class OutageLog:
 
     The first failure is logged, the next one after `EVERY` seconds with the number of failures, and the first
     success. An outage that begins less than `EVERY` seconds after such a line is logged only if it lasts
-    longer, so that an operation that fails now and then does not fill the log either.
+    longer, so that an operation that fails now and then does not fill the log either. A failure that is more
+    than `EVERY` seconds after the last one begins another outage.
 
     Parameters
     ----------
@@ -33,15 +34,15 @@ class OutageLog:
         self, failing: str, working: str, clock: Callable[[], float] = monotonic, level: int = WARNING
     ) -> None:
         self._failing, self._working, self._clock, self._level = failing, working, clock, level
-        self._failures, self._began, self._is_logged = 0, 0.0, False
+        self._failures, self._began, self._failed_at, self._is_logged = 0, 0.0, 0.0, False
         self._next_line: float | None = None
 
     def fail(self, error: Exception, **details: object) -> None:
         """Log a failure, unless another one was logged less than a minute ago."""
         now = self._clock()
-        self._failures += 1
-        if self._failures == 1:
-            self._began = now
+        if self._failures == 0 or now - self._failed_at > EVERY:
+            self._failures, self._began = 0, now
+        self._failures, self._failed_at = self._failures + 1, now
         if self._next_line is None or now >= self._next_line:
             repeated = {} if self._failures == 1 else self._summary(now)
             log.log(self._level, self._failing, reason=str(error), **details, **repeated)

@@ -34,7 +34,9 @@ def chromium() -> Iterator[Any]:
     # The machine may be busy. Successful assertions do not wait.
     api.expect.set_options(timeout=20_000)
     with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"])
+        browser = playwright.chromium.launch(
+            executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"]
+        )
         yield browser
         browser.close()
 

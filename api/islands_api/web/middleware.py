@@ -106,9 +106,11 @@ class RequestLogging:
         if state is not None:
             method, route = name_route(scope)
             state.metrics.latency.labels(method, route, entry.status).observe(entry.seconds)
-            outage = state.outages.get(f"{method} {route}")
+            # Routes answer HEAD as GET.
+            name = f"{'GET' if method == 'HEAD' else method} {route}"
+            outage = state.outages.get(name)
             if outage is not None and entry.status is not None and entry.status < HTTPStatus.BAD_REQUEST:
-                outage.succeed(route=f"{method} {route}")
+                outage.succeed(route=name)
 
     def _log(self, scope: Scope, entry: "_Entry") -> None:
         # Health checks and metrics scrapes would fill the log.
@@ -243,10 +245,11 @@ class HeadRequests:
         """Handle a request."""
         if scope["type"] != "http" or scope["method"] != "HEAD":
             return await self._app(scope, receive, send)
-        answered = asyncio.Event()
+        answered, inner = asyncio.Event(), {**scope, "method": "GET"}
 
         async def send_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
+                scope["route"] = inner.get("route")  # for the log, which is outside
                 await send(message)
                 await send({"type": "http.response.body"})
                 answered.set()
@@ -255,7 +258,7 @@ class HeadRequests:
             await answered.wait()
             return {"type": "http.disconnect"}
 
-        return await self._app({**scope, "method": "GET"}, receive_until_answered, send_headers)
+        return await self._app(inner, receive_until_answered, send_headers)
 
 
 def _get_url_part(url: str, part: str) -> str:

@@ -42,7 +42,9 @@ def test_start_of_ray_that_times_out_is_reported_as_a_cluster_error(monkeypatch)
 @pytest.mark.ci
 def test_local_ray_starts_no_autoscaler_log_monitor_or_dashboard(ray_address):
     """Each of them would import for a second of CPU before Ray answers."""
-    (head,) = (pid for pid, line in descendants(os.getpid()).items() if "islands_service.runtime.ray_head" in line)
+    (head,) = (
+        pid for pid, line in descendants(os.getpid()).items() if "islands_service.runtime.ray_head" in line
+    )
     lines = " ".join(descendants(head).values())
     assert "gcs_server" in lines
     assert "raylet" in lines
