@@ -6,6 +6,7 @@ from contextlib import asynccontextmanager
 from types import SimpleNamespace
 
 import pytest
+import structlog
 
 from islands_api.oidc.bearer_token import IssuerUnavailableError
 from islands_service.outbound.addresses import OutboundFailedError
@@ -123,6 +124,26 @@ def test_known_keys_are_used_for_six_hours_while_the_issuer_is_away():
         assert (await keys.find("first")).kid == "first"
 
     follow(scenario)
+
+
+def test_an_outage_of_the_issuer_is_logged_once_a_minute_and_its_end():
+    async def scenario(keys, client, now):
+        client.issuer.away = True
+        for _ in range(24):  # two minutes in which tokens arrive
+            with pytest.raises(IssuerUnavailableError):
+                await keys.find("first")
+            now.time += 5.0
+        client.issuer.away = False
+        await keys.find("first")
+
+    with structlog.testing.capture_logs() as logs:
+        follow(scenario)
+    assert [(entry["event"], entry.get("failures")) for entry in logs] == [
+        ("keys of the issuer not read", None),
+        ("keys of the issuer not read", 13),
+        ("the issuer answers again", 24),
+        ("keys of the issuer read", None),
+    ]
 
 
 def test_a_client_that_leaves_does_not_interrupt_the_others():

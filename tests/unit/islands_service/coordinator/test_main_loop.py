@@ -148,6 +148,45 @@ def test_outcome_is_stored_as_soon_as_the_disk_has_space(
     assert logged == ["cannot finish yet", "job can be finished", "job finished"]
 
 
+class Away(SerialCoordinator):
+    """A coordinator whose cluster does not answer at first, and then its store."""
+
+    def run(self) -> None:
+        self._settings = self._settings.model_copy(update={"ray_address": "cluster:6379"})
+        self.claims = self.connections = 5
+        self._claim, self._store.leases.claim = self._store.leases.claim, self.claim  # type: ignore[method-assign]
+        super().run()
+
+    def claim(self, *arguments: Any, **named: Any) -> Lease | None:
+        self.claims -= 1
+        if self.claims >= 0:
+            raise StoreUnavailableError("the database does not answer")
+        return self._claim(*arguments, **named)
+
+    def _connect(self) -> None:
+        self.connections -= 1
+        if self.connections >= 0:
+            raise ClusterError("the cluster does not answer")
+        self._connected = True
+
+
+def test_an_outage_is_logged_at_its_begin_and_its_end(
+    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace_runner(monkeypatch, lambda _run: DONE)
+    monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.01)
+    with structlog.testing.capture_logs() as logs:
+        coordinator(Away)
+        wait_until_finished(store, job)
+    logged = [(entry["event"], entry.get("failures")) for entry in logs]
+    assert [each for each in logged if each[0].split()[0] in ("no", "cluster", "store")] == [
+        ("no cluster", None),
+        ("cluster back", 5),
+        ("store unavailable", None),
+        ("store back", 5),
+    ]
+
+
 def test_unavailable_store_during_a_job_is_not_an_attempt(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
 ) -> None:
