@@ -17,7 +17,7 @@ from support.processes import alive, descendants, eventually, kill
 from support.service_processes import ROLES, SPEC, Service, serving
 
 #: Generations of the job that is disturbed.
-LONG = 300
+LONG = 200
 
 #: Generations of a job that is queued behind it.
 SHORT = 5
