@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from typer.testing import CliRunner, Result
 
 ISLANDS = Path(sysconfig.get_path("scripts")) / "islands"
@@ -62,10 +63,17 @@ def found(folder: Path) -> dict[str, bytes]:
 
 
 def islands(*arguments: object) -> Result:
-    """Run a command in this process, which has loaded the kernels; tests of processes use `ISLANDS`."""
+    """Run a command in this process, which has loaded the kernels; tests of processes use `ISLANDS`.
+
+    It starts no further processes, which would import everything for a part of a second of work, unless an
+    argument asks for them.
+    """
+    from islands.processes import pool
     from islands_api.cli.app import app
 
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=False)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pool, "count_cpus", lambda: 1)
+        return CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=False)
 
 
 def succeed(*arguments: object) -> str:

@@ -41,8 +41,8 @@ def base(tmp_path_factory):
     """Folder with a record of a linear system that has offsets, and one of a system with two outputs."""
     folder = tmp_path_factory.mktemp("load")
     rng = np.random.default_rng(0)
-    u = lfilter([0.1], [1.0, -0.9], rng.standard_normal(600))
-    y = 7.0 + lfilter([0.3], [1.0, -0.7], np.roll(u, 3)) + 0.02 * rng.standard_normal(600)
+    u = lfilter([0.1], [1.0, -0.9], rng.standard_normal(300))
+    y = 7.0 + lfilter([0.3], [1.0, -0.7], np.roll(u, 3)) + 0.02 * rng.standard_normal(300)
     write_record(islands.Dataset(u[:, None] + 2.0, y, 0.01, ("u_V",), "y_um"), folder / "r.csv")
     masses = make_coupled_record(TWO_MASSES, samples=150)
     with (folder / "masses.csv").open("w", newline="") as stream:

@@ -18,8 +18,8 @@ pytestmark = pytest.mark.ci
 def made(delay=3):
     """Return a record of a linear system with a dead time."""
     rng = np.random.default_rng(0)
-    u = lfilter([0.1], [1.0, -0.9], rng.standard_normal(600))
-    y = lfilter([0.3], [1.0, -0.7], np.roll(u, delay)) + 0.02 * rng.standard_normal(600)
+    u = lfilter([0.1], [1.0, -0.9], rng.standard_normal(300))
+    y = lfilter([0.3], [1.0, -0.7], np.roll(u, delay)) + 0.02 * rng.standard_normal(300)
     return islands.Dataset(u[:, None], y, 0.01, ("u_V",), "y_um")
 
 
@@ -57,7 +57,7 @@ def test_the_sentences_are_those_of_the_command(files, found):
 
 
 def test_the_extended_simulation_is_that_of_the_folder(found, tmp_path):
-    folder, other = found.save(tmp_path / "saved"), made()[:300]
+    folder, other = found.save(tmp_path / "saved"), made()[:200]
     np.testing.assert_array_equal(found.simulate(other).y, islands.load(folder).simulate(other).y)
     assert found.export("json", tmp_path / "exported.json") is None
     assert (tmp_path / "exported.json").read_bytes() == (folder / "extended.json").read_bytes()
