@@ -41,7 +41,7 @@ def follow(u: Signal, dt: float, gain: float = 2.0, tau: float = 0.08) -> Signal
 
 def make_record(law: Callable[[Signal, Signal, Signal], Signal] | None, seed: int = 4) -> Dataset:
     rng = np.random.default_rng(seed)
-    time = DT * np.arange(1500)
+    time = DT * np.arange(800)
     frequencies = rng.uniform(0.1, 2.0, 10)
     u = 4.0 * np.sin(2 * np.pi * np.outer(time, frequencies) + rng.uniform(0, 6.3, 10)).sum(axis=1)
     y = follow(u, DT)
