@@ -69,18 +69,18 @@ def submit(
 ) -> None:
     """Upload recordings and submit a job that identifies one model of them."""
     names, outputs = options.columns(inputs), options.columns(output_columns)
-    read, output_column = join_columns(names, outputs)
+    _, output_column = join_columns(names, outputs)
     held_out = _parse_validation(validation)
     if isinstance(held_out, str) and len(records) > 1:
         raise SettingsError(f"--validation {held_out}: with several recordings, give a file or a fraction")
     with open_client(url, key) as client:
         whole = output_column if rows is None else None
-        dataset, *others = (client.upload(record, read, whole, dt, reading.changes()) for record in records)
+        dataset, *others = (client.upload(record, names, whole, dt, reading.changes()) for record in records)
         validation_data: float | dict[str, Any] | None
         match held_out:
             case Path():
                 validation_data = {
-                    "dataset": client.upload(held_out, read, output_column, dt, reading.changes()).id
+                    "dataset": client.upload(held_out, names, output_column, dt, reading.changes()).id
                 }
             case str():
                 validation_data = {"dataset": dataset.id, "rows": held_out}
