@@ -9,7 +9,7 @@ from islands.data.coupled_record import CoupledRecord
 from islands.facade.coupled.identification import identify_coupled
 from islands_api.client import Client
 from islands_service.coordinator import identification_job
-from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled
+from islands_service.coordinator.heartbeat import CoordinatorStopping
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import JobState
 from islands_service.store.blobs import Blobs
@@ -66,6 +66,15 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
         succeed("jobs", "result", job.id, "--url", service.url, "--out", tmp_path / "result")
         assert "y1(k) =" in succeed("jobs", "watch", job.id, "--url", service.url)
         assert client.report(job).count(b"<img") == 2
+        path = f"{service.url}/v1/jobs/{job.id}/models/1/simulation"
+        first, second = (httpx.get(path, params={"output": number}, timeout=60).json() for number in (1, 2))
+        assert first["measured"] != second["measured"]
+        assert second["band"]["level"] == 0.9
+        missing = httpx.get(path, params={"output": 3})
+        assert (missing.status_code, missing.json()["detail"]) == (
+            404,
+            "the model has 2 outputs, there is no 3",
+        )
         assert "y2" in client.export(job, 1, "c")
     files = CoupledRecord(
         tuple(islands.read_record(tmp_path / "masses.csv", "u", name) for name in ("y1", "y2"))
@@ -99,18 +108,6 @@ def test_a_job_continues_in_the_search_that_was_interrupted(service, dataset, mo
         assert client.history(part) == client.history(whole)
 
 
-def test_a_cancelled_job_says_what_is_missing(service, dataset):
-    with Client(service.url) as client:
-        job = client.submit(dataset, "u", ["y1", "y2"], **SETTINGS)
-        lease = taken(service.store, job.id)
-
-        def cancel():
-            raise JobCancelled("cancelled")
-
-        with pytest.raises(JobCancelled):
-            run_identification_job(make_run(lease, service.store, Blobs(service.settings.blobs), cancel))
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -129,16 +126,3 @@ def test_a_job_that_can_only_fail_is_refused(service, dataset, given, message):
     answer = httpx.post(f"{service.url}/v1/jobs", json=request)
     assert answer.status_code == 422
     assert message in answer.json()["detail"]
-
-
-def test_the_figures_of_every_output_have_their_numbers(service, dataset):
-    with Client(service.url) as client:
-        job = client.submit(dataset, "u", ["y1", "y2"], **SETTINGS)
-        run(service, job)
-    path = f"{service.url}/v1/jobs/{job.id}/models/1"
-    assert httpx.get(f"{path}/figures").json()["items"] == ["free-run-1", "free-run-2"]
-    first, second = (httpx.get(f"{path}/simulation", params={"output": output}).json() for output in (1, 2))
-    assert first["measured"] != second["measured"]
-    assert second["band"]["level"] == 0.9
-    missing = httpx.get(f"{path}/simulation", params={"output": 3})
-    assert (missing.status_code, missing.json()["detail"]) == (404, "the model has 2 outputs, there is no 3")
