@@ -14,15 +14,16 @@ EMPTY = b'<svg xmlns="http://www.w3.org/2000/svg"></svg>'
 @contextmanager
 def undrawn_figures() -> Iterator[None]:
     """Skip the layout of figures in this process and save empty pictures."""
-    from matplotlib.figure import Figure
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    def save(_figure: Figure, to: str | Path | IO[bytes], **_options: Any) -> None:
+    def save(_canvas: FigureCanvasSVG, to: str | Path | IO[bytes], **_options: Any) -> None:
         if isinstance(to, str | Path):
             Path(to).write_bytes(EMPTY)
         else:
             to.write(EMPTY)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Figure, "draw_without_rendering", lambda _figure: None)
-        patch.setattr(Figure, "savefig", save)
+        patch.setattr(ConstrainedLayoutEngine, "execute", lambda _engine, _figure: None)
+        patch.setattr(FigureCanvasSVG, "print_svg", save)
         yield

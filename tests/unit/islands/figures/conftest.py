@@ -9,4 +9,6 @@ def without_layout(monkeypatch):
 
     For tests of the content of figures. `test_style_legibility` checks their layout.
     """
-    monkeypatch.setattr("matplotlib.figure.Figure.draw_without_rendering", lambda _figure: None)
+    monkeypatch.setattr(
+        "matplotlib.layout_engine.ConstrainedLayoutEngine.execute", lambda _engine, _figure: None
+    )

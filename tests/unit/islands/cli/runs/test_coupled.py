@@ -95,7 +95,8 @@ def test_preprocessed_outputs_are_simulated_as_measured(record, tmp_path) -> Non
 
 @pytest.mark.ci
 def test_a_run_that_its_wall_time_has_ended_is_resumed_to_the_whole_result(record, tmp_path) -> None:
-    settings = ("--population", 6, "--generations", 1, "--max-terms", 3, "--average", 1, "--engine", "serial")
+    # Without a library there are no seeds, which take most of the time.
+    settings = ("--preset", "paper-appendix", "--population", 20, "--generations", 1, "--max-terms", 3)
     whole, part = tmp_path / "whole", tmp_path / "part"
     with undrawn_figures():
         assert "2 outputs" in succeed("identify", record, *COLUMNS, *settings, "--out", whole)
