@@ -49,8 +49,10 @@ def kill(pid: int) -> None:
 
 def eventually(condition: Callable[[], object], seconds: float = 60.0) -> object:
     """Wait until a condition is true and return its value."""
-    deadline = time.monotonic() + seconds
+    deadline, pause = time.monotonic() + seconds, 0.02
     while not (found := condition()):
         assert time.monotonic() < deadline, f"the condition is still false after {seconds} s"
-        time.sleep(0.02)
+        time.sleep(pause)
+        # A condition may ask a service or read all processes: a long wait asks less often.
+        pause = min(1.2 * pause, 0.1)
     return found
