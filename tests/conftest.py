@@ -3,6 +3,7 @@
 import gc
 import os
 import shutil
+import signal
 from contextlib import ExitStack
 
 # Before NumPy is imported: the workers have the cores, and threads of its linear algebra would wait for them.
@@ -41,6 +42,8 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_configure(config):
+    # As Ctrl-C. By default SIGTERM ends no fixture: services and databases of the tests would run on.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     # Before the workers start: each of them would compile all kernels for itself.
     if not hasattr(config, "workerinput"):
         from islands.facade.warm_up import warm_up
