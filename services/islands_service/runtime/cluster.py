@@ -210,7 +210,11 @@ class _LocalNode(Node):  # type: ignore[misc]
 
 @contextmanager
 def _without_unused_processes() -> Iterator[None]:
-    """Replace the class of nodes of `ray.init`, which has no options for this."""
+    """Replace the class of nodes of `ray.init`, which has no options for this.
+
+    The class is private. The locked version of Ray has these methods, and a test starts it; a version without
+    one of them starts all processes.
+    """
     ray._private.node.Node = _LocalNode
     try:
         yield
