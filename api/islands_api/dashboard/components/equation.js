@@ -35,7 +35,8 @@ export function parseMath(source) {
   const plain = source.replace(/\sxmlns="[^"]*"/g, "");
   const parsed = new DOMParser().parseFromString(`<equations>${plain}</equations>`, "application/xml");
   const equations = [...parsed.documentElement.children];
-  if (parsed.querySelector("parsererror") || !equations.length || equations.some((each) => each.localName !== "math"))
+  const isMath = equations.length && equations.every((each) => each.localName === "math");
+  if (!isMath || parsed.querySelector("parsererror"))
     throw new Error("the equation is not MathML");
   return equations.map(copyMath);
 }

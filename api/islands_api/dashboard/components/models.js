@@ -26,12 +26,12 @@ const EXPORTS = {
 const PARTS = ["estimation", "validation"];
 
 /** Make an element with a formatted number; its value and title have the full precision. */
-function makeExactValue(value, format) {
+export function makeExactValue(value, format) {
   if (typeof value !== "number") return NONE;
   return el("data", { value: String(value), title: String(value) }, format(value));
 }
 
-const formatR2 = (value) =>
+export const formatR2 = (value) =>
   Math.abs(value) < 100 ? value.toFixed(5).replace("-", "−") : formatNumber(value);
 
 /** Make a metric of the free run, or the kind of the outcome ("diverged") if there is no value. */
@@ -98,7 +98,7 @@ function makeModelTable(job, models) {
   return modelTable;
 }
 
-function makeTermTable(model) {
+export function makeTermTable(model) {
   return makeTable(
     "Terms of the model",
     ["Regressor", ["Parameter", "figure"], ["Standard error", "figure"], ["Inclusion", "figure"]],
@@ -162,7 +162,7 @@ function makeExportButtons(path, rank) {
     el("button", { type: "button", "data-format": form, on: { click: save(form) } }, name));
 }
 
-const makeExportRow = (path, rank) =>
+export const makeExportRow = (path, rank) =>
   el(
     "div",
     { class: "row exports", role: "group", "aria-label": "Export the model as" },
@@ -170,7 +170,7 @@ const makeExportRow = (path, rank) =>
     makeExportButtons(path, rank),
   );
 
-function makeEquation(path, model, signal) {
+export function makeEquation(path, model, signal) {
   const host = makeScrollable("Equation", el("code", { class: "plain" }, model.equation));
   host.classList.add("equation");
   loadEquations(path, signal).then(
@@ -181,7 +181,7 @@ function makeEquation(path, model, signal) {
   return host;
 }
 
-function makeGallery(path, signal, skip = () => false) {
+export function makeGallery(path, signal, skip = () => false) {
   const host = el("div", { class: "gallery" });
   poll(async () => {
     const { items } = await getJson(`${path}/figures`, { signal });
@@ -221,72 +221,6 @@ function makeDetail(job, model, hysteresis, signal) {
   ];
 }
 
-/** Make the table of the errors of every output in the common free run. */
-function makeOutputTable(outputs) {
-  const getErrors = (output, part, mode) => output.metrics[part][mode];
-  return makeTable(
-    "Errors of the outputs",
-    [
-      "Output",
-      ...["MAPE est. %", "MAPE val. %", "R² val.", "RMSE val.", "One-step RMSE val.", "90 % band ±"].map(
-        (name) => [name, "figure"],
-      ),
-    ],
-    outputs.map((output, place) => {
-      const run = getErrors(output, "validation", "free_run");
-      return [
-        el("span", {}, `y${place + 1}: `, el("bdi", {}, output.name), output.unit ? ` (${output.unit})` : ""),
-        makeExactValue(getErrors(output, "estimation", "free_run").mape, formatNumber),
-        makeExactValue(run.mape, formatNumber),
-        makeExactValue(run.r2, formatR2),
-        makeExactValue(run.rmse, formatNumber),
-        makeExactValue(getErrors(output, "validation", "one_step_ahead").rmse, formatNumber),
-        makeExactValue(getHalfWidth(output.bands), formatNumber),
-      ];
-    }),
-  );
-}
-
-/** Return the median half-width of the 90 % band; null without bands. */
-function getHalfWidth(bands) {
-  const at = bands?.levels.indexOf(0.9) ?? -1;
-  return at < 0 ? null : bands.factors[at] * bands.width;
-}
-
-/** Make the model of several outputs: equations, errors, terms and the free run of every output. */
-function makeCoupledDetail(job, model, outputs, signal) {
-  const path = `v1/jobs/${encodeURIComponent(job)}/models/${model.rank}`;
-  return [
-    el("h3", { id: "model" }, "Equations"),
-    makeEquation(path, model, signal),
-    makeExportRow(path, model.rank),
-    el("h4", {}, "Outputs"),
-    makeScrollable("Errors of the outputs", makeOutputTable(outputs)),
-    el("h4", {}, "Terms"),
-    makeScrollable("Terms", makeTermTable(model)),
-    makeGallery(path, signal),
-  ];
-}
-
-/** Make the panel of the model of several outputs. */
-export function makeCoupledPanel(job, signal) {
-  const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
-  const article = el("article", { class: "model", "aria-labelledby": "model" });
-  poll(async () => {
-    const { models: [model], outputs } = await getJson(`v1/jobs/${encodeURIComponent(job.id)}/result`, { signal });
-    article.replaceChildren(...makeCoupledDetail(job.id, model, outputs, signal));
-    const note = el(
-      "p",
-      { class: "soft small" },
-      "All outputs are simulated together. The validation data selected the equations, so these errors are not "
-        + "an independent test.",
-    );
-    body.replaceChildren(makeSentences(job), note, article);
-    return Infinity;
-  }, signal);
-  return { node: el("section", { class: "card" }, el("h2", {}, "Model"), body), select() {} };
-}
-
 /** Make the figures of the whole search, loaded when the section is opened. */
 function makeSearchFigures(job, islands, signal) {
   const path = `v1/jobs/${encodeURIComponent(job)}`;
@@ -299,7 +233,7 @@ function makeSearchFigures(job, islands, signal) {
 }
 
 /** Make the sentences about the recommended model; results of earlier versions have none. */
-function makeSentences(job) {
+export function makeSentences(job) {
   const lines = job.summary?.words?.split("\n") ?? [];
   return el(
     "div",

@@ -3,6 +3,7 @@
 import { clearBanner, showProblem } from "../components/banner.js";
 import { askConfirmation } from "../components/confirm.js";
 import { makeConvergencePanel } from "../components/convergence.js";
+import { makeCoupledPanel } from "../components/coupled_model.js";
 import { makeDatasetPanel, makeSettingsPanel } from "../components/dataset.js";
 import { isSearch, makeFindingsPanel } from "../components/diagnosis.js";
 import {
@@ -13,7 +14,7 @@ import {
   makeBadge,
   makeProgressBar,
 } from "../components/job_state.js";
-import { makeCoupledPanel, makeModelsPanel } from "../components/models.js";
+import { makeModelsPanel } from "../components/models.js";
 import { download, getJson, sendRequest } from "../lib/api.js";
 import { formatUtc, makeAge } from "../lib/clock.js";
 import { announce, el, makeFacts, runOnceAtATime, setText } from "../lib/dom.js";

@@ -28,6 +28,7 @@ FILES = {
     "components/chart.js": _SCRIPT,
     "components/confirm.js": _SCRIPT,
     "components/convergence.js": _SCRIPT,
+    "components/coupled_model.js": _SCRIPT,
     "components/dataset.js": _SCRIPT,
     "components/diagnosis.js": _SCRIPT,
     "components/equation.js": _SCRIPT,

@@ -1,0 +1,82 @@
+/** Model of several outputs of a succeeded job: equations, errors of each output, terms and figures. */
+
+import { getJson } from "../lib/api.js";
+import { el, makeScrollable, makeTable } from "../lib/dom.js";
+import { formatNumber } from "../lib/numbers.js";
+import { poll } from "../lib/polling.js";
+import {
+  formatR2,
+  makeEquation,
+  makeExactValue,
+  makeExportRow,
+  makeGallery,
+  makeSentences,
+  makeTermTable,
+} from "./models.js";
+
+/** Make the table of the errors of every output in the common free run. */
+function makeOutputTable(outputs) {
+  const getErrors = (output, part, mode) => output.metrics[part][mode];
+  return makeTable(
+    "Errors of the outputs",
+    [
+      "Output",
+      ...["MAPE est. %", "MAPE val. %", "R² val.", "RMSE val.", "One-step RMSE val.", "90 % band ±"].map(
+        (name) => [name, "figure"],
+      ),
+    ],
+    outputs.map((output, place) => {
+      const run = getErrors(output, "validation", "free_run");
+      return [
+        el("span", {}, `y${place + 1}: `, el("bdi", {}, output.name), output.unit ? ` (${output.unit})` : ""),
+        makeExactValue(getErrors(output, "estimation", "free_run").mape, formatNumber),
+        makeExactValue(run.mape, formatNumber),
+        makeExactValue(run.r2, formatR2),
+        makeExactValue(run.rmse, formatNumber),
+        makeExactValue(getErrors(output, "validation", "one_step_ahead").rmse, formatNumber),
+        makeExactValue(getHalfWidth(output.bands), formatNumber),
+      ];
+    }),
+  );
+}
+
+/** Return the median half-width of the 90 % band; null without bands. */
+function getHalfWidth(bands) {
+  const at = bands?.levels.indexOf(0.9) ?? -1;
+  return at < 0 ? null : bands.factors[at] * bands.width;
+}
+
+/** Make the model of several outputs: equations, errors, terms and the free run of every output. */
+function makeCoupledDetail(job, model, outputs, signal) {
+  const path = `v1/jobs/${encodeURIComponent(job)}/models/${model.rank}`;
+  return [
+    el("h3", { id: "model" }, "Equations"),
+    makeEquation(path, model, signal),
+    makeExportRow(path, model.rank),
+    el("h4", {}, "Outputs"),
+    makeScrollable("Errors of the outputs", makeOutputTable(outputs)),
+    el("h4", {}, "Terms"),
+    makeScrollable("Terms", makeTermTable(model)),
+    makeGallery(path, signal),
+  ];
+}
+
+/** Make the panel of the model of several outputs. */
+export function makeCoupledPanel(job, signal) {
+  const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
+  const article = el("article", { class: "model", "aria-labelledby": "model" });
+  poll(async () => {
+    const path = `v1/jobs/${encodeURIComponent(job.id)}/result`;
+    const { models: [model], outputs } = await getJson(path, { signal });
+    article.replaceChildren(...makeCoupledDetail(job.id, model, outputs, signal));
+    const note = el(
+      "p",
+      { class: "soft small" },
+      "All outputs are simulated together. The validation data selected the equations, so these errors are "
+        + "not an independent test.",
+    );
+    body.replaceChildren(makeSentences(job), note, article);
+    return Infinity;
+  }, signal);
+  return { node: el("section", { class: "card" }, el("h2", {}, "Model"), body), select() {} };
+}
