@@ -8,7 +8,8 @@ from markupsafe import Markup
 
 from islands.evolution.search_result import SearchResult
 from islands.io.result_text.model_description import describe
-from islands.io.result_text.model_table import LEGEND, columns, number, rows
+from islands.io.result_text.model_table import columns, number, rows
+from islands.io.result_text.text_layout import LEGEND
 from islands.reports.rendering import TEMPLATES, inline_svg
 
 #: Captions of the figures, in the order of the report.

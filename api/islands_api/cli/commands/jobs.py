@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from islands.cli import options
+from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
 from islands.cli.record_options import with_reading_options
@@ -111,9 +111,9 @@ def diagnose(
     records: options.Records,
     inputs: options.Inputs,
     output_column: options.Output,
-    simulated: options.Simulated,
-    channels: options.Channels = None,
-    tolerance: options.Tolerances = None,
+    simulated: simulation_options.Simulated,
+    channels: simulation_options.Channels = None,
+    tolerance: simulation_options.Tolerances = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
@@ -128,7 +128,10 @@ def diagnose(
     as_json: Json = False,
 ) -> None:
     """Upload recordings and submit a job that diagnoses the errors of a simulation on them."""
-    driving, tolerances = options.single_input(options.columns(inputs)), options.tolerances(tolerance or [])
+    driving, tolerances = (
+        simulation_options.single_input(options.columns(inputs)),
+        simulation_options.tolerances(tolerance or []),
+    )
     channel_names = options.columns(channels or [])
     simulation = parse_simulation(simulated)
     read = [driving, *channel_names, *([simulation["column"]] if "column" in simulation else [])]

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from islands.cli import options
+from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
 from islands.cli.record_options import with_reading_options
 from islands.cli.watched_folder import find_time, hash_file, order_of_recording
@@ -45,8 +45,8 @@ def create(
     ] = None,
     inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column.")] = None,
     output_column: Annotated[str | None, typer.Option("--output", help="Output column.")] = None,
-    channels: options.Channels = None,
-    tolerance: options.Tolerances = None,
+    channels: simulation_options.Channels = None,
+    tolerance: simulation_options.Tolerances = None,
     dt: options.SamplingTime = None,
     false_alarms: Annotated[
         str | None,
@@ -72,11 +72,11 @@ def create(
         made = client.create_monitor(
             diagnosis,
             simulation=simulated,
-            input=options.single_input(driving) if driving else None,
+            input=simulation_options.single_input(driving) if driving else None,
             output=output_column,
             channels=options.columns(channels or []),
             dt=dt,
-            tolerance=options.tolerances(tolerance or []),
+            tolerance=simulation_options.tolerances(tolerance or []),
             false_alarms=false_alarms,
             interval=interval,
             training=training,

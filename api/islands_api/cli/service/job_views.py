@@ -14,8 +14,7 @@ from rich.table import Table
 from islands.cli.console import output
 from islands.cli.progress_display import progress
 from islands.io.models import any_model_from_json
-from islands.io.result_text.model_table import LEGEND, MARK
-from islands.io.result_text.text_layout import term_table, wrap
+from islands.io.result_text.text_layout import LEGEND, MARK, term_table, wrap
 from islands.models.coupled_narx import CoupledModel
 from islands.models.protocol import DynamicModel
 from islands.simulators.specification.table import EXTENDED_FILE

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from islands.cli import options
+from islands.cli import options, simulation_options
 from islands.cli.console import output
 from islands.cli.output_folder import check_folder
 from islands.cli.progress_display import compile_kernels, progress
@@ -60,7 +60,7 @@ NO_PLAN = PlanOptions()
 def diagnose(
     inputs: options.Inputs,
     out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
-    simulated: options.Simulated,
+    simulated: simulation_options.Simulated,
     records: Annotated[
         list[Path] | None,
         typer.Argument(metavar="RECORD...", help="Recordings of one system, as for fit; one for --plan."),
@@ -68,8 +68,8 @@ def diagnose(
     output_column: Annotated[
         str | None, typer.Option("--output", help="Output column; not needed for --plan.")
     ] = None,
-    channels: options.Channels = None,
-    tolerance: options.Tolerances = None,
+    channels: simulation_options.Channels = None,
+    tolerance: simulation_options.Tolerances = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
@@ -92,9 +92,9 @@ def diagnose(
             raise SettingsError("--validation is for a diagnosis: leave it out of a plan")
         check_folder(out, force, PLAN)
         compile_kernels()
-        columns_of_input = [options.single_input(options.columns(inputs)), *(channels or [])]
+        columns_of_input = [simulation_options.single_input(options.columns(inputs)), *(channels or [])]
         data = read_input(records or [], columns_of_input, output_column, dt, rows, reading, planning)
-        tolerances = options.tolerances(tolerance or [])
+        tolerances = simulation_options.tolerances(tolerance or [])
         _plan(data, simulated, tolerances, planning, out, seed, workers)
         return
     planning.check_unused()
@@ -112,7 +112,7 @@ def diagnose(
             *(output_column, dt, rows, reading),
         )
         simulator = make_simulator(spec, data, columns)
-        tolerances = options.tolerances(tolerance or [])
+        tolerances = simulation_options.tolerances(tolerance or [])
         began = perf_counter()
         run = partial(run_diagnosis, data, simulator, tolerances, seed, show)
         diagnosis, fits, before = _diagnose_until_stopped(run, out, seed, workers)
@@ -238,7 +238,7 @@ def _read_record(
 ) -> tuple[Dataset, Mapping[str, Any]]:
     """Read the recordings, and separately the column of a simulation that was recorded in them."""
     extra = [] if column is None else [column]
-    names = [options.single_input(inputs), *channels, *extra]
+    names = [simulation_options.single_input(inputs), *channels, *extra]
     recordings = Recordings(records, names, output_column, dt, reading, resting_inputs=True)
     whole = recordings.read(rows)
     if validation is not None:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from islands.cli import options
+from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
 from islands.cli.progress_display import compile_kernels
@@ -75,8 +75,8 @@ def monitor(
     output_column: Annotated[
         str | None, typer.Option("--output", help="Output column; by default that of the simulation.")
     ] = None,
-    channels: options.Channels = None,
-    tolerance: options.Tolerances = None,
+    channels: simulation_options.Channels = None,
+    tolerance: simulation_options.Tolerances = None,
     false_alarms: Annotated[
         str,
         typer.Option(
@@ -124,7 +124,7 @@ def monitor(
         "false_alarms": false_alarms,
         "interval": interval or watched.interval,
         "training": training,
-        "tolerance": options.tolerances(tolerance or []),
+        "tolerance": simulation_options.tolerances(tolerance or []),
     }
     out.mkdir(parents=True, exist_ok=True)
     compile_kernels()

@@ -11,7 +11,6 @@ from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.export import FILE_EXPORTS, export_or_write
 from islands.export.closed_form import closed_form
-from islands.export.extension import export_extended
 from islands.facade.results.model_simulation import simulate
 from islands.io.data_frames import as_record
 from islands.simulation.predictors import Simulation
@@ -103,6 +102,9 @@ class SavedSimulation:
             )
         if kind in FILE_EXPORTS:
             return export_or_write(closed_form(self.spec), kind, path)
+        # The generators of programs import all simulators, which a model or a result does not need.
+        from islands.export.extension import export_extended  # noqa: PLC0415
+
         text = export_extended(self.spec, kind)
         if path is None:
             return text

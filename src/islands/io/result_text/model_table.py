@@ -3,13 +3,8 @@
 from math import isfinite
 
 from islands.evolution.search_result import SearchResult
+from islands.io.result_text.text_layout import MARK
 from islands.validation.assessment import PARTS, Assessment
-
-#: Mark of the recommended model, after its rank.
-MARK = "*"
-
-#: Explanation of the mark and of the order.
-LEGEND = f"{MARK} recommended; ranked by the RMSE of the free run on the validation data"
 
 #: Columns of every table.
 _COLUMNS = ("rank", "terms", "MAPE est. %", "MAPE val. %", "R2 val.", "residuals")

@@ -3,8 +3,8 @@
 from islands.evolution.search_result import SearchResult
 from islands.io.certificates import summarise_certificates
 from islands.io.result_text.model_description import describe_choice, describe_findings, describe_units
-from islands.io.result_text.model_table import LEGEND, table
-from islands.io.result_text.text_layout import term_table, wrap
+from islands.io.result_text.model_table import table
+from islands.io.result_text.text_layout import LEGEND, term_table, wrap
 from islands.models.equations import named_signals
 
 

@@ -9,6 +9,12 @@ from islands.models.protocol import DynamicModel
 #: Largest number of characters of a line.
 WIDTH = 80
 
+#: Mark of the recommended model, after its rank.
+MARK = "*"
+
+#: Explanation of the mark and of the order.
+LEGEND = f"{MARK} recommended; ranked by the RMSE of the free run on the validation data"
+
 _HEADING = "standard error"
 
 #: Text in place of the standard error of a parameter that the constraints determine.

@@ -1,0 +1,48 @@
+"""Each command starts with the modules that it needs: their number and the large packages have limits."""
+
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import sys
+from islands_api.cli import main
+try:
+    main()
+finally:
+    large = {"matplotlib", "numba", "scipy"} & set(sys.modules)
+    print(len(sys.modules), *sorted(large), file=sys.stderr)
+"""
+
+#: Largest number of modules of a command, a few more than measured, and the large packages it loads.
+LIMITS = {
+    "--version": (280, ""),
+    "fit --help": (690, ""),
+    "inspect {record}": (535, ""),
+    "jobs --help": (870, ""),
+    "jobs list --url http://127.0.0.1:9": (820, ""),
+    "show published:13": (915, "numba scipy"),
+    "simulate published:13 {record} --input u_V --output y_um": (1240, "numba scipy"),
+}
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("examples")
+    done = subprocess.run([sys.executable, "-m", "islands", "examples", "copy", folder], check=False)
+    assert done.returncode == 0
+    return folder / "piezo.csv"
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("command", LIMITS)
+def test_a_command_loads_the_modules_that_it_needs(command, record):
+    arguments = [part.format(record=record) for part in command.split()]
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *arguments], capture_output=True, text=True, check=False
+    )
+    count, *large = done.stderr.splitlines()[-1].split()
+    most, allowed = LIMITS[command]
+    assert int(count) <= most
+    assert " ".join(large) == allowed
