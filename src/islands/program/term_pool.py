@@ -1,12 +1,13 @@
 """Pool of expressions as nodes and terms with integer indices, from which the kernels generate programs."""
 
 from collections.abc import Sequence
+from threading import local
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.expressions.primitives import ADD, MUL, SIGN, SUB
-from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Symbol
+from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Symbol, walk
 from islands.kernels import codegen, interpreter
 from islands.kernels.codegen import CONSTANT, LAGGED, NodeArrays
 from islands.kernels.interpreter import CALL, MAX_FACTORS, MULTIPLY, Program
@@ -19,6 +20,9 @@ _OPERATIONS = {ADD: interpreter.ADD, SUB: interpreter.SUBTRACT, MUL: MULTIPLY, S
 #: Instructions for the sign of a result. The sign of a difference is phi2 of the paper, the most frequent
 #: function.
 _SIGNS = {SUB: interpreter.SIGN_OF_DIFFERENCE, MUL: interpreter.SIGN_OF_PRODUCT}
+
+#: Largest number of nodes, and of terms, of the pool of recent terms.
+_MOST_NODES = 4096
 
 Term = Regressor | Expression
 
@@ -137,14 +141,63 @@ def _grow(old: NodeArrays, nodes: int = 0, terms: int = 0) -> NodeArrays:
     return new
 
 
+class _RecentTerms(local):
+    """Pool of the terms of recent programs of a thread, which finds a term by its identity.
+
+    A search simulates thousands of models over a few hundred regressors. The program of a model does not
+    depend on the other terms of its pool.
+    """
+
+    def __init__(self) -> None:
+        self._clear()
+
+    def _clear(self) -> None:
+        self.pool = TermPool()
+        # The terms are kept, so that no other object has their identity.
+        self._known: dict[int, tuple[Term, int]] = {}
+
+    def find(self, terms: Sequence[Term]) -> NDArray[np.int64] | None:
+        """Return the indices of terms in the pool; None if one of them may not be in it."""
+        if max(len(self._known), self.pool.nodes.operation.size) > _MOST_NODES:
+            self._clear()
+        found = np.empty(len(terms), np.int64)
+        for place, term in enumerate(terms):
+            known = self._known.get(id(term))
+            if known is None:
+                expression = term.expression if isinstance(term, Regressor) else term
+                if not all(map(_is_shareable, walk(expression))):
+                    return None
+                known = self._known[id(term)] = (term, self.pool.term(expression))
+            found[place] = known[1]
+        return found
+
+
+_RECENT = _RecentTerms()
+
+
+def _is_shareable(node: Expression) -> bool:
+    """Return whether equal nodes have equal bits: functions of one name may differ, and 0 equals -0."""
+    match node:
+        case Apply(primitive, _):
+            entry = PRIMITIVES.get(primitive.name)
+            return entry is not None and entry.scalar is primitive.scalar
+        case Constant(value):
+            return value != 0.0
+    return isinstance(node, Lagged)
+
+
 def link(terms: Sequence[Term], parameters: Sequence[str] = ()) -> Program:
     """Generate the program of some regressors, one term each and in the given order.
 
     A term may also be a canonical expression with lag 0, for example the target y(k). The kernel of columns
     allows this, a simulation does not. ``parameters`` are the names of parameters in the expressions.
     """
-    pool = TermPool(parameters)
-    indices = pool.terms(terms)
+    shared = None if parameters else _RECENT.find(terms)
+    if shared is None:
+        pool = TermPool(parameters)
+        indices = pool.terms(terms)
+    else:
+        pool, indices = _RECENT.pool, shared
     nodes = pool.nodes
     program: Program = codegen.generate_program(nodes, indices, np.full(nodes.operation.size, -1, np.int64))
     return program

@@ -1,6 +1,7 @@
 """The pool recognises equal expressions, so that each is computed once."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Constant, Lagged
+from islands.expressions.tree import Apply, Constant, Lagged
 from islands.expressions.user_primitive import primitive
 from islands.kernels import codegen
 from islands.kernels.codegen import CONSTANT, LAGGED
@@ -20,6 +21,7 @@ from islands.kernels.interpreter import (
     SIGN,
 )
 from islands.models.regressor import regressor
+from islands.program import term_pool
 from islands.program.primitive_functions import row_address
 from islands.program.term_pool import TermPool, link
 from support.oracles import NUMBERS
@@ -152,3 +154,35 @@ def test_functions_with_one_name_in_two_pools_keep_their_addresses():
     ]
     assert found == [[row_address(one)], [row_address(other)]]
     assert found[0] != found[1]
+
+
+@given(several, several)
+def test_program_does_not_depend_on_earlier_programs(terms, others):
+    """Programs share a pool of recent terms, which has other indices than a new pool."""
+    link(others)
+    pool = TermPool()
+    indices = pool.terms(terms)
+    expected = codegen.generate_program(pool.nodes, indices, np.full(pool.nodes.operation.size, -1, np.int64))
+    for again in (link(terms), link(terms)):
+        for found, column in zip(again, expected, strict=True):
+            np.testing.assert_array_equal(found, column)
+
+
+def test_function_with_the_name_of_a_built_in_one_keeps_its_address():
+    item, own = made("tanh(u(k-1))"), replace(primitive("mine", lambda a: a + 1.0), name="tanh")
+    link([item])
+    assert link([Apply(own, (Lagged(1, 1),))]).addresses.tolist() == [row_address(own)]
+    assert link([item]).addresses.tolist() == [row_address(PRIMITIVES["tanh"])]
+
+
+def test_zeros_of_both_signs_keep_their_sign():
+    for zero in (0.0, -0.0, 0.0):
+        (found,) = link([Apply(PRIMITIVES["max"], (Lagged(1, 1), Constant(zero)))]).constants
+        assert math.copysign(1.0, found) == math.copysign(1.0, zero)
+
+
+def test_pool_of_recent_terms_is_bounded():
+    for lag in range(1, 3 * term_pool._MOST_NODES):
+        link([Lagged(1, lag)])
+    assert len(term_pool._RECENT.pool) <= term_pool._MOST_NODES + 1
+    assert term_pool._RECENT.pool.nodes.operation.size <= 2 * term_pool._MOST_NODES
