@@ -6,6 +6,8 @@ constant output at constant input, at every level and on both branches (Property
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,13 +160,12 @@ def check_physics(model: DynamicModel, record: Dataset) -> PhysicsChecks:
         Complete record that defines the ranges, the rate, the bound and the initial output.
     """
     record = match_record(model, record)
-    period = _choose_period(record, model.maximum_lag)
-    scenarios = [*_make_holds(period), *_make_excursions(period)]
-    simulated = list(_simulate(model, record, [signal for _, signal in scenarios]))
+    plan = _plan_checks(record, model.maximum_lag)
+    simulated = list(_simulate(model, record, plan.excitations))
     holds, excursions = [], []
-    for (kind, signal), y in zip(scenarios, simulated, strict=True):
+    for (kind, signal), y in zip(plan.scenarios, simulated, strict=True):
         if isinstance(kind, tuple):
-            at_rest = y[len(y) - HOLD_PERIODS * period + model.maximum_lag :]
+            at_rest = y[len(y) - HOLD_PERIODS * plan.period + model.maximum_lag :]
             holds.append(_evaluate_hold(kind, at_rest, record.output_range))
         else:
             excursions.append(_evaluate_excursion(kind, signal, y, record.output_range))
@@ -204,7 +205,8 @@ def hold_response(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the input (in fractions of its amplitude) and the output of one hold, for a figure."""
     signal = _make_hold(_choose_period(record, model.maximum_lag), level, loading)
-    return signal, next(_simulate(model, record, [signal]))
+    excitations = _make_excitations(record, model.maximum_lag, [signal])
+    return signal, next(_simulate(model, record, excitations))
 
 
 def _choose_period(record: Dataset, maximum_lag: int) -> int:
@@ -218,6 +220,23 @@ def _choose_period(record: Dataset, maximum_lag: int) -> int:
 
 #: Name of an excursion, or (level, loading) of a hold.
 _Kind = str | tuple[float, bool]
+
+
+class _Plan(NamedTuple):
+    """Checks of all models with a largest lag on a record, and the record of their excitations."""
+
+    period: int
+    scenarios: list[tuple[_Kind, NDArray[np.float64]]]
+    excitations: Dataset
+
+
+# The excitations of recent calls are kept, like their layouts: a fit checks many models on one record.
+@lru_cache(maxsize=8)
+def _plan_checks(record: Dataset, maximum_lag: int) -> _Plan:
+    period = _choose_period(record, maximum_lag)
+    scenarios = [*_make_holds(period), *_make_excursions(period)]
+    signals = [signal for _, signal in scenarios]
+    return _Plan(period, scenarios, _make_excitations(record, maximum_lag, signals))
 
 
 def _make_holds(period: int) -> list[tuple[_Kind, NDArray[np.float64]]]:
@@ -247,18 +266,15 @@ def _make_excursions(period: int) -> list[tuple[_Kind, NDArray[np.float64]]]:
     return excursions
 
 
-def _simulate(
-    model: DynamicModel, record: Dataset, signals: Sequence[NDArray[np.float64]]
-) -> Iterator[NDArray[np.float64]]:
-    """Yield the model's output for every signal, NaN after a divergence.
+def _make_excitations(record: Dataset, warm_up: int, signals: Sequence[NDArray[np.float64]]) -> Dataset:
+    """Return a record with a segment for every signal.
 
-    Each simulation starts at the midpoint of the input ranges, with the measured output of the sample whose
+    Each segment starts at the midpoint of the input ranges, with the measured output of the sample whose
     inputs are nearest to it.
     """
     midpoint = (record.u.max(axis=0) + record.u.min(axis=0)) / 2
     amplitude = np.ptp(record.u, axis=0) / 2
     nearest = int(np.argmin(np.abs(record.u - midpoint).sum(axis=1)))
-    warm_up = model.maximum_lag
     recordings = []
     for signal in signals:
         u = midpoint + amplitude * np.concatenate([np.zeros(warm_up), signal])[:, None]
@@ -270,10 +286,14 @@ def _simulate(
                 preprocessing=record.preprocessing,
             )
         )
-    joined = join(tuple(recordings))
-    simulated = free_run(model, joined, bound=divergence_bound(record.y)).y
-    for begin, end in joined.bounds:
-        yield simulated[begin + warm_up : end]
+    return join(tuple(recordings))
+
+
+def _simulate(model: DynamicModel, record: Dataset, excitations: Dataset) -> Iterator[NDArray[np.float64]]:
+    """Yield the model's output in every segment of the excitations, NaN after a divergence."""
+    simulated = free_run(model, excitations, bound=divergence_bound(record.y)).y
+    for begin, end in excitations.bounds:
+        yield simulated[begin + model.maximum_lag : end]
 
 
 def _evaluate_hold(kind: tuple[float, bool], y: NDArray[np.float64], output_range: float) -> HoldTest:

@@ -7,6 +7,7 @@ import islands
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.estimate import estimate
+from islands.simulation.layout import layout
 from islands.validation.physics import LEVELS, ClusterSum, check_physics, cluster_sums, hold_response
 
 PERIOD = 200
@@ -160,6 +161,15 @@ def test_divergence_gives_infinite_values_without_a_warning():
 
 
 # Excursions.
+
+
+def test_models_with_one_largest_lag_share_the_layout_of_their_excitations():
+    measured = record()
+    check_physics(model(HYSTERESIS), measured)
+    before = layout.cache_info()
+    check_physics(model({"y(k-1)": 0.5, "u(k-2)": 0.5}), measured)
+    after = layout.cache_info()
+    assert (after.hits, after.misses) == (before.hits + 1, before.misses)
 
 
 def test_excursions_are_minor_loops_half_amplitude_and_other_rates():
