@@ -16,7 +16,7 @@ from islands.errors import RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.err_targets import ERR_TARGETS
 from islands.evolution.fitness import FITNESSES
-from islands.evolution.gene_index import ZERO, GeneIndex
+from islands.evolution.gene_index import GeneIndex
 from islands.evolution.individual import Individual
 from islands.evolution.settings import Settings
 from islands.expressions.tree import Expression, Lagged
@@ -223,16 +223,11 @@ class Evaluator:
             Number of individuals whose terms, after pruning, occur earlier in the population or in the cache.
         """
         self._enforce_limits()
-        index_of = self._gene_index.index_of
-        genes: list[dict[int, Expression]] = []
-        keys: list[_Key] = []
-        for individual, pruned in population:
-            by_number: dict[int, Expression] = {}
-            for gene in individual.genes:
-                by_number.setdefault(index_of(gene), gene)
-            by_number.pop(ZERO, None)
-            genes.append(by_number)
-            keys.append((frozenset(by_number), pruned))
+        number_genes = self._gene_index.number_genes
+        genes = [number_genes(individual.genes) for individual, _ in population]
+        keys = [
+            (frozenset(numbered), pruned) for numbered, (_, pruned) in zip(genes, population, strict=True)
+        ]
         self._check_lags()
         largest = max(map(len, genes), default=0)
         allowed = np.full(max(largest + 1, len(thresholds or ())), inf)
@@ -249,8 +244,8 @@ class Evaluator:
         )
         cache.update(zip(missing, self._evaluate_terms(missing, allowed), strict=True))
         evaluated = tuple(
-            _make_evaluated(individual, by_number, cache[terms], allowed)
-            for (individual, _), by_number, terms in zip(population, genes, remaining, strict=True)
+            _make_evaluated(individual, numbered, cache[terms], allowed)
+            for (individual, _), numbered, terms in zip(population, genes, remaining, strict=True)
         )
         return evaluated, len(keys) - len(missing)
 
@@ -275,7 +270,8 @@ class Evaluator:
 
     def _select_terms(self, keys: Sequence[_Key]) -> list[_Terms]:
         """Return the terms of structures that pruning and constraints leave."""
-        structures = [tuple(sorted(numbers, key=self._gene_index.content)) for numbers, _ in keys]
+        ranks = self._gene_index.rank(set().union(*(numbers for numbers, _ in keys)))
+        structures = [tuple(sorted(numbers, key=ranks.__getitem__)) for numbers, _ in keys]
         pruned = np.array([decision for _, decision in keys], np.bool_)
         remaining: list[_Terms] = []
         for part, given in self._make_batches(structures):
@@ -297,7 +293,7 @@ class Evaluator:
                 evaluations.append(
                     Evaluation(
                         numbers,
-                        tuple([self._gene_index.regressor(number) for number in numbers]),
+                        self._gene_index.regressors(numbers),
                         tuple(parameters[:length]) if outcome is OK else (),
                         float(allowed[length]) if outcome is _ABANDONED else squares / self._predicted,
                         outcome,

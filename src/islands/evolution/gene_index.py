@@ -1,6 +1,7 @@
 """Index of the genes of a search: it maps every gene to the number of its regressor."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from operator import itemgetter
 
 import numpy as np
 
@@ -93,13 +94,35 @@ class GeneIndex:
             known = self._known[gene] = self._add(gene)
         return known
 
-    def regressor(self, number: int) -> Regressor:
-        """Return the regressor with a number."""
-        return self._regressors[number]
+    def number_genes(self, genes: Iterable[Expression]) -> dict[int, Expression]:
+        """Return genes by the number of their regressor, without those of the number `ZERO`.
 
-    def content(self, number: int) -> tuple[object, ...]:
-        """Return the sort key of the regressor with a number."""
-        return self._regressors[number].content
+        The first of several genes with one number is kept. New genes are added.
+        """
+        known, found = self._known, {}
+        for gene in genes:
+            number = known.get(gene)
+            if number is None:
+                number = known[gene] = self._add(gene)
+            if number not in found:
+                found[number] = gene
+        found.pop(ZERO, None)
+        return found
+
+    def regressors(self, numbers: Iterable[int]) -> tuple[Regressor, ...]:
+        """Return the regressors with some numbers."""
+        return tuple(map(self._regressors.__getitem__, numbers))
+
+    def rank(self, numbers: Iterable[int]) -> dict[int, int]:
+        """Return the rank of each number in the order of the contents of the regressors."""
+        ranks: dict[int, int] = {}
+        previous = None
+        for content, number in sorted(
+            ((self._regressors[number].content, number) for number in numbers), key=itemgetter(0)
+        ):
+            ranks[number] = len(ranks) if content != previous else ranks[last]
+            previous, last = content, number
+        return ranks
 
     def _add(self, gene: Expression) -> int:
         regressor = make_regressor(gene)

@@ -5,7 +5,7 @@ adds the gene that reduces the shooting error most, exchanges single genes as lo
 continues with the next size. Its structures seed the evolution, which is not bound to the pool.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 from math import inf, isfinite
 
@@ -70,7 +70,7 @@ def swap_search(
             break
         steps.report(f"swap search among {len(pool)} candidates: {len(best) + 1} terms", None)
         found = search.evaluate(((*best, gene) for gene in pool if gene not in best), inf)
-        start = min((each for each in (found, search.best(len(best) + 1)) if each), key=_order, default=None)
+        start = _find_best([each for each in (found, search.best(len(best) + 1)) if each])
         if start is None or start.size <= len(best):
             break
         exchanged = search.exchange(start, skip)
@@ -100,7 +100,7 @@ class _SwapSearch:
         found = [each for each in evaluated if isfinite(each.fitness)]
         for each in found:
             self._seen.setdefault(each.size, {}).setdefault(each.key, each)
-        return min(found, key=_order, default=None)
+        return _find_best(found)
 
     def exchange(self, start: Individual, skip: Callable[[], bool]) -> Individual:
         """Exchange single genes, each time the best exchange of all, as long as the error falls."""
@@ -109,13 +109,9 @@ class _SwapSearch:
         while not (self.is_exhausted or skip()):
             genes = best.genes
             free = [place for place, gene in enumerate(genes) if gene not in required]
+            others = [gene for gene in self._pool if gene not in genes]
             exchanged = self.evaluate(
-                (
-                    (*genes[:place], gene, *genes[place + 1 :])
-                    for place in free
-                    for gene in self._pool
-                    if gene not in genes
-                ),
+                ((*genes[:place], gene, *genes[place + 1 :]) for place in free for gene in others),
                 _ABANDON_FACTOR * best.fitness,
             )
             if exchanged is None or not exchanged.fitness < (1.0 - _MIN_GAIN) * best.fitness:
@@ -125,13 +121,21 @@ class _SwapSearch:
 
     def best(self, size: int) -> Individual | None:
         """Return the best structure of a size."""
-        return min(self._seen.get(size, {}).values(), key=_order, default=None)
+        return _find_best(self._seen.get(size, {}).values())
 
     def ranked(self, depth: int) -> tuple[Population, ...]:
         """Return the best structures of every size."""
         return tuple(
             tuple(sorted(found.values(), key=_order)[:depth]) for _, found in sorted(self._seen.items())
         )
+
+
+def _find_best(individuals: Collection[Individual]) -> Individual | None:
+    """Return the first individual by `_order`, whose texts decide between equal errors only."""
+    least = min(((-each.size, each.fitness) for each in individuals), default=None)
+    return min(
+        (each for each in individuals if (-each.size, each.fitness) == least), key=_order, default=None
+    )
 
 
 def _order(individual: Individual) -> tuple[int, float, tuple[str, ...]]:

@@ -42,15 +42,13 @@ class Regressor:
     text: str = field(init=False, repr=False)
     #: Key of the canonical order.
     content: tuple[object, ...] = field(init=False, repr=False, compare=False)
+    #: Pairs (channel, lag) that the regressor reads; channel 0 is y.
+    lags: frozenset[tuple[int, int]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "text", plain(self.expression, inputs=2))
         object.__setattr__(self, "content", content(self.expression))
-
-    @property
-    def lags(self) -> frozenset[tuple[int, int]]:
-        """Pairs (channel, lag) that the regressor reads; channel 0 is y."""
-        return lags(self.expression)
+        object.__setattr__(self, "lags", lags(self.expression))
 
     @property
     def degree(self) -> int:
