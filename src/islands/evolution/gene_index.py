@@ -116,12 +116,12 @@ class GeneIndex:
     def rank(self, numbers: Iterable[int]) -> dict[int, int]:
         """Return the rank of each number in the order of the contents of the regressors."""
         ranks: dict[int, int] = {}
-        previous = None
-        for content, number in sorted(
-            ((self._regressors[number].content, number) for number in numbers), key=itemgetter(0)
-        ):
-            ranks[number] = len(ranks) if content != previous else ranks[last]
-            previous, last = content, number
+        rank, previous = 0, None
+        contents = ((self._regressors[number].content, number) for number in numbers)
+        for content, number in sorted(contents, key=itemgetter(0)):
+            if content != previous:
+                rank = len(ranks)
+            ranks[number], previous = rank, content
         return ranks
 
     def _add(self, gene: Expression) -> int:
