@@ -1,7 +1,6 @@
 """Index of the genes of a search: it maps every gene to the number of its regressor."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from operator import itemgetter
 
 import numpy as np
 
@@ -115,14 +114,8 @@ class GeneIndex:
 
     def rank(self, numbers: Iterable[int]) -> dict[int, int]:
         """Return the rank of each number in the order of the contents of the regressors."""
-        ranks: dict[int, int] = {}
-        rank, previous = 0, None
-        contents = ((self._regressors[number].content, number) for number in numbers)
-        for content, number in sorted(contents, key=itemgetter(0)):
-            if content != previous:
-                rank = len(ranks)
-            ranks[number], previous = rank, content
-        return ranks
+        ordered = sorted(numbers, key=lambda number: self._regressors[number].content)
+        return {number: rank for rank, number in enumerate(ordered)}
 
     def _add(self, gene: Expression) -> int:
         regressor = make_regressor(gene)
