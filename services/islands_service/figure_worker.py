@@ -35,7 +35,8 @@ from islands.io.result_models import read_shooting_interval
 from islands.models.coupled_narx import CoupledModel
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
-from islands.simulation.predictors import Simulation, free_run
+from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands.validation.prediction_bands import PredictionBand
 from islands_service.domain.job import REPORT, Job
@@ -192,7 +193,7 @@ def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     bands = entry.bands
     band = None if bands is None else bands.predict(entry.model, data, warm_up=entry.warm_up)
     run = free_run(entry.model, data, entry.warm_up)
-    made[f"{rank}/free-run.json"] = _free_run_document(data, run, band)
+    made[f"{rank}/free-run.json"] = _free_run_document(data, run.y, run.outcome, band)
     return made
 
 
@@ -220,7 +221,7 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
     for number, (each, y, band) in enumerate(zip(data.records, run.y.T, bands, strict=True), start=1):
         figures.append(_svg(draw_free_run(each, y, band=band)))
         made[f"1/free-run-{number}.svg"] = figures[-1]
-        made[f"1/free-run-{number}.json"] = _free_run_document(each, Simulation(y, (), run.outcome), band)
+        made[f"1/free-run-{number}.json"] = _free_run_document(each, y, run.outcome, band)
     words = str((job.summary or {}).get("words", "")).splitlines()
     sentences = [*words[:1], *words[2:]]  # the second one is the equations
     terms = stored.document["terms"]
@@ -234,18 +235,20 @@ def _svg(figure: Any) -> bytes:
     return stream.getvalue()
 
 
-def _free_run_document(data: Dataset, simulated: Simulation, band: PredictionBand | None) -> bytes:
+def _free_run_document(
+    data: Dataset, simulated: NDArray[np.float64], outcome: EvaluationOutcome, band: PredictionBand | None
+) -> bytes:
     """Return the validation data and a free run of one output as JSON, downsampled to `MAX_POINTS`."""
     every = max(1, -(-data.samples // MAX_POINTS))
     kept = slice(None, None, every)
     time = data.start + data.dt * np.arange(data.samples)
     document = {
-        "outcome": str(simulated.outcome),
+        "outcome": str(outcome),
         "every": every,
         "time_s": time[kept].tolist(),
         "inputs": {name: data.u[kept, index].tolist() for index, name in enumerate(data.input_names)},
         "measured": data.y[kept].tolist(),
-        "free_run": _finite_values(simulated.y[kept]),
+        "free_run": _finite_values(simulated[kept]),
     }
     if band is not None:
         document["band"] = {

@@ -1,7 +1,8 @@
 """Identification job: the search on Ray, its progress, its checkpoints and its result."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from math import isfinite
 from time import monotonic, sleep
 from typing import Any
@@ -63,33 +64,26 @@ def run_identification_job(run: JobRun) -> JobOutcome:
     try:
         if len(spec.outputs) > 1:
             coupled = _identify_outputs(record, validation, spec, start, run.engine, reporter, stop)
-            return _end_outputs(coupled, start.note, stop)
+            return _end_job(partial(make_coupled_outcome, coupled), coupled.left_out, start.note, stop)
         found = _identify(record, validation, spec, start, run.engine, reporter, stop)
     except StoppedError as stopped:
         raise stop.reason or stopped from stopped
-    if not found.search.left_out:
-        return make_outcome(found, start.note)
+    return _end_job(partial(make_outcome, found), found.search.left_out, start.note, stop)
+
+
+def _end_job(
+    make: Callable[..., JobOutcome], left_out: Sequence[str], note: str, stop: "SearchStop"
+) -> JobOutcome:
+    """Return the outcome of a search that is complete, cancelled, or at its limit of run time."""
+    if not left_out:
+        return make(note)
     if not isinstance(stop.reason, RunTimeLimitError):
-        return replace(make_outcome(found, start.note), state=JobState.CANCELLED)
-    ended = replace(found, search=replace(found.search, ended_by=RUN_TIME))
-    return make_outcome(ended, _explain_limit(start.note, stop.reason))
-
-
-def _explain_limit(note: str, reason: RunTimeLimitError) -> str:
+        return replace(make(note), state=JobState.CANCELLED)
     limit = (
-        f"the search ended at the limit of the run time of one job, {reason.limit} s, with its "
+        f"the search ended at the limit of the run time of one job, {stop.reason.limit} s, with its "
         "best models so far; the operator can raise the limit"
     )
-    return "; ".join(filter(None, [note, limit]))
-
-
-def _end_outputs(found: CoupledResult, note: str, stop: "SearchStop") -> JobOutcome:
-    """Return the outcome of the searches of several outputs."""
-    if not found.left_out:
-        return make_coupled_outcome(found, note)
-    if not isinstance(stop.reason, RunTimeLimitError):
-        return replace(make_coupled_outcome(found, note), state=JobState.CANCELLED)
-    return make_coupled_outcome(found, _explain_limit(note, stop.reason), RUN_TIME)
+    return make("; ".join(filter(None, [note, limit])), RUN_TIME)
 
 
 class SearchStop:
@@ -152,16 +146,25 @@ def _identify(
         record,
         validation=validation,
         preset=preset,
-        seed=spec.seed,
-        progress=reporter.report_stage,
-        on_epoch=reporter,
-        stop=stop,
-        start=start.state,
-        engine=engine,
-        **spec.changes,
+        **_list_arguments(spec, start, engine, reporter, stop),
     )
     reporter.flush()
     return result.with_wall_time(reporter.spent).search_result
+
+
+def _list_arguments(
+    spec: Identification, start: JobStart, engine: Engine, reporter: "ProgressReporter", stop: SearchStop
+) -> dict[str, Any]:
+    """Return the arguments that the search of one output and those of several share."""
+    return {
+        "seed": spec.seed,
+        "progress": reporter.report_stage,
+        "on_epoch": reporter,
+        "stop": stop,
+        "start": start.state,
+        "engine": engine,
+        **spec.changes,
+    }
 
 
 def _identify_outputs(
@@ -178,13 +181,7 @@ def _identify_outputs(
         couple(record, outputs),
         validation=couple(validation, outputs) if isinstance(validation, Dataset) else validation,
         preset=spec.preset,
-        seed=spec.seed,
-        progress=reporter.report_stage,
-        on_epoch=reporter,
-        stop=stop,
-        start=start.state,
-        engine=engine,
-        **spec.changes,
+        **_list_arguments(spec, start, engine, reporter, stop),
     )
     reporter.flush()
     return result.with_wall_time(reporter.spent)
@@ -212,8 +209,19 @@ def make_coupled_outcome(found: CoupledResult, note: str = "", ended_by: str = "
     return JobOutcome(JobState.SUCCEEDED, document, ((models[0], model_json(found.model)),), summary)
 
 
-def make_outcome(found: SearchResult, note: str = "") -> JobOutcome:
-    """Return the part of a search result that the store keeps, with a note for the owner in its summary."""
+def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> JobOutcome:
+    """Return the part of a search result that the store keeps.
+
+    Parameters
+    ----------
+    found : SearchResult
+    note : str
+        For the owner, in the summary.
+    ended_by : str
+        What ended the search, if it is not known to the search.
+    """
+    if ended_by:
+        found = replace(found, search=replace(found.search, ended_by=ended_by))
     document = result_document(found)
     models = document.pop("models")
     recommended = document["recommended"]

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import islands
 from islands.cli.console import output
 from islands.errors import SettingsError
 
@@ -40,5 +41,5 @@ def check_folder(folder: Path, force: bool, result: str = "result.json") -> None
 def show_result(result: "Result | CoupledResult", folder: Path) -> None:
     """Print the summary and the files of a result."""
     output.print(str(result), markup=False)
-    files = COUPLED_FILES if hasattr(result, "ranks") else RESULT_FILES
+    files = COUPLED_FILES if isinstance(result, islands.CoupledResult) else RESULT_FILES
     output.print(f"{folder}/: {files}", markup=False)

@@ -209,7 +209,7 @@ def make_ensemble(
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(position,)))
         drawn = draw_parameters(model, split.estimation, candidate.interval, constraints, warm_up, count, rng)
         # The divergence of a member gives NaN, which is not plausible either.
-        predicted = _predicted(free_run(model, split.validation, warm_up).y)
+        predicted = find_predicted(free_run(model, split.validation, warm_up).y)
         runs = free_runs(model, drawn, split.validation, warm_up)
         errors = mean_squares(split.validation, runs, predicted)
         plausible = errors <= _IMPLAUSIBLE * candidate.error + floor
@@ -248,7 +248,7 @@ def mean_squares(
     return relative
 
 
-def _predicted(y: NDArray[np.float64]) -> NDArray[np.bool_]:
+def find_predicted(y: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which samples of a simulation of one or several outputs have a value, shape (samples,)."""
     found: NDArray[np.bool_] = ~np.isnan(y.reshape(len(y), -1)[:, 0])
     return found
@@ -275,7 +275,7 @@ def _weigh(
     if not candidates:
         return []
     best = free_run(candidates[0].model, validation, warm_up).y
-    residual = (validation.y - best)[_predicted(best)]
+    residual = (validation.y - best)[find_predicted(best)]
     count = sum(map(effective_samples, np.atleast_2d(residual.T)))
     errors = np.array([candidate.error for candidate in candidates]) + floor
     # The floor is 0 if the output is constant, and the ratio of two errors remains finite.

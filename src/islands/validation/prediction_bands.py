@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import CoupledSplit
+from islands.data.coupled_record import AnyRecord, CoupledSplit
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError
@@ -155,7 +155,10 @@ def calibrate_bands(
     tuple of PredictionBands or None
         None for a model that diverges on the estimation or the validation data.
     """
-    parts = [(record, ensemble.simulate(record, warm_up)) for record in (split.estimation, split.validation)]
+    parts = [
+        (record, _simulate_samples(ensemble, record, warm_up))
+        for record in (split.estimation, split.validation)
+    ]
 
     def calibrate(model: DynamicModel) -> PredictionBands | None:
         simulated = [free_run(model, record, warm_up) for record, _ in parts]
@@ -184,15 +187,14 @@ def calibrate_output_bands(
     """
     found = []
     parts = [
-        (record, free_run(model, record, warm_up), ensemble.simulate(record, warm_up))
+        (record, free_run(model, record, warm_up), _simulate_samples(ensemble, record, warm_up))
         for record in (split.estimation, split.validation)
     ]
     if not all(run.outcome for _, run, _ in parts):
         return ()
     for place in range(len(model.models)):
         outputs = [
-            _Output(record.records[place].y, run.y[:, place], runs[:, :, place])
-            for record, run, runs in parts
+            _Output(record.records[place].y, run.y[:, place], runs[..., place]) for record, run, runs in parts
         ]
         if (calibrated := _calibrate(ensemble, outputs)) is None:
             return ()
@@ -200,9 +202,19 @@ def calibrate_output_bands(
     return tuple(found)
 
 
+def _list_samples(samples: int) -> NDArray[np.int64]:
+    """Return the samples of a part of the data that calibrate the bands, at equal distances."""
+    return np.arange(0, samples, -(-samples // _SAMPLES))
+
+
+def _simulate_samples(ensemble: Ensemble, record: AnyRecord, warm_up: int) -> NDArray[np.float64]:
+    """Return the free runs of the ensemble at these samples."""
+    return ensemble.simulate(record, warm_up)[:, _list_samples(record.samples)]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Output:
-    """Measured output, free run of the model, and free runs of the ensemble, on a part of the data."""
+    """Measured output and free run on a part of the data, and runs of the ensemble at some samples."""
 
     y: NDArray[np.float64]
     run: NDArray[np.float64]
@@ -214,8 +226,8 @@ def _calibrate(ensemble: Ensemble, parts: Sequence[_Output]) -> PredictionBands 
     for part in parts:
         residual = part.y - part.run
         count += effective_samples(residual[~np.isnan(residual)])
-        samples = np.arange(0, len(residual), -(-len(residual) // _SAMPLES))
-        spread = ensemble.spread(part.runs[:, samples], part.run[samples])
+        samples = _list_samples(len(residual))
+        spread = ensemble.spread(part.runs, part.run[samples])
         known = ~np.isnan(residual[samples]) & np.isfinite(spread)
         residuals.append(np.abs(residual[samples][known]))
         spreads.append(spread[known])

@@ -10,7 +10,7 @@ from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model
 from islands.progress import Steps
 from islands.simulation.predictors import free_run
-from islands.validation.ensemble import ValidatedModel, make_ensemble, mean_squares
+from islands.validation.ensemble import ValidatedModel, find_predicted, make_ensemble, mean_squares
 from islands.validation.prediction_bands import PredictionBands, calibrate_output_bands
 
 #: Name of the step.
@@ -79,5 +79,4 @@ def _validate(model: CoupledModel, data: CoupledSplit, warm_up: int) -> float:
     run = free_run(model, data.validation, warm_up)
     if not run.outcome:
         return np.inf
-    predicted = ~np.isnan(run.y[:, 0])
-    return float(mean_squares(data.validation, run.y[None], predicted)[0])
+    return float(mean_squares(data.validation, run.y[None], find_predicted(run.y))[0])
