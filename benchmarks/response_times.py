@@ -100,9 +100,9 @@ def command(name: str, *arguments: str, out: bool = False) -> Row:
     return row
 
 
-def reads_fit(name: str, *arguments: str) -> Row:
+def reads_fit(name: str, *arguments: str, out: bool = False) -> Row:
     """Return a row whose command reads a fit, which is made once."""
-    once = command(name, *arguments)
+    once = command(name, *arguments, out=out)
 
     def row(checkout: Checkout) -> Mapping[str, float]:
         if not (checkout.folder / "fitted").exists():
@@ -252,10 +252,7 @@ ROWS: Mapping[str, Row] = {
     "inspect": command("inspect, 500 samples", "inspect", "process500.csv"),
     "fit": command("fit, 500 samples", "fit", "process500.csv", *PAIR, out=True),
     "fit-long": command("fit, 100000 samples", "fit", "process100000.csv", *PAIR, out=True),
-    "simulate": reads_fit(
-        "simulate, 500 samples",
-        *("simulate", "fitted", "process500.csv", "--out", "simulated.csv", "--force"),
-    ),
+    "simulate": reads_fit("simulate, 500 samples", "simulate", "fitted", "process500.csv", out=True),
     "show": reads_fit("show", "show", "fitted"),
     "diagnose": command(
         "diagnose linear:1, 3000 samples",
