@@ -26,7 +26,7 @@ from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import Recommendation, recommend, recommend_fittest
 
 #: Name of the step that makes the ensemble and the prediction bands.
-_BANDS = "prediction bands"
+BANDS = "prediction bands"
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,17 +169,17 @@ def with_bands(
 
     Once a stop is requested, the result has neither. It is marked as stopped if any step was left out.
     """
-    steps.report(_BANDS, 1.0)
-    skip = partial(steps.skip, _BANDS)
+    steps.report(BANDS, 1.0)
+    skip = partial(steps.skip, BANDS)
     ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed, skip)
     if skip() or ensemble is None:
-        return _mark_stopped(found, steps)
+        return mark_stopped(found, steps)
     calibrated = calibrate_bands([entry.model for entry in found.models], ensemble, found.split, warm_up)
     models = tuple(replace(entry, bands=bands) for entry, bands in zip(found.models, calibrated, strict=True))
-    return _mark_stopped(replace(found, models=models, ensemble=ensemble), steps)
+    return mark_stopped(replace(found, models=models, ensemble=ensemble), steps)
 
 
-def _mark_stopped(found: SearchResult, steps: Steps) -> SearchResult:
+def mark_stopped(found: SearchResult, steps: Steps) -> SearchResult:
     """Return a search result with the steps that were left out; the same result if there are none."""
     if not steps.left_out:
         return found

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from math import isfinite
+from math import inf, isfinite
 from typing import Protocol, TypeAlias, TypeVar
 
 from islands.data.dataset import Dataset
@@ -21,11 +21,11 @@ from islands.evolution.individual import Individual, unique_structures
 from islands.evolution.problem import Problem
 from islands.evolution.search_result import rank_models
 from islands.evolution.settings import Settings
-from islands.models.narx import Model, require_narx
+from islands.models.narx import require_narx
 from islands.models.protocol import DynamicModel
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import free_run, multiple_shooting
+from islands.simulation.predictors import free_run, free_run_error, multiple_shooting
 from islands.validation.assessment import Assessment, assess
 from islands.validation.ensemble import ValidatedModel
 
@@ -184,15 +184,19 @@ def screen(
         Number of individuals of each kind.
     """
     by_fitness = _take_fittest(individuals, len(individuals))
-    models = {
-        Model(
-            each.regressors, each.theta, validation.input_names, validation.output_name, validation.dt
-        ): each
-        for each in by_fitness
-    }
-    validated = _without_diverged(_validate(models, 1, validation, warm_up))
-    by_error = [models[require_narx(each.model)] for each in validated]
-    return list(unique_structures((*by_error[:most_valid], *by_fitness[:fittest])))
+    by_error: list[tuple[float, Individual]] = []
+    for each in by_fitness:
+        # A simulation ends as soon as its error exceeds that of the last of the best ones so far.
+        allowed = by_error[-1][0] if len(by_error) == most_valid else inf
+        error = free_run_error(each.regressors, each.theta, validation, warm_up, allowed)
+        if error < inf:
+            by_error = sorted([*by_error, (error, each)], key=_order_by_error)[:most_valid]
+    return list(unique_structures((*(each for _, each in by_error), *by_fitness[:fittest])))
+
+
+def _order_by_error(entry: tuple[float, Individual]) -> tuple[float, tuple[str, ...], tuple[float, ...]]:
+    error, individual = entry
+    return error, individual.key, individual.theta
 
 
 def _take_fittest(individuals: Sequence[Individual], most: int) -> list[Individual]:

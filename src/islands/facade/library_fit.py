@@ -32,6 +32,7 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
+    mark_stopped,
     rank_models,
     with_average,
     with_bands,
@@ -44,6 +45,7 @@ from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.rate_selection import select_rate
 from islands.models.candidate_library import full_set
+from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
 from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.simulation.outcome import EvaluationOutcome
@@ -78,6 +80,42 @@ class FitSettings:
             raise SettingsError(f"a shooting interval has at least 1 sample, got {self.shooting}")
 
 
+@dataclass(frozen=True, slots=True)
+class LibraryFit:
+    """Models of increasing size from one library, without prediction bands.
+
+    Attributes
+    ----------
+    found : SearchResult
+        Its models are at the rate of the split.
+    average : int
+        Number of samples of the record whose mean is one sample of the split.
+    estimates : list of ValidatedModel
+        All models that were estimated.
+    warm_up : int
+        Number of samples before the first prediction.
+    steps : Steps
+        Steps of the fit, with those that were left out.
+    """
+
+    found: SearchResult
+    average: int
+    estimates: list[ValidatedModel[DynamicModel]]
+    warm_up: int
+    steps: Steps
+
+    @property
+    def without_bands(self) -> SearchResult:
+        """Result without prediction bands."""
+        return with_average(mark_stopped(self.found, self.steps), self.average)
+
+    def complete(self) -> SearchResult:
+        """Return the result with prediction bands."""
+        constraints = self.found.settings["constraints"]
+        banded = with_bands(self.found, self.estimates, constraints, self.warm_up, self.steps)
+        return with_average(banded, self.average)
+
+
 def fit_library(
     record: Dataset,
     split: Split,
@@ -86,7 +124,7 @@ def fit_library(
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
-) -> SearchResult:
+) -> LibraryFit:
     """Fit models of increasing size from one library and rank them on the validation data.
 
     Parameters
@@ -114,7 +152,6 @@ def fit_library(
     RecordError
         The record is too short.
     """
-    constraints = library.constraints
     # At most a tenth of a short record.
     shooting = settings.shooting or min(SHOOTING, max(1, split.estimation.samples // 10))
     steps = Steps(progress, stop)
@@ -144,7 +181,7 @@ def fit_library(
         "degree": library.degree,
         "lags": library.lags,
         "delays": library.delays,
-        "constraints": constraints,
+        "constraints": library.constraints,
         **asdict(settings),
         "shooting": shooting,
     }
@@ -154,7 +191,7 @@ def fit_library(
         ValidatedModel(entry.model, minimised, entry.metrics["validation"]["free_run"].rmse ** 2)
         for entry in models
     ]
-    return with_average(with_bands(result, estimates, constraints, warm_up, steps), samples)
+    return LibraryFit(result, samples, estimates, warm_up, steps)
 
 
 def _estimate(

@@ -1,5 +1,6 @@
 """One-step-ahead prediction, multiple shooting and free run with the same kernel (the paper, section 2)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +10,12 @@ from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.data.dataset import Dataset
 from islands.data.signal_map import map_coupled_signals, map_signals
 from islands.errors import RecordError, SettingsError
-from islands.kernels.simulate import Layout, simulate
+from islands.kernels.simulate import COMPLETE, Layout, simulate
 from islands.kernels.summation import dot, total
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
+from islands.models.regressor import Regressor
 from islands.program.term_pool import link
 from islands.simulation.blocks import make_simulator
 from islands.simulation.layout import layout
@@ -165,6 +167,40 @@ def _require_one_output(record: AnyRecord) -> Dataset:
 def _diverged(y: NDArray[np.float64], sample: int, output: str, bound: float, outputs: int) -> Simulation:
     outcome = EvaluationOutcome(Status.DIVERGED, f"|{output}| left {bound:.3g} at sample {sample}")
     return Simulation(y, (np.inf,) * outputs, outcome)
+
+
+def free_run_error(
+    regressors: Sequence[Regressor],
+    theta: Sequence[float],
+    record: Dataset,
+    warm_up: int,
+    allowed: float = np.inf,
+) -> float:
+    """Return the mean squared error of a free run that stops as soon as its error exceeds an allowed one.
+
+    Parameters
+    ----------
+    regressors, theta
+        Terms of the model, and their parameters.
+    record : Dataset
+        Record in the units of the model, without missing outputs.
+    warm_up : int
+        Number of samples before the first prediction, at least the largest lag of the terms.
+    allowed : float
+        Largest mean squared error of interest.
+
+    Returns
+    -------
+    float
+        Infinite after a divergence, or if the mean squared error exceeds the allowed one.
+    """
+    cut = layout(record, warm_up)
+    squared_error = np.empty(len(cut.start))
+    diverged = np.empty(len(cut.start), np.int64)
+    samples, bound = int(cut.length.sum()), divergence_bound(record.y)
+    limits = cut, bound, allowed * samples, False
+    ending = simulate(link(regressors), np.array(theta), *limits, squared_error, diverged, np.empty(0))
+    return float(total(squared_error) / samples) if ending == COMPLETE else np.inf
 
 
 def free_runs(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import nan
 
 import numpy as np
@@ -34,6 +35,31 @@ _UNDEFINED = Metrics(nan, nan, nan, nan)
 _MIN_RESIDUALS = 3
 
 
+class Checks:
+    """Checks of a model that take longer than its errors: each is made when it is first read.
+
+    Parameters
+    ----------
+    model : DynamicModel
+    split : Split
+    warm_up : int or None
+        Number of samples before the first prediction. None is the model's largest lag.
+    """
+
+    def __init__(self, model: DynamicModel, split: Split, warm_up: int | None) -> None:
+        self._model, self._split, self._warm_up = model, split, warm_up
+
+    @cached_property
+    def physics(self) -> PhysicsChecks:
+        """Physics checks on the estimation data."""
+        return check_physics(self._model, self._split.estimation)
+
+    @cached_property
+    def residual(self) -> tuple[ResidualTests, ResidualStructure]:
+        """Tests of the residuals on the validation data; see `assess_residual`."""
+        return assess_residual(self._model, self._split.validation, self._warm_up)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Assessment:
     """A model with its errors, residual tests and physics checks.
@@ -48,12 +74,8 @@ class Assessment:
     information : InformationCriteria
         Information criteria of the one-step-ahead residual on the estimation data. NaN if it diverged. The
         number of parameters is that of the free ones: the terms minus the independent constraints.
-    residual_tests : ResidualTests
-        Tests of the one-step-ahead residual on the longest recording of the validation data. If the
-        prediction diverged, all tests failed and their notes give the reason.
-    residual_structure : ResidualStructure
-        Predictable part of the residuals on the same recording, and a verdict.
-    physics : PhysicsChecks
+    checks : Checks
+        Residual tests and physics checks, which are made when they are read.
     warm_up : int
         Number of samples before the first prediction of these simulations. The errors depend on it.
     squared_errors : ndarray, shape (samples,)
@@ -72,14 +94,30 @@ class Assessment:
     metrics: Mapping[str, Mapping[str, Metrics]]
     outcomes: Mapping[str, Mapping[str, EvaluationOutcome]]
     information: InformationCriteria
-    residual_tests: ResidualTests
-    residual_structure: ResidualStructure
-    physics: PhysicsChecks
+    checks: Checks
     warm_up: int
     squared_errors: NDArray[np.float64]
     constraints: tuple[ConstraintCheck, ...] = ()
     recordings: Mapping[str, Mapping[str, Metrics]] = field(default_factory=dict)
     bands: PredictionBands | None = None
+
+    @property
+    def physics(self) -> PhysicsChecks:
+        """Physics checks on the estimation data."""
+        return self.checks.physics
+
+    @property
+    def residual_tests(self) -> ResidualTests:
+        """Tests of the one-step-ahead residual on the longest recording of the validation data.
+
+        If the prediction diverged, all tests failed and their notes give the reason.
+        """
+        return self.checks.residual[0]
+
+    @property
+    def residual_structure(self) -> ResidualStructure:
+        """Predictable part of the residuals on the same recording, and a verdict."""
+        return self.checks.residual[1]
 
 
 def assess(
@@ -113,24 +151,26 @@ def assess(
     errors: dict[str, dict[str, Metrics]] = {}
     outcomes: dict[str, dict[str, EvaluationOutcome]] = {}
     recordings: dict[str, dict[str, Metrics]] = {}
-    runs: dict[str, Simulation] = {}
+    runs: dict[str, dict[str, Simulation]] = {}
     for part, record in zip(PARTS, (split.estimation, split.validation), strict=True):
-        runs = {mode: multiple_shooting(model, record, m, warm_up) for mode, m in intervals.items()}
-        outcomes[part] = {mode: run.outcome for mode, run in runs.items()}
+        found = {mode: multiple_shooting(model, record, m, warm_up) for mode, m in intervals.items()}
+        outcomes[part] = {mode: run.outcome for mode, run in found.items()}
         errors[part] = {
-            mode: metrics(record.y, run.y) if run.outcome else _UNDEFINED for mode, run in runs.items()
+            mode: metrics(record.y, run.y) if run.outcome else _UNDEFINED for mode, run in found.items()
         }
-        recordings[part] = _compute_recording_metrics(record, runs["free_run"])
+        recordings[part] = _compute_recording_metrics(record, found["free_run"])
+        runs[part] = found
+    first = model.maximum_lag if warm_up is None else warm_up
+    _find_longest_recording(split.validation, first)  # before the checks are read
+    free = count_free_parameters(model, constraints)
     return Assessment(
         model,
         errors,
         outcomes,
-        _compute_information(model, split.estimation, warm_up, constraints),
-        *assess_residual(model, split.validation, warm_up),
-        check_physics(model, split.estimation),
-        model.maximum_lag if warm_up is None else warm_up,
-        # The loop ends with the validation data.
-        _compute_squared_errors(split.validation, runs["free_run"]),
+        _compute_information(split.estimation, runs["estimation"]["one_step_ahead"], free),
+        Checks(model, split, warm_up),
+        first,
+        _compute_squared_errors(split.validation, runs["validation"]["free_run"]),
         check_constraints(model, constraints),
         recordings,
     )
@@ -151,14 +191,10 @@ def _compute_squared_errors(record: Dataset, run: Simulation) -> NDArray[np.floa
         return ((record.y - run.y) / (record.output_range or 1.0)) ** 2
 
 
-def _compute_information(
-    model: DynamicModel, record: Dataset, warm_up: int | None, constraints: str
-) -> InformationCriteria:
-    run = multiple_shooting(model, record, 1, warm_up)
-    if not run.outcome:
+def _compute_information(record: Dataset, one_step: Simulation, free: int) -> InformationCriteria:
+    if not one_step.outcome:
         return InformationCriteria(nan, nan, nan)
-    residual = (record.y - run.y)[~np.isnan(run.y)]
-    free = count_free_parameters(model, constraints)
+    residual = (record.y - one_step.y)[~np.isnan(one_step.y)]
     return information_criteria(float(np.add.reduce(residual**2)), len(residual), free)
 
 
@@ -179,16 +215,9 @@ def assess_residual(
     ModelError, RecordError, SettingsError
         As in `assess`.
     """
-    begin, end = max(record.bounds, key=lambda bounds: bounds[1] - bounds[0])
-    recording = record[begin:end]
     first = model.maximum_lag if warm_up is None else warm_up
+    recording = _find_longest_recording(record, first)
     samples = recording.samples - first
-    if samples < _MIN_RESIDUALS:
-        raise RecordError(
-            f"the longest recording of the validation data has {recording.samples} samples, of which the "
-            f"warm-up takes {first}: testing the residual takes {_MIN_RESIDUALS} more; "
-            "give a longer recording"
-        )
     runs = [multiple_shooting(model, recording, interval, warm_up) for interval in (1, None)]
     one_step, simulated = ((recording.y - run.y)[first:] if run.outcome else None for run in runs)
     structure = measure_structure(
@@ -200,6 +229,17 @@ def assess_residual(
     if one_step is None:
         tests = _mark_failed(tests, f"diverged: {runs[0].outcome.reason}")
     return tests, structure
+
+
+def _find_longest_recording(record: Dataset, warm_up: int) -> Dataset:
+    begin, end = max(record.bounds, key=lambda bounds: bounds[1] - bounds[0])
+    if end - begin - warm_up < _MIN_RESIDUALS:
+        raise RecordError(
+            f"the longest recording of the validation data has {end - begin} samples, of which the "
+            f"warm-up takes {warm_up}: testing the residual takes {_MIN_RESIDUALS} more; "
+            "give a longer recording"
+        )
+    return record[begin:end]
 
 
 def _mark_failed(tests: ResidualTests, reason: str) -> ResidualTests:

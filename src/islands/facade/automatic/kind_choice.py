@@ -13,8 +13,9 @@ from typing import Any
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.search_result import SearchResult
+from islands.evolution.search_result import BANDS, SearchResult
 from islands.facade.automatic.kind_trials import NO_DEAD_TIME, ROUNDING, KindTrials, percent, try_kinds
+from islands.facade.library_fit import LibraryFit
 from islands.facade.trials.library import TrialLibrary
 from islands.inspection.rest import check_rest
 from islands.progress import Steps, StoppedError
@@ -29,7 +30,7 @@ _CLOSE = 1.25
 CHOICE = "choice of the kind of record"
 
 #: Fits the library of a kind with the dead times of the trials.
-FitKind = Callable[[TrialLibrary], SearchResult]
+FitKind = Callable[[TrialLibrary], LibraryFit]
 
 
 class StoppedChoiceError(StoppedError):
@@ -114,7 +115,7 @@ def choose_kind(
     delays: Sequence[int] | None,
     fit_kind: FitKind,
     steps: Steps,
-) -> tuple[Choice, Mapping[str, SearchResult]]:
+) -> tuple[Choice, Mapping[str, LibraryFit]]:
     """Choose the kind of a record.
 
     The recommended models of the kinds are compared as `recommend` compares the models of a search: the
@@ -141,7 +142,7 @@ def choose_kind(
     Returns
     -------
     tuple of Choice and mapping
-        The choice, and the results of the kinds that were fitted.
+        The choice, and the fits of the kinds that were compared.
     """
     libraries = _drop_repeated(libraries)
     if not record.output_range > 0.0:
@@ -150,8 +151,9 @@ def choose_kind(
         nothing: Mapping[str, float] = MappingProxyType({})
         return Choice(kind, tuple(delays or ()), (sentence, NO_DEAD_TIME), nothing, nothing), {}
     trials = try_kinds(record, libraries, delays, steps)
-    results = _fit_promising(trials, libraries, fit_kind, steps)
-    compared = {kind: result.recommended for kind, result in results.items() if _is_bounded(result)}
+    fits = _fit_promising(trials, libraries, fit_kind, steps)
+    recommended = {kind: each.found.recommended for kind, each in fits.items()}
+    compared = {kind: model for kind, model in recommended.items() if _is_bounded(model)}
     errors = {kind: _measure(model, record) for kind, model in compared.items()}
     kind, reason = _select_kind(record, libraries, trials, compared, errors)
     choice = Choice(
@@ -161,7 +163,7 @@ def choose_kind(
         MappingProxyType(errors),
         MappingProxyType({kind: error for kind, error in trials.errors.items() if isfinite(error)}),
     )
-    return choice, results
+    return choice, fits
 
 
 def _drop_repeated(libraries: Mapping[str, TrialLibrary]) -> Mapping[str, TrialLibrary]:
@@ -175,32 +177,33 @@ def _fit_promising(
     libraries: Mapping[str, TrialLibrary],
     fit_kind: FitKind,
     steps: Steps,
-) -> dict[str, SearchResult]:
-    """Return the result of every promising kind; none if there is nothing to compare."""
+) -> dict[str, LibraryFit]:
+    """Return the fit of every promising kind; none if there is nothing to compare."""
     promising = [kind for kind in trials.promising if isfinite(trials.errors[kind])]
-    results: dict[str, SearchResult] = {}
+    fits: dict[str, LibraryFit] = {}
     if len(promising) > 1:
         for kind in promising:
             try:
                 steps(f"preset auto: fit of {kind}", None)
-                results[kind] = fit_kind(libraries[kind].with_delays(trials.delays))
-                if results[kind].search.ended_by is not None:
+                fits[kind] = fit_kind(libraries[kind].with_delays(trials.delays))
+                if fits[kind].steps.left_out:
                     raise StoppedError(f"preset auto: fit of {kind}")
             except StoppedError as stopped:
-                if not results:
+                if not fits:
                     raise
-                missing = [f"fit of {each}" for each in promising if each not in results]
-                raise StoppedChoiceError(stopped.step, _take_best(results, missing)) from stopped
+                missing = [f"fit of {each}" for each in promising if each not in fits]
+                found = [each.without_bands for each in fits.values()]
+                raise StoppedChoiceError(stopped.step, _take_best(found, missing)) from stopped
             except (SettingsError, RecordError, ModelError):
                 continue  # Another kind may have a model. If none has, the search reports what is wrong.
-    return results
+    return fits
 
 
-def _take_best(results: Mapping[str, SearchResult], missing: Sequence[str]) -> SearchResult:
+def _take_best(results: Sequence[SearchResult], missing: Sequence[str]) -> SearchResult:
     """Return the result with the least error on the validation data, with the steps that were left out."""
-    left_out = dict.fromkeys([each for found in results.values() for each in found.search.left_out])
-    best = min(results.values(), key=_validation_error)
-    search = replace(best.search, ended_by="stopped", left_out=(*left_out, *missing, CHOICE))
+    left_out = dict.fromkeys([each for found in results for each in found.search.left_out])
+    best = min(results, key=_validation_error)
+    search = replace(best.search, ended_by="stopped", left_out=(*left_out, *missing, CHOICE, BANDS))
     return replace(best, search=search)
 
 
@@ -209,9 +212,9 @@ def _validation_error(result: SearchResult) -> float:
     return error if isfinite(error) else inf
 
 
-def _is_bounded(result: SearchResult) -> bool:
-    """Return whether the free run of the recommended model on the validation data does not diverge."""
-    return bool(result.recommended.outcomes["validation"]["free_run"])
+def _is_bounded(model: Assessment) -> bool:
+    """Return whether the free run of a model on the validation data does not diverge."""
+    return bool(model.outcomes["validation"]["free_run"])
 
 
 def _measure(model: Assessment, record: Dataset) -> float:

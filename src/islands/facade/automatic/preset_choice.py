@@ -81,9 +81,10 @@ def fit_chosen_library(
     constraint(constraints or "none").check_inputs(record.inputs)
     fit_one = partial(fit_library, record, split, settings=settings, seed=seed, progress=progress, stop=stop)
     if library != AUTO:
-        return fit_one(take_library(library, degree, lags, constraints, delays or ()))
+        return fit_one(take_library(library, degree, lags, constraints, delays or ())).complete()
     kinds = resolve_kinds({} if constraints is None else {"constraints": constraints})
     libraries = {kind: take_library(each.library, degree, lags, constraints) for kind, each in kinds.items()}
-    choice, results = choose_kind(split.estimation, libraries, delays, fit_one, Steps(progress, stop))
-    found = results.get(choice.kind) or fit_one(libraries[choice.kind].with_delays(choice.delays))
+    choice, fits = choose_kind(split.estimation, libraries, delays, fit_one, Steps(progress, stop))
+    chosen = fits.get(choice.kind) or fit_one(libraries[choice.kind].with_delays(choice.delays))
+    found = chosen.complete()
     return replace(found, settings={**found.settings, "choice": choice.to_document()})

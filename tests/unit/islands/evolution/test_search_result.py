@@ -21,7 +21,7 @@ def entry(free_run, one_step=0.1, terms=("y(k-1)",), theta=0.5):
         },
     }
     model = islands.make_model([(islands.parse(text), theta) for text in terms])
-    return Assessment(model, errors, {}, None, None, None, None, 0, ())
+    return Assessment(model, errors, {}, None, None, 0, ())
 
 
 def assert_ranked_in_any_order(*expected):

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import nan, sqrt
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -43,9 +44,7 @@ class Candidate:
             },
             {"validation": {"free_run": OK if known else LOST}},
             None,
-            None,
-            None,
-            physics,
+            SimpleNamespace(physics=physics),
             0,
             np.asarray(self.blocks, dtype=float),
         )

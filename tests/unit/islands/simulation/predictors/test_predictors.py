@@ -14,7 +14,14 @@ from islands.expressions.parsing import parse
 from islands.models.narx import make_model
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, Status
-from islands.simulation.predictors import BOUND, divergence_bound, free_run, multiple_shooting, one_step_ahead
+from islands.simulation.predictors import (
+    BOUND,
+    divergence_bound,
+    free_run,
+    free_run_error,
+    multiple_shooting,
+    one_step_ahead,
+)
 
 SAMPLES = 300
 
@@ -260,3 +267,12 @@ def test_warm_up_shorter_than_the_largest_lag_is_refused(warm_up):
         one_step_ahead(chosen, record(), warm_up)
     assert str(caught.value) == f"the model reads 4 samples back, the warm-up has {warm_up}"
     assert one_step_ahead(chosen, record(), 4).outcome
+
+
+def test_a_free_run_with_an_allowed_error_has_the_same_error_or_an_infinite_one():
+    chosen, data = model((0.6, "y(k-1)"), (0.3, "u(k-1)")), record(segments=(100, 200))
+    error = free_run(chosen, data, 3).mean_squared_error
+    parts = chosen.regressors, chosen.parameters, data, 3
+    assert free_run_error(*parts) == free_run_error(*parts, error) == error
+    assert free_run_error(*parts, 0.99 * error) == math.inf
+    assert free_run_error(model((1.9, "y(k-1)")).regressors, (1.9,), data, 3) == math.inf
