@@ -73,7 +73,7 @@ print(parallel.best)
 
 # %%
 # The figure shows the best error of each island over the generations.
-parallel.save(out / "result")
+parallel.save(out / "result", figures=("islands",))
 shutil.copy(out / "result" / "figures" / "islands.svg", out / "islands.svg")
 
 # %%

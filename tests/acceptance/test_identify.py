@@ -24,7 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with undrawn_figures():
         succeed(
             *("identify", base / "record.csv", *COLUMNS, *BUDGET, "--generations", 6),
-            *("--test", 0.2, "--out", base / "whole"),
+            *("--test", 0.2, "--figures", "all", "--out", base / "whole"),
         )
     return base
 
@@ -41,7 +41,7 @@ def assert_same_search(one: Path, other: Path) -> None:
     searches = [stored(out)["search"] for out in (one, other)]
     for name in ("generations", "evaluations", "duplicates", "outcomes", "feasible_share", "full_set"):
         assert searches[0][name] == searches[1][name], name
-    for name in ("test.json", "figures/convergence.svg"):
+    for name in ("test.json", "figures/free-run.svg"):
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
 
 

@@ -31,7 +31,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def identify(base: Path, out: str, *options: object) -> str:
     """Identify the record with empty figures."""
     with undrawn_figures():
-        return succeed("identify", base / "record.csv", *COLUMNS, *BUDGET, *options, "--out", base / out)
+        return succeed(
+            *("identify", base / "record.csv", *COLUMNS, *BUDGET, *options),
+            *("--figures", "islands", "--out", base / out),
+        )
 
 
 @pytest.mark.ci

@@ -8,9 +8,6 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from islands.export import EXPORTS
-from islands.figures.registry import FIGURES, SEARCH_FIGURES
-from islands_api.web.routes.figures import MODEL_FIGURES
-from islands_api.web.routes.figures import SEARCH_FIGURES as NAMED
 from support.service import (
     columns,
     csv,
@@ -246,12 +243,6 @@ def test_an_unknown_export_format_is_rejected(service, finished):
     detail = problem_of(answer, 422, "invalid-settings")
     assert "cobol" in detail
     assert "python" in detail
-
-
-def test_figure_names_match_the_figure_registry():
-    """The web service does not import the registry, because importing matplotlib would delay its start."""
-    assert tuple(FIGURES) == MODEL_FIGURES
-    assert tuple(SEARCH_FIGURES) == NAMED
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from islands.figures.names import ALL_FIGURES
+
 Record = Annotated[
     Path, typer.Argument(help="The record: text, XLSX, NPZ, MAT, HDF5, Parquet, MDF or TDMS; also .gz, .zip.")
 ]
@@ -44,6 +46,13 @@ ModelFile = Annotated[
     typer.Argument(
         help="A model file, a result folder, an extended.json, ode:FILE.toml, fmu:FILE.fmu, or published:12, "
         ":13, :14."
+    ),
+]
+
+Figures = Annotated[
+    str,
+    typer.Option(
+        "--figures", help=f"Figures to draw, separated by commas: {', '.join(ALL_FIGURES)}; all; none."
     ),
 ]
 

@@ -17,9 +17,6 @@ from islands.models.operating_point import static_characteristic
 from islands.models.protocol import DynamicModel
 from islands.simulation.step_response import StepResponse, step_response
 
-#: Names of the figures of `draw_responses`.
-RESPONSES = ("characteristic", "step-response")
-
 #: Points of a characteristic; the equilibria of models with functions such as roots are searched.
 POINTS = 25
 

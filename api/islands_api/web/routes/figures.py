@@ -11,6 +11,7 @@ import structlog
 from fastapi import APIRouter, Path, Query, Response
 
 from islands.errors import IslandsError, suggest
+from islands.figures.names import MODEL_FIGURES, SEARCH_FIGURES
 from islands_api.result_schemas import FreeRun
 from islands_api.schemas import Names
 from islands_api.web.auth import Principal, Reader
@@ -28,13 +29,6 @@ from islands_service.store.database import StorageFullError, StoreUnavailableErr
 log = structlog.get_logger()
 
 router = APIRouter(prefix="/v1/jobs", tags=["figures"], responses=RESPONSES)
-
-#: Names of the figures of a model. A test compares them with `islands.figures`, which is not imported here
-#: because the import of matplotlib would delay every start of the service.
-MODEL_FIGURES = ("free-run", "loop", "hold", "residuals")
-
-#: Names of the figures of a search, likewise.
-SEARCH_FIGURES = ("record", "front", "convergence", "islands")
 
 #: The figure that exists only for searches with several islands.
 _MULTI_ISLAND_FIGURE = "islands"

@@ -18,6 +18,7 @@ from islands.cli.search_progress import search_progress
 from islands.cli.stop_requests import stop_requests
 from islands.data.dataset import Dataset
 from islands.evolution.presets import PRESETS
+from islands.figures.names import ALL_FIGURES
 from islands.io.records import write_record
 from islands.models.protocol import DynamicModel
 from islands.progress import Steps, StoppedError
@@ -90,7 +91,7 @@ def demo(
         with progress("demo") as show:
             show("figures", None)
             drawing = Steps(stop=stop)
-            result.save(out, drawing)
+            result.save(out, drawing, ALL_FIGURES)
             models = dict[str, DynamicModel]()
             with suppress(StoppedError):
                 models = _make_paper_models(records, Steps(show, stop))

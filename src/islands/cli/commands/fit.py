@@ -24,6 +24,7 @@ from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.figures.names import FREE_RUN, parse_figures
 from islands.io.models import NARX
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.models.candidate_library import LIBRARIES
@@ -95,9 +96,11 @@ def fit(
     ] = 10_000,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+    figures: options.Figures = FREE_RUN,
 ) -> None:
     """Fit small models to recordings of a system by subset selection and least squares, and assess them."""
     check_folder(out, force)
+    drawn = parse_figures(figures)
     outputs = options.columns(output_columns)
     names, output_column = join_columns(options.columns(inputs), outputs)
     if len(outputs) == 1:
@@ -137,12 +140,12 @@ def fit(
             given["library"] = SEVERAL_OUTPUTS if library == AUTO else library
             record, held = couple_data(data, [held_out], len(outputs), steps, names)
             fit_all = partial(islands.fit_coupled, record, validation=held, **coupled_options(given))
-            result = search_outputs(fit_all, out, stop)
+            result = search_outputs(fit_all, out, stop, drawn)
         else:
             result = islands.fit(data, validation=held_out, **given)
         result = result.with_wall_time(perf_counter() - began)
         show("figures", 1.0)
         drawing = Steps(stop=stop)
-        result.save(out, drawing)
+        result.save(out, drawing, drawn)
     show_result(result, out)
     stop.end(out, (*result.left_out, *drawing.left_out), REPEAT)

@@ -16,11 +16,12 @@ from islands.cli.search_options import DEFAULTS, SearchOptions, with_search_opti
 from islands.data.coupled_record import join_columns
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError, lookup
+from islands.figures.names import FREE_RUN, parse_figures
 from islands.io.records import fingerprint
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 
 #: Options of the run rather than of the search: allowed with ``--resume``.
-RUN_OPTIONS = ("resume", "engine", "ray_address", "wall_time", "verbose")
+RUN_OPTIONS = ("resume", "engine", "ray_address", "wall_time", "verbose", "figures")
 
 
 @with_reading_options
@@ -70,6 +71,7 @@ def identify(
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Also print the memory used by the caches.")
     ] = False,
+    figures: options.Figures = FREE_RUN,
 ) -> None:
     """Identify recordings of a system by evolution. Ctrl-C keeps the best so far; --resume DIR continues."""
     if engine is not None:
@@ -78,7 +80,7 @@ def identify(
         raise SettingsError(f"--wall-time is a number of seconds above 0, got {wall_time}")
     if ray_address is not None and engine == "serial":
         raise SettingsError("--ray-address requires --engine ray: the serial engine runs in this process")
-    run_options = RunOptions(engine, ray_address, wall_time, verbose)
+    run_options = RunOptions(engine, ray_address, wall_time, verbose, parse_figures(figures))
     if resume is not None:
         _check_resume(context)
         run(run_options, resume, *load_run(resume))

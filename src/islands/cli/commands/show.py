@@ -6,14 +6,21 @@ from typing import Annotated
 import typer
 
 from islands.cli import options
+from islands.cli.record_options import with_reading_options
+from islands.errors import SettingsError, lookup
 from islands.export import EXPORTS, FILE_EXPORTS
 from islands.facade.load import load
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
+from islands.figures.names import MODEL_FIGURES
+from islands.io.records import read_dataset
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.row_range import parse_rows
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.models.equations import named_signals
 
 
+@with_reading_options
 def show(
     model: options.ModelFile,
     kind: Annotated[
@@ -28,6 +35,16 @@ def show(
         Path | None,
         typer.Option("--out", help="File to write; required for fmu and fmu2, which are not text."),
     ] = None,
+    figure: Annotated[
+        str | None,
+        typer.Option(
+            "--figure", help=f"Draw {', '.join(MODEL_FIGURES)} of the model on --record into --out, as SVG."
+        ),
+    ] = None,
+    record: Annotated[Path | None, typer.Option("--record", help="Record of --figure.")] = None,
+    dt: options.SamplingTime = None,
+    rows: options.Rows = None,
+    reading: ReadingOptions = DEFAULT_READING,
 ) -> None:
     """Show or write a model as an equation, a program, a block for a simulator, or JSON.
 
@@ -36,6 +53,11 @@ def show(
     simulation is a program in C or MATLAB; one with a closed form is exported like a
     model, a model of several outputs as one program or block.
     """
+    if figure is not None:
+        _draw(model, figure, record, out, dt, parse_rows(rows), reading)
+        return
+    if record is not None:
+        raise SettingsError("--record is for --figure: name one")
     loaded = load(model)
     if kind is None and out is None and isinstance(loaded, Result | FittedModel):
         found = loaded.best.model if isinstance(loaded, Result) else loaded.model
@@ -45,3 +67,29 @@ def show(
     text = loaded.export(kind or "plain", out)
     if text is not None:
         typer.echo(text.rstrip("\n"))
+
+
+def _draw(
+    name: str,
+    figure: str,
+    record: Path | None,
+    out: Path | None,
+    dt: float | None,
+    rows: slice | None,
+    reading: ReadingOptions,
+) -> None:
+    """Draw a figure of a model on a record."""
+    lookup(dict.fromkeys(MODEL_FIGURES), figure, "figure")
+    if record is None or out is None:
+        raise SettingsError(
+            f"--figure {figure} draws the model on a record: give --record FILE and --out FILE"
+        )
+    loaded = load(name)
+    model = loaded.best if isinstance(loaded, Result) else loaded
+    if not isinstance(model, FittedModel):
+        raise SettingsError(f"--figure is for a model of one output, and {name} is none")
+    stated = model.model
+    data = read_dataset(record, stated.column_names, stated.output_name, dt, rows, options=reading)
+    from islands.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
+
+    save(model.plot(figure, data), out)

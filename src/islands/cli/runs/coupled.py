@@ -63,6 +63,7 @@ def search_outputs(
     search: Callable[[], "islands.CoupledResult"],
     folder: Path,
     stop: StopRequests,
+    figures: Sequence[str],
     explain_continuation: Callable[[], str] = lambda: REPEAT,
 ) -> "islands.CoupledResult":
     """Search several outputs; a search that is stopped before its last output ends the command.
@@ -81,7 +82,7 @@ def search_outputs(
             raise
         left_out = [f"models of {name}" for name in stopped.outputs[len(stopped.found) :]]
         for name, found in zip(list_folders(stopped.outputs), stopped.found, strict=False):
-            found.save(folder / "outputs" / name, drawing)
+            found.save(folder / "outputs" / name, drawing, figures)
         stop.end(
             folder / "outputs", (*left_out, "the common model", *drawing.left_out), explain_continuation()
         )

@@ -1,5 +1,6 @@
 """Run of ``islands identify`` in its folder: record, search, checkpoints, result."""
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -72,12 +73,15 @@ class RunOptions:
         Seconds after which the search stops.
     verbose : bool
         Whether the memory used by the caches is printed.
+    figures : tuple of str
+        Names of the figures to draw.
     """
 
     engine: str | None
     address: str | None
     wall_time: float | None
     verbose: bool
+    figures: tuple[str, ...]
 
     def engine_for(self, islands: int) -> str:
         """Return the name of the engine."""
@@ -125,7 +129,7 @@ def run(
                     (folder / name).unlink(missing_ok=True)
             preset = job["preset"]
             if preset == AUTO and "outputs" not in job:
-                preset = _choose_preset(data, held_out, job, show, stop, folder)
+                preset = _choose_preset(data, held_out, job, show, stop, folder, run_options.figures)
                 # Checkpoints contain the job, so a resumed run does not choose again.
                 job = {**job, "choice": preset.to_document()}
             checkpoints = _CheckpointWriter(folder, job, show, state, spent)
@@ -134,6 +138,7 @@ def run(
                 result = _search(
                     data,
                     folder,
+                    run_options.figures,
                     job["changes"],
                     validation=held_out,
                     start=state,
@@ -150,7 +155,7 @@ def run(
             result = result.with_wall_time(perf_counter() - began)
             show("figures", 1.0)
             drawing = Steps(stop=stop)
-            result.save(folder, drawing)
+            result.save(folder, drawing, run_options.figures)
         _show_run(result, run_options, folder, stop)
         if test_data is not None:
             evaluate_test(result, test_data, folder)
@@ -158,13 +163,17 @@ def run(
 
 
 def _search(
-    data: islands.Dataset | CoupledRecord, folder: Path, changes: dict[str, Any], **arguments: Any
+    data: islands.Dataset | CoupledRecord,
+    folder: Path,
+    figures: Sequence[str],
+    changes: dict[str, Any],
+    **arguments: Any,
 ) -> islands.Result | islands.CoupledResult:
     """Search one or several outputs."""
     if isinstance(data, islands.Dataset):
         return islands.identify(data, **arguments, **changes)
     search = partial(islands.identify_coupled, data, **arguments, **coupled_options(changes))
-    return search_outputs(search, folder, arguments["stop"], partial(_explain_continuation, folder))
+    return search_outputs(search, folder, arguments["stop"], figures, partial(_explain_continuation, folder))
 
 
 def _explain_continuation(folder: Path) -> str:
@@ -198,6 +207,7 @@ def _choose_preset(
     show: Display,
     stop: StopRequests,
     folder: Path,
+    figures: Sequence[str],
 ) -> Choice:
     """Return the stored choice of the preset, or choose one.
 
@@ -209,7 +219,7 @@ def _choose_preset(
         return choose_preset(data, held_out, job["changes"], show, stop)
     except StoppedChoiceError as stopped:
         result, drawing = islands.Result.from_search(stopped.found), Steps(stop=stop)
-        result.save(folder, drawing)
+        result.save(folder, drawing, figures)
         show_result(result, folder)
         stop.end(folder, (*result.left_out, "the search", *drawing.left_out), REPEAT)
         raise

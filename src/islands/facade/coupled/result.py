@@ -17,6 +17,7 @@ from islands.export import export_or_write
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.facade.results.identification import Result
+from islands.figures.names import FREE_RUN, OVERVIEW
 from islands.io.ensembles import (
     bands_document,
     bands_from_document,
@@ -224,11 +225,15 @@ class CoupledResult(FittedCoupledModel):
         band = self.bands(data)[place] if self.prediction_bands else None
         return draw_free_run(data.records[place], run.y[:, place], band=band)
 
-    def save(self, folder: str | Path, steps: Steps | None = None) -> Path:
+    def save(self, folder: str | Path, steps: Steps | None = None, figures: Sequence[str] = OVERVIEW) -> Path:
         """Write ``result.json``, ``model.json``, ``summary.txt``, ``figures/`` and ``outputs/``.
 
-        ``outputs/`` has a folder with the complete result of every output. The figures are optional
-        ``steps``, which a stop request leaves out.
+        ``outputs/`` has a folder with the complete result of every output.
+
+        Parameters
+        ----------
+        folder, steps, figures
+            As for `Result.save`. The figures are those of every output; the common model has its free runs.
         """
         steps = steps or Steps()
         folder = Path(folder)
@@ -236,8 +241,8 @@ class CoupledResult(FittedCoupledModel):
         for directory, name, result in zip(
             list_folders(self.model.output_names), self.model.output_names, self.results, strict=True
         ):
-            result.save(folder / "outputs" / directory, steps)
-            if not steps.skip("figures"):
+            result.save(folder / "outputs" / directory, steps, figures)
+            if FREE_RUN in figures and not steps.skip("figures"):
                 self._draw_figure(name, folder / "figures" / f"free-run-{directory}.svg")
         (folder / "model.json").write_text(model_json(self.model), encoding="utf-8")
         (folder / "summary.txt").write_text(f"{self}\n", encoding="utf-8")

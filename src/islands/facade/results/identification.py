@@ -15,6 +15,7 @@ from islands.evolution.search_result import SearchResult
 from islands.facade.results.comparison import ResultComparison, compare_models
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
+from islands.figures.names import OVERVIEW, RESPONSES
 from islands.io.result_folder import content_sha256, write_result
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.summary_text import summary
@@ -200,43 +201,46 @@ class Result:
         found = self.search_result
         return Result.from_search(replace(found, search=replace(found.search, wall_s=seconds)))
 
-    def save(self, folder: str | Path, steps: Steps | None = None) -> Path:
-        """Write ``result.json``, the models, the figures of the recommended model, and the texts.
+    def save(self, folder: str | Path, steps: Steps | None = None, figures: Sequence[str] = OVERVIEW) -> Path:
+        """Write ``result.json``, the models, the texts, and figures of the recommended model and the search.
 
-        The figures are optional ``steps``, which a stop request leaves out.
+        Parameters
+        ----------
+        folder : str or Path
+        steps : Steps, optional
+            The figures are optional steps, which a stop request leaves out.
+        figures : sequence of str
+            Names from ``islands.figures.names.ALL_FIGURES``. A figure that the result does not have, such as
+            the loop of a record without one, is left out. Figures of an earlier result are removed.
         """
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        self._draw_figures(folder / "figures", steps or Steps())
+        self._draw_figures(folder / "figures", figures, steps or Steps())
         write_result(self.search_result, folder)
         return folder
 
-    def _draw_figures(self, figures: Path, steps: Steps) -> None:
-        if steps.skip("figures"):  # before matplotlib is loaded, which takes a second
-            for path in figures.glob("*.svg"):
-                path.unlink()  # of an earlier result
+    def _draw_figures(self, folder: Path, names: Sequence[str], steps: Steps) -> None:
+        for path in folder.glob("*.svg"):
+            path.unlink()  # of an earlier result
+        if not names or steps.skip("figures"):  # before matplotlib is loaded, which takes half a second
             return
-        from islands.figures.model_responses import RESPONSES, draw_responses  # noqa: PLC0415
+        from islands.figures.model_responses import draw_responses  # noqa: PLC0415
         from islands.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
         from islands.figures.style import save  # noqa: PLC0415
 
-        figures.mkdir(parents=True, exist_ok=True)
-        # An earlier result in the folder may have had a loop or an equilibrium.
-        for name in ("loop", *RESPONSES):
-            (figures / f"{name}.svg").unlink(missing_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         drawn: dict[str, Callable[[], Figure]] = {
             kind: partial(self.best.plot, kind) for kind in model_figures(self.search_result)
         }
         for name in search_figures(self.search_result):
             drawn[name] = partial(SEARCH_FIGURES[name], self.search_result)
         for name, draw in drawn.items():
-            if steps.skip(f"figure {name}"):
-                (figures / f"{name}.svg").unlink(missing_ok=True)
-            else:
-                save(draw(), figures / f"{name}.svg")
-        if not steps.skip("figures of responses"):
+            if name in names and not steps.skip(f"figure {name}"):
+                save(draw(), folder / f"{name}.svg")
+        if set(names).intersection(RESPONSES) and not steps.skip("figures of responses"):
             for name, figure in draw_responses(self.best.model, self.search_result.split.estimation).items():
-                save(figure, figures / f"{name}.svg")
+                if name in names:
+                    save(figure, folder / f"{name}.svg")
 
     def __str__(self) -> str:
         if self._search_result is None:

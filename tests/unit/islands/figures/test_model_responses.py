@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import islands
-from islands.figures.model_responses import RESPONSES, draw_responses
+from islands.figures.model_responses import draw_responses
+from islands.figures.names import RESPONSES
 
 RNG = np.random.default_rng(0)
 LAG = islands.make_model(

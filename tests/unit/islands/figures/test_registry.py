@@ -7,10 +7,14 @@ from math import nan
 import pytest
 
 from islands.data.split import Split
+from islands.errors import SettingsError
 from islands.expressions.parsing import parse
-from islands.figures.registry import FIGURES
+from islands.figures import names
+from islands.figures.model_responses import draw_responses
+from islands.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.models.narx import make_model
 from islands.validation.assessment import assess
+from support.assessments import with_changes
 from support.searches import record
 
 #: The initial state decays slowly, so the error of the free run depends on where the run begins.
@@ -26,7 +30,7 @@ def test_the_figure_of_the_residual_gives_its_verdict_before_the_tests():
         (structure, f"residual {structure.verdict}: predictable part 4 % one step ahead, 31 % in free run"),
         (replace(structure, free_run_share=nan), "predictable part 4 % one step ahead"),
     ):
-        assessed = replace(entry, residual_structure=shares)
+        assessed = with_changes(entry, residual_structure=shares)
         verdict, tests = FIGURES["residuals"](assessed, split).get_suptitle().split("\n")
         assert verdict.endswith(words)
         assert tests.startswith("residual tests ")
@@ -41,3 +45,19 @@ def test_free_run_figure_has_the_error_of_the_assessment(warm_up):
     texts = [text.get_text() for text in figure.findobj(match=lambda artist: hasattr(artist, "get_text"))]
     (drawn,) = re.findall(r"RMSE ([0-9.e-]+)", " ".join(texts))
     assert float(drawn) == pytest.approx(assessed.metrics["validation"]["free_run"].rmse, rel=5e-3)
+
+
+def test_the_names_of_the_figures_are_those_that_can_be_drawn():
+    """Commands and the service know the names without loading matplotlib."""
+    assert tuple(FIGURES) == names.MODEL_FIGURES
+    assert tuple(SEARCH_FIGURES) == names.SEARCH_FIGURES
+    assert tuple(draw_responses(MODEL, record(400))) == names.RESPONSES
+
+
+def test_figures_are_named_in_a_list_or_all_at_once():
+    assert names.parse_figures("loop, free-run,loop") == ("loop", "free-run")
+    assert (names.parse_figures("all"), names.parse_figures("none")) == (names.ALL_FIGURES, ())
+    with pytest.raises(
+        SettingsError, match=r"no figure 'lop': take one or several of free-run, loop, .*none"
+    ):
+        names.parse_figures("free-run,lop")

@@ -14,6 +14,7 @@ from islands.io.models import read_model, terms_document
 from islands.io.result_folder import content_sha256, result_json, write_result
 from islands.io.result_text.summary_text import summary
 from islands.simulation.outcome import EvaluationOutcome, Status
+from support.assessments import with_changes
 
 LOST = EvaluationOutcome(Status.DIVERGED, "|y| left 1e+06 at sample 17")
 
@@ -44,7 +45,7 @@ def loaded(findings):
 def with_best(findings, **changes):
     """Return the result with changed fields of the best model."""
     best, *others = findings.models
-    return replace(findings, models=(replace(best, **changes), *others))
+    return replace(findings, models=(with_changes(best, **changes), *others))
 
 
 # The contract: the fields that issue 2 lists, and those that docs/reference/result-json.md adds.

@@ -26,8 +26,8 @@ def test_a_result_without_a_loop_replaces_the_loop_figure_of_an_earlier_one(resu
     figures.mkdir()
     (figures / "loop.svg").touch()
     with undrawn_figures():
-        result.save(tmp_path)
-    assert "loop.svg" not in {path.name for path in figures.iterdir()}
+        result.save(tmp_path, figures=("free-run", "loop", "front"))
+    assert {path.name for path in figures.iterdir()} == {"free-run.svg", "front.svg"}
     assert json.loads((tmp_path / "result.json").read_text())["loop"] is False
 
 

@@ -8,6 +8,7 @@ import pytest
 import islands
 from islands.io.result_text.model_table import columns, number, rows, table
 from islands.simulation.outcome import EvaluationOutcome, Status
+from support.assessments import with_changes
 from support.searches import record
 
 LOST = EvaluationOutcome(Status.DIVERGED, "|y| left 1e+06 at sample 17")
@@ -21,7 +22,7 @@ def findings():
 def with_first(findings, **changes):
     """Return the result with a changed assessment of its first model."""
     first, *others = findings.models
-    return replace(findings, models=(replace(first, **changes), *others))
+    return replace(findings, models=(with_changes(first, **changes), *others))
 
 
 def first_cells(findings, **changes):

@@ -17,6 +17,7 @@ from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
 from islands.validation.predictable_residual import ResidualStructure
+from support.assessments import with_changes
 from support.identifications import two_inputs
 from support.searches import record
 
@@ -32,7 +33,7 @@ def findings():
 
 def said(findings, **changes):
     """Return the sentences by first word, for a result with one model whose assessment is changed."""
-    changed = replace(findings.recommended, **changes)
+    changed = with_changes(findings.recommended, **changes)
     lines = describe(replace(findings, models=(changed,)))
     return {line.partition(":")[0]: line for line in lines if not line.startswith(" ")}
 

@@ -18,7 +18,7 @@ from support.identify_runs import COLUMNS, DEEPEST, SMALL, STEPWISE, TWO, models
 
 @pytest.mark.ci
 def test_run_writes_a_result_and_a_checkpoint_only(run, with_figures, tmp_path):
-    code, out, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--seed", "4")
+    code, out, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--seed", "4", "--figures", "all")
     assert (code, error) == (0, "")
     assert "out/: result.json, models/, figures/, summary.txt, method.txt" in out
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
