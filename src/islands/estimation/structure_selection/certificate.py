@@ -6,13 +6,17 @@ rounding of the inner products: a candidate that depends on others except for ro
 """
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from math import sqrt
+from threading import Event
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from islands.available_cpus import count_cpus
 from islands.estimation.forward_selection import SelectionProblem, Structure
 from islands.estimation.structure_selection.froe import froe
 from islands.kernels.subset_search import Tree, exchange, search
@@ -57,7 +61,7 @@ class Certificate:
 def certify(
     problem: SelectionProblem, max_terms: int, nodes: int, skip: Callable[[], bool] = lambda: False
 ) -> tuple[Certificate, ...]:
-    """Compute a certificate for every number of terms up to a maximum.
+    """Compute a certificate for every number of terms up to a maximum; the searches run in parallel threads.
 
     Parameters
     ----------
@@ -74,44 +78,91 @@ def certify(
     tuple of Certificate
         By number of terms; empty without nodes, or if there are more than `MOST_CANDIDATES`.
     """
-    gram, energy = problem.gram[:-1, :-1], problem.gram[-1, -1]
-    usable = np.flatnonzero((np.diag(gram) > 0.0) & np.isfinite(np.diag(gram)))
-    if not nodes or len(gram) > MOST_CANDIDATES or not (usable.size and 0.0 < energy < np.inf):
+    subsets = _Subsets(problem, max_terms)
+    if not (nodes and subsets.are_searchable):
         return ()
-    norms = np.sqrt(np.diag(gram)[usable])
-    scaled = gram[np.ix_(usable, usable)] / norms[:, None] / norms
-    correlation = problem.gram[usable, -1] / norms / sqrt(energy)
-    order, tree = _make_tree(scaled)
-    scaled, correlation, usable = scaled[np.ix_(order, order)], correlation[order], usable[order]
-    # A fixed regressor that no candidate can replace is a term of every model.
-    replaceable = {item for direction in problem.free for item in direction.regressors}
-    always = sum(item not in replaceable for item in problem.fixed)
-    selection = froe(problem.gram, max_terms=max_terms)
-    certificates = []
-    for terms in range(max(1, always), max_terms + 1):
-        if skip():
-            break
-        size = terms - always
+
+    skipped = Event()
+
+    def certify_size(terms: int) -> Certificate | None:
+        if skipped.is_set() or skip():
+            skipped.set()
+            return None
+        return subsets.certify(terms, nodes)
+
+    with ThreadPoolExecutor(count_cpus()) as threads:
+        found = list(threads.map(certify_size, subsets.sizes))
+    return tuple(takewhile(lambda each: each is not None, found))  # type: ignore[arg-type]
+
+
+def find_subsets(problem: SelectionProblem, max_terms: int) -> tuple[Structure, ...]:
+    """Return, for every number of terms, the best structure that exchanges of pairs of candidates find.
+
+    They are the structures of `certify`, unless its search finds a better one. There are none if there are
+    more than `MOST_CANDIDATES`.
+    """
+    subsets = _Subsets(problem, max_terms)
+    if not subsets.are_searchable:
+        return ()
+    return tuple(subsets.compose(subsets.exchange(terms)[1]) for terms in subsets.sizes)
+
+
+class _Subsets:
+    """Inner products of the usable candidates of a problem in the order of the tree of `Tree`."""
+
+    def __init__(self, problem: SelectionProblem, max_terms: int) -> None:
+        gram, self._energy = problem.gram[:-1, :-1], problem.gram[-1, -1]
+        self._problem = problem
+        usable = np.flatnonzero((np.diag(gram) > 0.0) & np.isfinite(np.diag(gram)))
+        self.are_searchable = bool(
+            len(gram) <= MOST_CANDIDATES and usable.size and 0.0 < self._energy < np.inf
+        )
+        if not self.are_searchable:
+            return
+        norms = np.sqrt(np.diag(gram)[usable])
+        scaled = gram[np.ix_(usable, usable)] / norms[:, None] / norms
+        correlation = problem.gram[usable, -1] / norms / sqrt(self._energy)
+        order, self._tree = _make_tree(scaled)
+        self._scaled, self._correlation = scaled[np.ix_(order, order)], correlation[order]
+        self._usable = usable[order]
+        # A fixed regressor that no candidate can replace is a term of every model.
+        replaceable = {item for direction in problem.free for item in direction.regressors}
+        self._always = sum(item not in replaceable for item in problem.fixed)
+        self._selection = froe(problem.gram, max_terms=max_terms)
+        #: Numbers of terms.
+        self.sizes = range(max(1, self._always), max_terms + 1)
+
+    def exchange(self, terms: int) -> tuple[float, NDArray[np.int64]]:
+        """Return the error of the best known subset, and its positions; -1 after the last."""
+        size = terms - self._always
         positions = np.full(max(1, size), -1)
-        greedy = selection.order[:size]
-        positions[: len(greedy)] = [int(np.flatnonzero(usable == each)[0]) for each in greedy]
-        error = max(0.0, 1.0 - sum(selection.err[:size]))
-        bound, evaluated = error, 0
+        greedy = self._selection.order[:size]
+        positions[: len(greedy)] = [int(np.flatnonzero(self._usable == each)[0]) for each in greedy]
+        error = max(0.0, 1.0 - sum(self._selection.err[:size]))
         if len(greedy) == size:
-            error = exchange(scaled, correlation, error, positions[:size])
+            error = exchange(self._scaled, self._correlation, error, positions[:size])
+        return error, positions
+
+    def certify(self, terms: int, nodes: int) -> Certificate:
+        """Search for a better subset than that of the exchanges, and for a bound on the error of all."""
+        error, positions = self.exchange(terms)
+        bound, evaluated, size = error, 0, terms - self._always
         if size:
-            bound, _, evaluated = search(scaled, correlation, tree, size, nodes, error, positions)
-        structure = problem.compose([int(usable[each]) for each in positions if each >= 0])
-        certificates.append(Certificate(terms, sqrt(bound * energy / problem.rows), evaluated, structure))
-    return tuple(certificates)
+            bound, _, evaluated = search(
+                self._scaled, self._correlation, self._tree, size, nodes, error, positions
+            )
+        error = sqrt(bound * self._energy / self._problem.rows)
+        return Certificate(terms, error, evaluated, self.compose(positions))
+
+    def compose(self, positions: NDArray[np.int64]) -> Structure:
+        """Return the structure of some positions."""
+        return self._problem.compose([int(self._usable[each]) for each in positions if each >= 0])
 
 
 def combine_certificates(
-    one: tuple[Certificate, ...] | None, other: tuple[Certificate, ...]
+    one: tuple[Certificate, ...], other: tuple[Certificate, ...]
 ) -> tuple[Certificate, ...]:
-    """Return certificates that hold for two libraries; those of the second if there is no first one."""
-    if one is None:
-        return other
+    """Return certificates that hold for two libraries."""
     return tuple(
         replace(min(first, second, key=lambda each: each.bound), nodes=first.nodes + second.nodes)
         for first, second in zip(one, other, strict=False)

@@ -15,7 +15,7 @@ from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.search_result import BANDS, SearchResult
 from islands.facade.automatic.kind_trials import NO_DEAD_TIME, ROUNDING, KindTrials, percent, try_kinds
-from islands.facade.library_fit import LibraryFit
+from islands.facade.library_fit import CERTIFICATES, LibraryFit
 from islands.facade.trials.library import TrialLibrary
 from islands.inspection.rest import check_rest
 from islands.progress import Steps, StoppedError
@@ -28,6 +28,9 @@ _CLOSE = 1.25
 
 #: Name of the step that compares the fits of the kinds.
 CHOICE = "choice of the kind of record"
+
+#: Steps after the comparison of the kinds.
+_OMITTED = CHOICE, CERTIFICATES, BANDS
 
 #: Fits the library of a kind with the dead times of the trials.
 FitKind = Callable[[TrialLibrary], LibraryFit]
@@ -192,7 +195,7 @@ def _fit_promising(
                 if not fits:
                     raise
                 missing = [f"fit of {each}" for each in promising if each not in fits]
-                found = [each.without_bands for each in fits.values()]
+                found = [each.incomplete for each in fits.values()]
                 raise StoppedChoiceError(stopped.step, _take_best(found, missing)) from stopped
             except (SettingsError, RecordError, ModelError):
                 continue  # Another kind may have a model. If none has, the search reports what is wrong.
@@ -203,7 +206,9 @@ def _take_best(results: Sequence[SearchResult], missing: Sequence[str]) -> Searc
     """Return the result with the least error on the validation data, with the steps that were left out."""
     left_out = dict.fromkeys([each for found in results for each in found.search.left_out])
     best = min(results, key=_validation_error)
-    search = replace(best.search, ended_by="stopped", left_out=(*left_out, *missing, CHOICE, BANDS))
+    search = replace(
+        best.search, ended_by="stopped", left_out=(*left_out, *missing, CHOICE, CERTIFICATES, BANDS)
+    )
     return replace(best, search=search)
 
 
