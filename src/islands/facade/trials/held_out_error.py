@@ -1,7 +1,7 @@
 """Trial of a candidate library: free-run errors of small models on held-out parts of the estimation data."""
 
 from collections.abc import Iterator, Sequence
-from math import inf, isfinite
+from math import inf
 
 from islands.data.dataset import Dataset, join
 from islands.data.split import Split
@@ -26,7 +26,7 @@ from islands.facade.trials.library import TrialLibrary
 from islands.models.regressor import Regressor
 from islands.progress import Steps, StoppedError
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import free_run
+from islands.simulation.predictors import free_run_error
 
 #: Part of the record that is held out, at its end and at its start in turn.
 _HELD_OUT = 0.3
@@ -81,11 +81,12 @@ def measure_library(
         A stop is requested.
     """
     checked = steps or Steps()
-    return tuple(min(_measure_models(split, library, checked), default=inf) ** 0.5 for split in splits)
+    return tuple(_find_least_error(split, library, checked) ** 0.5 for split in splits)
 
 
-def _measure_models(split: Split, library: TrialLibrary, steps: Steps) -> Iterator[float]:
-    """Yield the mean squared errors of the free runs that do not diverge."""
+def _find_least_error(split: Split, library: TrialLibrary, steps: Steps) -> float:
+    """Return the least mean squared error of the free runs of the models; infinite if all diverge."""
+    least = inf
     try:
         steps.check(_STEP)
         free = constraint(library.constraints).allows_offsets
@@ -95,15 +96,16 @@ def _measure_models(split: Split, library: TrialLibrary, steps: Steps) -> Iterat
         warm_up = max(item.maximum_lag for item in pool)
         for structure in _select(pool, estimation, library, steps):
             steps.check(_STEP)
-            found = estimate(structure, estimation, library.constraints, warm_up)
+            found = estimate(structure, estimation, library.constraints, warm_up, standard_errors=False)
             if not isinstance(found, EvaluationOutcome):
-                error = free_run(found.model, held, warm_up).mean_squared_error
-                if isfinite(error):
-                    yield error
+                model = found.model
+                error = free_run_error(model.regressors, model.parameters, held, warm_up, least)
+                least = min(least, error)
     except StoppedError:
         raise
     except IslandsError:
-        return  # The search with this library reports what is wrong.
+        pass  # The search with this library reports what is wrong.
+    return least
 
 
 def _select(

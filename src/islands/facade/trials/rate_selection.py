@@ -153,14 +153,16 @@ def compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[n
     structures = forward_selection(pool, estimation, library.constraints, _TERMS)
     warm_up = max(item.maximum_lag for item in pool)
     estimated = (
-        estimate(structure, estimation, library.constraints, warm_up)
+        estimate(structure, estimation, library.constraints, warm_up, standard_errors=False)
         for structure in (() if isinstance(structures, EvaluationOutcome) else structures)
     )
     best = min(_simulate(estimated, validation, warm_up), key=_squared_error, default=None)
     if best is None:
         return np.full(sum(length // count for length in validation.segments), inf)
     if library.shooting is not None:
-        refined = refine(best[0], estimation, library.shooting, library.constraints, warm_up)
+        refined = refine(
+            *(best[0], estimation, library.shooting, library.constraints, warm_up), standard_errors=False
+        )
         best = min((best, *_simulate([refined], validation, warm_up)), key=_squared_error)
     return average_samples(replace(validation, y=validation.y - best[1].y), count).y
 
