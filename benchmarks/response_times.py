@@ -76,9 +76,10 @@ class Checkout:
 
 
 def write_records(folder: Path) -> None:
-    """Write the records of all rows: a piezo actuator with hysteresis and a linear process with noise."""
+    """Write the records of all rows: a piezo actuator with hysteresis, and processes with noise."""
     piezo = make_record("bouc-wen-piezo", "authors", "estimation")
     write_record(piezo, folder / "piezo.csv")
+    write_lag(folder / "lag.csv")
     for samples in (500, 2_000, 3_000, 20_000, 100_000):
         rng = np.random.default_rng(1)
         u = np.repeat(rng.uniform(-1, 1, samples // 10), 10)
@@ -89,6 +90,17 @@ def write_records(folder: Path) -> None:
         time_s = 0.01 * np.arange(samples)
         lines = [f"{t:.2f},{a:.6g},{b:.6g}" for t, a, b in zip(time_s, u, y, strict=True)]
         (folder / f"process{samples}.csv").write_text("time_s,u,y\n" + "\n".join(lines) + "\n")
+
+
+def write_lag(path: Path) -> None:
+    """Write a record of a lag of first order with a slow sine that a lag does not explain."""
+    rng = np.random.default_rng(2)
+    u, y = np.repeat(rng.uniform(-1, 1, 150), 20), np.zeros(3_000)
+    for k in range(1, 3_000):
+        y[k] = 0.95 * y[k - 1] + 0.05 * u[k - 1]
+    y += 0.1 * np.sin(2 * np.pi * np.arange(3_000) / 600) + rng.normal(0, 0.01, 3_000)
+    lines = [f"{0.01 * k:.2f},{a:.6g},{b:.6g}" for k, (a, b) in enumerate(zip(u, y, strict=True))]
+    path.write_text("time_s,u,y\n" + "\n".join(lines) + "\n")
 
 
 def command(name: str, *arguments: str, out: bool = False) -> Row:
@@ -256,7 +268,7 @@ ROWS: Mapping[str, Row] = {
     "show": reads_fit("show", "show", "fitted"),
     "diagnose": command(
         "diagnose linear:1, 3000 samples",
-        *("diagnose", "process3000.csv", *PAIR, "--simulation", "linear:1"),
+        *("diagnose", "lag.csv", *PAIR, "--simulation", "linear:1"),
         out=True,
     ),
     "identify": command("identify, 3000 samples", "identify", "process3000.csv", *PAIR, out=True),

@@ -18,8 +18,6 @@ from islands.diagnosis.documents.result_json import as_json
 from islands.diagnosis.planning.experiment_plan import DecisiveLimits, ExperimentPlan
 from islands.diagnosis.planning.planned_input import InputForm, InputLimits, PlannedInput
 from islands.errors import SettingsError, lookup
-from islands.figures.separability import draw_separability
-from islands.figures.style import save
 from islands.io.records import read_dataset
 from islands.io.records.reading_options import ReadingOptions
 from islands.io.records.row_range import parse_rows
@@ -178,6 +176,9 @@ def write_plan(plan: ExperimentPlan, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name in (PLAN, EXPERIMENT):
         (folder / name).unlink(missing_ok=True)
+    from islands.figures.separability import draw_separability  # noqa: PLC0415 - matplotlib
+    from islands.figures.style import save  # noqa: PLC0415
+
     save(draw_separability(plan.isolability), folder / MATRIX)
     if plan.decisive is not None:
         name = plan.record.input_names[0]
