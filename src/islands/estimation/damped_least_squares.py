@@ -5,7 +5,6 @@ products are summed in a written order, so that a result has the same bits on ev
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -35,27 +34,8 @@ class Residual(Protocol):
         return [self(theta) for theta in thetas]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Minimum:
-    """Parameters, their residual, and the number of accepted steps."""
-
-    theta: NDArray[np.float64]
-    error: NDArray[np.float64]
-    steps: int
-
-
-def minimise(
-    residual: Residual,
-    theta: NDArray[np.float64],
-    error: NDArray[np.float64],
-    directions: NDArray[np.float64],
-    *,
-    max_steps: int,
-    min_gain: float,
-    is_allowed: Callable[[NDArray[np.float64]], bool] = lambda _theta: True,
-    stop: Callable[[], bool] = lambda: False,
-) -> Minimum:
-    """Minimise the mean square of a residual.
+class Minimisation:
+    """Minimisation of the mean square of a residual, which may be continued.
 
     Parameters
     ----------
@@ -64,30 +44,62 @@ def minimise(
         Parameters at the start, and the residual there.
     directions : ndarray, shape (terms, free)
         Directions of the steps. Its columns have the magnitudes of the parameters.
-    max_steps : int
-        Maximum number of accepted steps.
     min_gain : float
         The minimisation ends when a step reduces the mean square by a smaller relative amount.
     is_allowed : callable
         Whether a step to these parameters may be accepted.
-    stop : callable
-        Called before each step. Once it returns true, the minimisation ends with the parameters so far.
+
+    Attributes
+    ----------
+    theta, error : ndarray
+        Parameters after the last accepted step, and the residual there.
+    steps : int
+        Number of accepted steps.
     """
-    damping, steps = _DAMPING, 0
-    normal, gradient = normal_equations(residual, theta, error, directions)
-    while steps < max_steps and damping < _MAX_DAMPING and not stop():
-        damped = normal + damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
-        candidate = theta - directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
-        trial = residual(candidate) if is_allowed(candidate) else None
-        if trial is None or not mean_square(trial) < mean_square(error):
-            damping *= _INCREASE
-            continue
-        gain = 1.0 - mean_square(trial) / mean_square(error)
-        theta, error, damping, steps = candidate, trial, damping * _DECREASE, steps + 1
-        if gain < min_gain:
-            break
-        normal, gradient = normal_equations(residual, theta, error, directions)
-    return Minimum(theta, error, steps)
+
+    def __init__(
+        self,
+        residual: Residual,
+        theta: NDArray[np.float64],
+        error: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        min_gain: float,
+        is_allowed: Callable[[NDArray[np.float64]], bool] = lambda _theta: True,
+    ) -> None:
+        self.theta, self.error, self.steps = theta, error, 0
+        self._residual, self._directions = residual, directions
+        self._min_gain, self._is_allowed = min_gain, is_allowed
+        self._damping, self._gain = _DAMPING, np.inf
+        self._normal: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether further steps would not reduce the mean square noticeably."""
+        return self._gain < self._min_gain or self._damping >= _MAX_DAMPING
+
+    def advance(self, max_steps: int, stop: Callable[[], bool] = lambda: False) -> None:
+        """Take steps up to a number of accepted ones from the start.
+
+        Parameters
+        ----------
+        max_steps : int
+        stop : callable
+            Called before each step. Once it returns true, the steps end.
+        """
+        while self.steps < max_steps and not self.has_ended and not stop():
+            if self._normal is None:
+                self._normal = normal_equations(self._residual, self.theta, self.error, self._directions)
+            normal, gradient = self._normal
+            damped = normal + self._damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
+            candidate = self.theta - self._directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
+            trial = self._residual(candidate) if self._is_allowed(candidate) else None
+            if trial is None or not mean_square(trial) < mean_square(self.error):
+                self._damping *= _INCREASE
+                continue
+            self._gain = 1.0 - mean_square(trial) / mean_square(self.error)
+            self.theta, self.error, self._normal = candidate, trial, None
+            self._damping *= _DECREASE
+            self.steps += 1
 
 
 def find_directions(

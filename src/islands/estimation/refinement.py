@@ -9,19 +9,20 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.data.compatibility import match_record
 from islands.data.coupled_record import AnyRecord, CoupledRecord, match_coupled
 from islands.errors import RecordError
 from islands.estimation.covariance import sandwich_of_jacobian
 from islands.estimation.damped_least_squares import (
+    Minimisation,
     compute_jacobian,
     find_directions,
     mean_square,
-    minimise,
 )
 from islands.estimation.parameter_constraints import constrain_model
-from islands.estimation.shooting_residual import make_residual
+from islands.estimation.shooting_residual import BlockResidual, ShootingResidual, make_residual
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.protocol import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome
@@ -41,6 +42,46 @@ class RefinedModel(Generic[M]):
     before: float
     after: float
     steps: int
+
+
+class Refinement(Generic[M]):
+    """Refinement of the parameters of a model that may be continued; `begin_refinement` begins one.
+
+    Parameters
+    ----------
+    model : DynamicModel or CoupledModel
+    residual : ShootingResidual or BlockResidual
+    minimisation : Minimisation
+    directions : ndarray, shape (terms, free)
+        Directions along which the constraints hold.
+    """
+
+    def __init__(
+        self,
+        model: M,
+        residual: ShootingResidual | BlockResidual,
+        minimisation: Minimisation,
+        directions: NDArray[np.float64],
+    ) -> None:
+        self._model, self._residual, self._directions = model, residual, directions
+        self.minimisation = minimisation
+
+    @property
+    def model(self) -> M:
+        """Model with the parameters so far, without standard errors."""
+        found: M = self._model.with_parameters(self.minimisation.theta.tolist(), None)  # type: ignore[assignment]
+        return found
+
+    @property
+    def model_with_errors(self) -> M:
+        """Model with the parameters so far and their standard errors, which take as long as two steps."""
+        found, directions = self.minimisation, self._directions
+        jacobian = compute_jacobian(self._residual, found.theta, found.error.size, directions)
+        covariance = sandwich_of_jacobian(jacobian, found.error, self._residual.intervals)
+        squares = np.einsum("ti,ij,tj->t", directions, covariance, directions)
+        errors = np.sqrt(np.maximum(squares, 0.0)).tolist()
+        refined: M = self._model.with_parameters(found.theta.tolist(), errors)  # type: ignore[assignment]
+        return refined
 
 
 def refine(
@@ -91,6 +132,24 @@ def refine(
         The warm-up is shorter than the model's largest lag, the interval is less than 1, or the constraint
         is unknown.
     """
+    begun = begin_refinement(model, record, interval, constraints, warm_up)
+    if isinstance(begun, EvaluationOutcome):
+        return begun
+    found = begun.minimisation
+    before = mean_square(found.error)
+    found.advance(max_steps, stop)
+    refined = begun.model_with_errors if standard_errors else begun.model
+    return RefinedModel(refined, before, mean_square(found.error), found.steps)
+
+
+def begin_refinement(
+    model: M,
+    record: AnyRecord,
+    interval: int | None,
+    constraints: str = "none",
+    warm_up: int | None = None,
+) -> Refinement[M] | EvaluationOutcome:
+    """Begin the refinement of a model; see `refine` for the parameters, the outcomes and the errors."""
     constrained = constrain_model(model, constraints)
     if isinstance(constrained, EvaluationOutcome):
         return constrained
@@ -111,18 +170,5 @@ def refine(
     residual = make_residual(model, record, interval, warm_up)
     error = residual(theta)
     assert error is not None, "the initial simulation did not diverge"
-    found = minimise(
-        *(residual, theta, error, directions),
-        max_steps=max_steps,
-        min_gain=_MIN_GAIN,
-        is_allowed=constrained.has_signs,
-        stop=stop,
-    )
-    errors = None
-    if standard_errors:
-        jacobian = compute_jacobian(residual, found.theta, found.error.size, directions)
-        covariance = sandwich_of_jacobian(jacobian, found.error, residual.intervals)
-        squares = np.einsum("ti,ij,tj->t", directions, covariance, directions)
-        errors = np.sqrt(np.maximum(squares, 0.0)).tolist()
-    refined: M = model.with_parameters(found.theta.tolist(), errors)  # type: ignore[assignment]
-    return RefinedModel(refined, mean_square(error), mean_square(found.error), found.steps)
+    minimisation = Minimisation(residual, theta, error, directions, _MIN_GAIN, constrained.has_signs)
+    return Refinement(model, residual, minimisation, directions)
