@@ -9,7 +9,7 @@ from islands.data.dataset import Dataset, join
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.damped_least_squares import normal_equations
 from islands.estimation.estimate import estimate
-from islands.estimation.refinement import RefinedModel, refine
+from islands.estimation.refinement import RefinedModel, begin_refinement, refine
 from islands.estimation.shooting_residual import ShootingResidual
 from islands.expressions.parsing import parse
 from islands.models.coupled_narx import CoupledModel
@@ -316,3 +316,14 @@ def test_invalid_arguments_of_refine_are_refused():
     gap[300] = np.nan
     with pytest.raises(RecordError, match="refinement needs every sample"):
         refine(model(HYSTERESIS), replace(record, y=gap), None)
+
+
+def test_a_continued_refinement_equals_an_uninterrupted_one():
+    record = make_record(CLUSTERED, noise=0.02)
+    start = perturb(CLUSTERED)
+    whole = refine_model(start, record, 50, standard_errors=False)
+    begun = begin_refinement(start, record, 50)
+    for steps in (1, 1, 2, 30):
+        begun.minimisation.advance(steps)
+    assert whole.steps == begun.minimisation.steps > 2
+    assert whole.model == begun.model
