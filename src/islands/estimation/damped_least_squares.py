@@ -20,7 +20,9 @@ from islands.simulation.outcome import EvaluationOutcome
 _DIFFERENCE_STEP = 1e-5
 
 #: Initial damping, its factors after a failed and a successful step, and the value at which the steps end.
-_DAMPING, _INCREASE, _DECREASE, _MAX_DAMPING = 1e-3, 10.0, 0.2, 1e9
+#: The regressors of an oversampled record depend on each other almost, so that a damping of 1e-3 holds the
+#: parameters for several steps. A step that fails costs one simulation, one that is too short many.
+_DAMPING, _INCREASE, _DECREASE, _MAX_DAMPING = 1e-8, 10.0, 0.2, 1e9
 
 
 class Residual(Protocol):
@@ -55,6 +57,8 @@ class Minimisation:
         Parameters after the last accepted step, and the residual there.
     steps : int
         Number of accepted steps.
+    gain : float
+        Part of the mean square by which the last accepted step reduced it; infinite before the first.
     """
 
     def __init__(
@@ -69,13 +73,13 @@ class Minimisation:
         self.theta, self.error, self.steps = theta, error, 0
         self._residual, self._directions = residual, directions
         self._min_gain, self._is_allowed = min_gain, is_allowed
-        self._damping, self._gain = _DAMPING, np.inf
+        self._damping, self.gain = _DAMPING, np.inf
         self._normal: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     @property
     def has_ended(self) -> bool:
         """Whether further steps would not reduce the mean square noticeably."""
-        return self._gain < self._min_gain or self._damping >= _MAX_DAMPING
+        return self.gain < self._min_gain or self._damping >= _MAX_DAMPING
 
     def advance(self, max_steps: int, stop: Callable[[], bool] = lambda: False) -> None:
         """Take steps up to a number of accepted ones from the start.
@@ -96,7 +100,7 @@ class Minimisation:
             if trial is None or not mean_square(trial) < mean_square(self.error):
                 self._damping *= _INCREASE
                 continue
-            self._gain = 1.0 - mean_square(trial) / mean_square(self.error)
+            self.gain = 1.0 - mean_square(trial) / mean_square(self.error)
             self.theta, self.error, self._normal = candidate, trial, None
             self._damping *= _DECREASE
             self.steps += 1
