@@ -10,6 +10,9 @@ from threading import Event, Thread
 #: Seconds between two heartbeats.
 EVERY = 0.5
 
+#: Heartbeat of a process, and of one that uses the roles which it may need.
+ALIVE, IN_NEED = b".", b"n"
+
 #: Exit status after an error that only its message describes.
 FAILED = 1
 
@@ -22,28 +25,50 @@ MISCONFIGURED = 2
 UNAVAILABLE = os.EX_TEMPFAIL
 
 
-def send_heartbeat(descriptor: int | None) -> None:
+def send_heartbeat(descriptor: int | None, message: bytes = ALIVE) -> None:
     """Write a heartbeat to the pipe of the supervisor. Do nothing without a descriptor."""
     if descriptor is not None:
         # A full pipe holds enough heartbeats. A broken pipe means that the supervisor has exited.
         with suppress(BlockingIOError, BrokenPipeError):
-            os.write(descriptor, b".")
+            os.write(descriptor, message)
+
+
+class Heartbeats:
+    """Heartbeats of this process to its supervisor.
+
+    Parameters
+    ----------
+    descriptor : int or None
+        The pipe of the supervisor; None without one.
+    """
+
+    def __init__(self, descriptor: int | None) -> None:
+        self._descriptor, self._message = descriptor, ALIVE
+
+    def send(self) -> None:
+        """Send a heartbeat."""
+        send_heartbeat(self._descriptor, self._message)
+
+    def demand_roles(self) -> None:
+        """Ask the supervisor to run the roles that this one may need, as long as this process runs."""
+        self._message = IN_NEED
+        self.send()
 
 
 @contextmanager
-def watch_supervisor(descriptor: int | None) -> Iterator[None]:
+def watch_supervisor(descriptor: int | None) -> Iterator[Heartbeats]:
     """Send heartbeats from a background thread while the block runs."""
-    over = Event()
+    over, heartbeats = Event(), Heartbeats(descriptor)
 
     def beat() -> None:
-        send_heartbeat(descriptor)
+        heartbeats.send()
         while not over.wait(EVERY):
-            send_heartbeat(descriptor)
+            heartbeats.send()
 
     thread = Thread(target=beat, name="heartbeat pipe", daemon=True)
     thread.start()
     try:
-        yield
+        yield heartbeats
     finally:
         over.set()
         thread.join()

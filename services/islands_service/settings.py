@@ -77,6 +77,9 @@ class ServiceSettings(BaseSettings):
     lease
         Duration of a lease without a heartbeat, after which another coordinator may claim the job; at least
         one second.
+    short_search
+        Estimated time on one core up to which a search runs in the process of its coordinator, instead of on
+        Ray. With 0 every search runs on Ray.
     checkpoint_every
         Least time between two checkpoints: about the work that a crash can lose.
     max_upload, max_unpacked
@@ -180,6 +183,7 @@ class ServiceSettings(BaseSettings):
         default_factory=lambda: min(count_cpus(), DEFAULT_COORDINATORS)
     )
     lease: Annotated[float, Field(ge=1.0)] = 5.0
+    short_search: Annotated[float, Field(ge=0.0)] = 5.0
     checkpoint_every: Positive = 5.0
     max_upload: Count = 256_000_000
     max_unpacked: Count = 1_000_000_000

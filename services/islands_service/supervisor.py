@@ -14,12 +14,20 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import IO
 
 from islands.errors import IslandsError
-from islands_service.liveness import FAILED, MISCONFIGURED, UNAVAILABLE, StopRequest, stop_on_signals
+from islands_service.liveness import (
+    FAILED,
+    IN_NEED,
+    MISCONFIGURED,
+    UNAVAILABLE,
+    StopRequest,
+    stop_on_signals,
+)
 
 #: Seconds between two checks of the children.
 _POLL_SECONDS = 0.05
@@ -43,6 +51,10 @@ _STARTUP_TIMEOUT = 120.0
 
 #: Seconds that the children have to end by themselves.
 _SHUTDOWN_GRACE = 15.0
+
+#: Seconds for which a role on demand runs after the last heartbeat of a role that needs it. Ray takes five
+#: seconds of a core to start, and 260 MB while it runs.
+_LINGER_SECONDS = 300.0
 
 #: Number of exits with the same error at the start, without any longer run, that end the supervisor.
 _MOST_FAILURES = 5
@@ -72,7 +84,10 @@ class Role:
     orphaned : signal
         Signal that the process receives if the supervisor ends.
     needs : tuple of str
-        Roles that it cannot run without: if one of them ends, this one is restarted, too.
+        Roles that it may need. After a heartbeat `IN_NEED` it cannot run without them: if one of them ends,
+        this one is restarted, too.
+    on_demand : bool
+        Whether it runs only while another role needs it, and for a while after that.
     address : Path, optional
         File in which the process stores its address. It is deleted when the process has ended.
     process : Popen, optional
@@ -83,10 +98,16 @@ class Role:
         Time of the last heartbeat; None before the first one.
     last_active : float
         Time of the last heartbeat, or of a later check that has found it reading pages from a disk.
+    is_in_need : bool
+        Whether the last heartbeat was `IN_NEED`.
+    needed_at : float
+        Time of the last such heartbeat.
     page_faults : str
         Number of pages that it had read then.
     is_killed : bool
         Whether the process is killed because it hangs. One that waits for a disk ends after that.
+    is_dismissed : bool
+        Whether the process is asked to end because no other role needs it.
     started_at, start_at : float
         Time of the last start, and the earliest time of the next one.
     backoff : float
@@ -106,13 +127,17 @@ class Role:
     patience: float
     orphaned: signal.Signals = signal.SIGTERM
     needs: tuple[str, ...] = ()
+    on_demand: bool = False
     address: Path | None = None
     process: "subprocess.Popen[bytes] | None" = None
     pipe: int = -1
     last_heartbeat: float | None = None
     last_active: float = 0.0
+    is_in_need: bool = False
+    needed_at: float = -inf
     page_faults: str = ""
     is_killed: bool = False
+    is_dismissed: bool = False
     started_at: float = 0.0
     start_at: float = 0.0
     backoff: float = _FIRST_BACKOFF
@@ -183,8 +208,9 @@ def _check_role(
     role: Role, roles: Sequence[Role], environment: Mapping[str, str], now: float, log: IO[str]
 ) -> int:
     """Start a role that is due, kill it if it hangs, handle its exit; return a final status or 0."""
+    needed = not role.on_demand or _is_needed(role, roles, now)
     if role.process is None:
-        if now >= role.start_at:
+        if needed and now >= role.start_at:
             _start(role, environment)
         return 0
     _read_heartbeats(role, now)
@@ -194,8 +220,12 @@ def _check_role(
             _print(log, f"{role.name} has sent no heartbeat for {silent:.1f} s: it is started again")
             role.process.kill()
             role.is_killed = True
+        elif not (needed or role.is_dismissed):
+            _print(log, f"{role.name} ends, since no job has needed it for {_LINGER_SECONDS:.0f} s")
+            role.process.terminate()
+            role.is_dismissed = True
         return 0
-    code, has_run = role.process.returncode, role.has_run
+    code, has_run, dismissed = role.process.returncode, role.has_run, role.is_dismissed
     _handle_exit(role, now)
     # If it has run with these settings, the cause (an expired key, a port in use) can be repaired while the
     # jobs run.
@@ -208,11 +238,16 @@ def _check_role(
             "has printed above, and start the service again",
         )
         return FAILED
-    _print(log, f"{role.name} ended ({code}): it is started again")
+    if not dismissed:
+        _print(log, f"{role.name} ended ({code}): it is started again")
     for other in roles:
-        if role.name in other.needs and other.process is not None:
+        if role.name in other.needs and other.is_in_need and other.process is not None:
             other.process.kill()
     return 0
+
+
+def _is_needed(role: Role, roles: Sequence[Role], now: float) -> bool:
+    return any(role.name in other.needs and now - other.needed_at < _LINGER_SECONDS for other in roles)
 
 
 def _start(role: Role, environment: Mapping[str, str]) -> None:
@@ -229,7 +264,8 @@ def _start(role: Role, environment: Mapping[str, str]) -> None:
         preexec_fn=lambda: _set_parent_death_signal(role.orphaned),  # noqa: PLW1509 - this process has one thread
     )
     os.close(writing)
-    role.pipe, role.last_heartbeat, role.is_killed, role.started_at = reading, None, False, monotonic()
+    role.pipe, role.last_heartbeat, role.started_at = reading, None, monotonic()
+    role.is_killed = role.is_dismissed = role.is_in_need = False
 
 
 def _set_parent_death_signal(number: signal.Signals) -> None:
@@ -239,8 +275,11 @@ def _set_parent_death_signal(number: signal.Signals) -> None:
 
 def _read_heartbeats(role: Role, now: float) -> None:
     with suppress(BlockingIOError):
-        if os.read(role.pipe, 4096):
+        if received := os.read(role.pipe, 4096):
             role.last_heartbeat = role.last_active = now
+            role.is_in_need = received.endswith(IN_NEED)
+            if role.is_in_need:
+                role.needed_at = now
             role.page_faults, _ = _read_state(role)
 
 

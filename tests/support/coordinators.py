@@ -1,8 +1,9 @@
-"""Coordinators without Ray, in a thread of the test."""
+"""Coordinators in a thread of the test."""
 
 import time
 from collections.abc import Callable
 from types import MappingProxyType
+from typing import Any
 
 import pytest
 
@@ -11,6 +12,7 @@ from islands_service.coordinator import main_loop as coordinator_module
 from islands_service.coordinator.job_run import JobRun
 from islands_service.coordinator.main_loop import Coordinator
 from islands_service.domain.job import Job, JobOutcome, JobState
+from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from support.processes import eventually
 from support.stores import ALICE
@@ -19,11 +21,15 @@ from support.stores import ALICE
 class SerialCoordinator(Coordinator):
     """A coordinator without Ray: its engine is serial."""
 
-    def _wait_for_ray(self, *_: object) -> None:
-        pass
-
     def _make_engine(self, *_: object) -> SerialEngine:  # type: ignore[override]
         return SerialEngine()
+
+
+class RayCoordinator(Coordinator):
+    """A coordinator that runs every search on Ray."""
+
+    def __init__(self, settings: ServiceSettings, *arguments: Any, **options: Any) -> None:
+        super().__init__(settings.model_copy(update={"short_search": 0.0}), *arguments, **options)
 
 
 def wait_until_finished(store: Store, job: Job) -> Job:

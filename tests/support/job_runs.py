@@ -31,4 +31,5 @@ def make_run(
     checkpoint_every: float = 600.0,
 ) -> JobRun:
     """Return the run of a job with a serial engine."""
-    return JobRun(lease, store, blobs, SerialEngine(), check, checkpoint_every, JobNotes(lease, store))
+    notes = JobNotes(lease, store)
+    return JobRun(lease, store, blobs, SerialEngine(), check, checkpoint_every, notes, lambda: None)

@@ -36,8 +36,14 @@ SPEC = {
     "settings": {"population": 30, "max_terms": 5, "shooting": 200, "islands": 2, "migrate_every": 1},
 }
 
-#: Frequent checkpoints, because tests are short, and one coordinator, because most tests have one job.
-QUICK = {"ISLANDS_CHECKPOINT_EVERY": "0.5", "ISLANDS_RATE": "0", "ISLANDS_COORDINATORS": "1"}
+#: Searches on Ray, although tests are short, and frequent checkpoints for the same reason. One coordinator,
+#: because most tests have one job.
+QUICK = {
+    "ISLANDS_SHORT_SEARCH": "0",
+    "ISLANDS_CHECKPOINT_EVERY": "0.5",
+    "ISLANDS_RATE": "0",
+    "ISLANDS_COORDINATORS": "1",
+}
 
 
 def free_port() -> int:

@@ -46,9 +46,10 @@ def main() -> int:
         metrics = CoordinatorMetrics()
         if port := arguments.metrics_port or settings.metrics_port:
             serve_metrics(metrics.registry, settings.metrics_host, port)
-        with watch_supervisor(settings.lifeline):
+        with watch_supervisor(settings.lifeline) as heartbeats:
             abandon = partial(restart_process, settings.lifeline)
-            Coordinator(settings, arguments.name, stopping, abandon, metrics).run()
+            demand = heartbeats.demand_roles
+            Coordinator(settings, arguments.name, stopping, abandon, metrics, demand).run()
     except IslandsError as error:
         print(f"coordinator: {error}", file=sys.stderr)
         if isinstance(error, DatabaseDamagedError):

@@ -31,6 +31,8 @@ class JobRun:
         Least number of seconds between two checkpoints.
     notes : JobNotes
         Messages that the progress of the job contains.
+    connect : callable
+        Connects this process to the Ray cluster, unless it is connected.
     """
 
     lease: Lease
@@ -40,6 +42,7 @@ class JobRun:
     check: Callable[[], None]
     checkpoint_every: float
     notes: JobNotes
+    connect: Callable[[], None]
 
     @property
     def job(self) -> Job:

@@ -26,7 +26,14 @@ from islands_service.coordinator.job_run import JobRun
 from islands_service.coordinator.job_runners import JOB_RUNNERS
 from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.coordinator.sweeper import Sweeper
-from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
+from islands_service.domain.job import (
+    Job,
+    JobOutcome,
+    JobState,
+    Lease,
+    LeaseLostError,
+    ProgressReport,
+)
 from islands_service.liveness import StopRequest, stop_on_signals
 from islands_service.outage_log import OutageLog
 from islands_service.runtime.errors import ClusterError
@@ -56,7 +63,7 @@ RAY_STARTUP_TIMEOUT = 60.0
 
 
 class Coordinator:
-    """Runs jobs one at a time on a Ray cluster to which it stays connected.
+    """Runs jobs one at a time. It connects to a Ray cluster when a job needs one, and stays connected.
 
     Parameters
     ----------
@@ -68,6 +75,8 @@ class Coordinator:
     abandon : callable
         See `Heartbeat`.
     metrics : CoordinatorMetrics, optional
+    demand_ray : callable
+        Asks the supervisor to run the Ray head of this machine as long as this process runs.
     """
 
     def __init__(
@@ -77,6 +86,7 @@ class Coordinator:
         stopping: StopRequest,
         abandon: Callable[[], None] = lambda: None,
         metrics: CoordinatorMetrics | None = None,
+        demand_ray: Callable[[], None] = lambda: None,
     ) -> None:
         self._settings, self._name, self._stopping, self._abandon = settings, name, stopping, abandon
         self._metrics = metrics or CoordinatorMetrics()
@@ -86,8 +96,8 @@ class Coordinator:
         self._blobs.observe_write = self._metrics.blob_writes.observe
         self._blobs.observe_object = self._metrics.observe_object
         self._traces = Traces(settings.telemetry, "coordinator")
-        self._ray = ExitStack()
-        self._connected = False
+        self._demand_ray, self._ray = demand_ray, ExitStack()
+        self._connected = self._prepared = False
         self._cluster_outage = OutageLog("no cluster", "cluster back")
         self._store_outage = OutageLog("store unavailable", "store back")
         self._sweeper = Sweeper(settings, self._store, self._blobs, POLL_SECONDS)
@@ -141,8 +151,7 @@ class Coordinator:
                 self._process(lease)
 
     def _idle(self) -> None:
-        if not self._connected and self._find_address() is not None:
-            self._connect()
+        self._prepare()
         self._stopping.wait(POLL_SECONDS)
 
     def _process(self, lease: Lease) -> None:
@@ -180,16 +189,19 @@ class Coordinator:
     def _run_job(self, lease: Lease, heartbeat: Heartbeat) -> JobOutcome:
         try:
             heartbeat.check()
-            self._wait_for_ray(lease, heartbeat)
+            self._prepare()
+            self._demand_ray_early(lease.job)
             notes = JobNotes(lease, self._store)
+            connect = partial(self._wait_for_ray, lease, heartbeat)
             run = JobRun(
                 lease,
                 self._store,
                 self._blobs,
-                engine=HangGuard(self._make_engine(lease, notes, heartbeat), heartbeat),
+                engine=HangGuard(self._make_engine(lease, connect, notes, heartbeat), heartbeat),
                 check=partial(self._check, heartbeat),
                 checkpoint_every=self._settings.checkpoint_every,
                 notes=notes,
+                connect=connect,
             )
             return JOB_RUNNERS[lease.job.kind](run)
         except JobCancelled:
@@ -262,8 +274,10 @@ class Coordinator:
     def _wait_for_ray(self, lease: Lease, heartbeat: Heartbeat) -> None:
         if self._connected:
             return
-        self._store.leases.report(lease, ProgressReport({"phase": "starting", "note": "waiting for Ray"}))
+        self._demand_ray()
         if self._find_address() is None:
+            report = ProgressReport({"phase": "starting", "note": "waiting for Ray"})
+            self._store.leases.report(lease, report)
             # The supervisor kills this process if Ray ends. Five of its starts must not make the job fail.
             self._store.leases.count_attempt(lease, -1)
             try:
@@ -289,25 +303,44 @@ class Coordinator:
             return None
 
     def _connect(self) -> None:
-        from islands.facade.warm_up import warm_up  # noqa: PLC0415
-        from islands.processes.settings import freeze_garbage_collector  # noqa: PLC0415
         from islands_service.runtime.cluster import cluster  # noqa: PLC0415
 
         self._ray.enter_context(cluster(self._find_address()))
         stop_on_signals(self._stopping)
         self._connected = True
         log.info("connected to Ray", address=self._find_address())
+
+    def _prepare(self) -> None:
+        """Import what most jobs need, and compile the kernels: it would delay the first job."""
+        if self._prepared:
+            return
+        from islands.facade.warm_up import warm_up  # noqa: PLC0415
+        from islands.processes.settings import freeze_garbage_collector  # noqa: PLC0415
+
         freeze_garbage_collector()  # before the compilation, which makes many objects
         warm_up(lambda line: log.info("kernels", note=line))
+        self._prepared = True
 
-    def _make_engine(self, lease: Lease, notes: JobNotes, heartbeat: Heartbeat) -> "Engine":
-        from islands_service.coordinator.job_engine import make_job_engine  # noqa: PLC0415
+    def _demand_ray_early(self, job: Job) -> None:
+        """Let Ray start while a job reads its record and selects seeds."""
+        from islands_service.coordinator.job_engine import expects_cluster  # noqa: PLC0415
+
+        datasets = [self._store.datasets.get(job.owner, each, deleted=True) for each in job.datasets]
+        samples = sum(each.preview["samples"] for each in datasets)
+        if expects_cluster(job, samples, self._settings.short_search):
+            self._demand_ray()
+
+    def _make_engine(
+        self, lease: Lease, connect: Callable[[], None], notes: JobNotes, heartbeat: Heartbeat
+    ) -> "Engine":
+        from islands_service.coordinator.job_engine import JobEngine  # noqa: PLC0415
 
         def observe(placed: int, waiting: int) -> None:
             self._metrics.observe_islands(placed, waiting)
             heartbeat.observe_islands(placed, waiting)
 
-        return make_job_engine(lease, notes.add, self._settings.autoscaling, observe)
+        settings = self._settings
+        return JobEngine(lease, settings.short_search, connect, notes.add, settings.autoscaling, observe)
 
 
 @dataclass(frozen=True, slots=True)

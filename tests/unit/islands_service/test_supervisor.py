@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -85,6 +86,11 @@ class Supervised:
         found = eventually(lambda: len(got := self.entries("start", name)) >= count and got, seconds=20.0)
         return list(found)  # type: ignore[call-overload]
 
+    def note(self, what: str) -> None:
+        """Add an entry to the journal."""
+        with self.journal.open("a") as journal:
+            journal.write(f"{time.monotonic():.4f} test {what} 0\n")
+
     def order(self, *kinds: str) -> list[str]:
         return [f"{role} {kind}" for _, role, kind, _ in self.entries() if kind in kinds]
 
@@ -114,7 +120,7 @@ def supervised(tmp_path: Path) -> Iterator[Start]:
     for each in running:
         if each.process.poll() is None:
             each.end()
-        eventually(lambda each=each: not alive({pid for *_, pid in each.entries()}))
+        eventually(lambda each=each: not alive({pid for *_, pid in each.entries()} - {0}))
 
 
 def role(name: str, script: str = "stay()", patience: float = 60.0, **more: Any) -> dict[str, Any]:
@@ -151,20 +157,53 @@ def test_other_roles_start_after_a_limit_without_the_api(supervised: Start) -> N
     running.started(1, "work")
 
 
-def test_role_is_restarted_with_a_role_that_it_needs(supervised: Start) -> None:
-    roles = (role("api"), role("work", needs=["ray"]), role("ray"))
+#: Needs another role while the journal has an odd number of demands.
+NEEDY = """
+def live():
+    demands = open(os.environ["JOURNAL"]).read().count("demand")
+    os.write(int(os.environ["ISLANDS_LIFELINE"]), b"n" if demands % 2 else b".")
+LIVE = live
+stay()
+"""
+
+
+def test_role_is_restarted_with_a_role_that_it_uses(supervised: Start) -> None:
+    roles = (role("api"), role("work", NEEDY, needs=["ray"]), role("other", needs=["ray"]), role("ray"))
     running = supervised(*roles)
-    running.started(3)
+    running.started(4)
+    running.note("demand")
+    time.sleep(0.3)
     before = {name: pid for _, name, _, pid in running.entries("start")}
     os.kill(before["ray"], signal.SIGKILL)
     running.started(2, "ray")
     running.started(2, "work")
     assert not alive([before["work"], before["ray"]])
-    assert len(running.entries("start", "api")) == 1
+    assert alive([before["api"], before["other"]]) == [before["api"], before["other"]]
     # In the other direction no other role is affected.
     os.kill(running.entries("start", "work")[-1][3], signal.SIGKILL)
     running.started(3, "work")
     assert len(running.entries("start", "ray")) == 2
+
+
+def test_role_on_demand_runs_while_another_role_needs_it(supervised: Start) -> None:
+    ray = role("ray", on_demand=True)
+    running = supervised(role("api"), role("work", NEEDY, needs=["ray"]), ray, _LINGER_SECONDS=0.3)
+    running.started(2)
+    time.sleep(0.3)
+    assert not running.entries(name="ray")
+    for count in (1, 2):
+        running.note("demand")
+        running.started(count, "ray")
+        time.sleep(0.6)  # longer than it stays without a demand
+        assert len(running.entries("end", "ray")) == count - 1
+        running.note("demand")
+        eventually(lambda count=count: len(running.entries("end", "ray")) == count)
+    running.note("demand")
+    os.kill(running.started(3, "ray")[-1][3], signal.SIGKILL)
+    running.started(4, "ray")
+    running.started(2, "work")
+    assert running.end().count("ray ends, since no job has needed it for 0 s") == 2
+    assert len(running.entries("start", "work")) == 2
 
 
 def test_misconfigured_role_ends_all_roles_and_the_supervisor(supervised: Start) -> None:

@@ -123,7 +123,8 @@ def roles(settings: ServiceSettings) -> list[Role]:
     ]
     if not settings.ray_address and settings.coordinators:
         head = (*python, "islands_service.runtime.ray_head")
-        children.append(Role("ray", head, _RAY_HEARTBEAT_TIMEOUT, address=settings.ray_address_file))
+        address = settings.ray_address_file
+        children.append(Role("ray", head, _RAY_HEARTBEAT_TIMEOUT, on_demand=True, address=address))
     return children
 
 

@@ -34,7 +34,7 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
     ----------
     run : JobRun
     map_cases : ParallelMap, optional
-        Fits the effects; by default on the Ray cluster to which this process is connected.
+        Fits the effects; by default on the Ray cluster.
 
     Raises
     ------
@@ -51,7 +51,10 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
     report("reading the record", 0.0)
     record, columns = read_record_and_columns(spec, datasets, run.blobs)
     simulator = make_simulator(spec.simulation, record, columns)
-    fits = state.journal.record(map_cases or ray_map(check=run.check))
+    if map_cases is None:
+        run.connect()
+        map_cases = ray_map(check=run.check)
+    fits = state.journal.record(map_cases)
     interim, artefacts = InterimFindings(), dict[str, str]()
     formula, left_out = None, [FORMULA, REPORT]
 

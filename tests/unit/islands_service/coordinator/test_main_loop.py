@@ -35,6 +35,7 @@ from islands_service.store.job_rows import job_claims
 from islands_service.store.job_rows.job_claims import ATTEMPTS
 from support.coordinators import (
     DONE,
+    RayCoordinator,
     SerialCoordinator,
     replace_runner,
     run_until_check_raises,
@@ -364,9 +365,9 @@ def test_starts_of_ray_that_fail_do_not_count_as_attempts(
 
 
 def test_wait_for_ray_counts_as_an_attempt_if_it_ends(
-    store: Store, job: Job, settings: ServiceSettings, coordinator: Callable[..., Thread]
+    store: Store, job: Job, coordinator: Callable[..., Thread]
 ) -> None:
-    thread = coordinator(Coordinator)
+    thread = coordinator(RayCoordinator)
     eventually(lambda: "waiting for Ray" in str(store.jobs.get(ALICE, job.id).progress))
     thread.stop()  # type: ignore[attr-defined]
     thread.join(10.0)
@@ -391,7 +392,8 @@ class Waiting(Coordinator):
     def _wait_for_address(self, *_):
         print("waiting", flush=True)
         time.sleep(60)
-Waiting(ServiceSettings(data_dir=Path(sys.argv[1])), "waiting", StopRequest()).run()
+settings = ServiceSettings(data_dir=Path(sys.argv[1]), short_search=0.0)
+Waiting(settings, "waiting", StopRequest()).run()
 """
 
 HANGING = """
@@ -409,7 +411,6 @@ class Engine:
         time.sleep(60)
         yield
 class SerialCoordinator(Coordinator):
-    def _wait_for_ray(self, *_): pass
     def _make_engine(self, *_): return Engine()
 SerialCoordinator(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", StopRequest()).run()
 """

@@ -1,20 +1,30 @@
 """Metrics of a coordinator: attempts, outcomes and durable writes of real jobs."""
 
+from math import inf
 from threading import Thread
 from typing import Any
 
 import pytest
 
-from islands_service.coordinator import job_engine
+from islands.evolution.archipelago import empty_archipelago
+from islands.evolution.engine import SerialEngine
+from islands.evolution.problem import Problem
 from islands_service.coordinator.heartbeat import Heartbeat
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.coordinator.job_run import JobRun
-from islands_service.coordinator.main_loop import Coordinator
 from islands_service.domain.job import IDENTIFICATION, Job, JobOutcome, JobState
 from islands_service.liveness import StopRequest
+from islands_service.runtime import actor_pool, cluster, ray_engine
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from support.coordinators import DONE, SerialCoordinator, replace_runner, wait_until_finished
+from support.coordinators import (
+    DONE,
+    RayCoordinator,
+    SerialCoordinator,
+    replace_runner,
+    wait_until_finished,
+)
+from support.searches import SMALL, record
 from support.stores import claimed
 
 
@@ -53,13 +63,19 @@ def test_islands_with_and_without_a_separate_cpu_are_metrics(
     store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     engines: list[Any] = []
-    monkeypatch.setattr(job_engine, "check_memory", lambda _job: None)
-    monkeypatch.setattr(job_engine, "kill_stale_actors", lambda *_: 0)
-    monkeypatch.setattr(job_engine, "RayEngine", lambda *arguments: engines.append(arguments))
-    coordinator = Coordinator(settings, "me", StopRequest())
+
+    def make_engine(*arguments: Any) -> SerialEngine:
+        engines.append(arguments)
+        return SerialEngine()
+
+    monkeypatch.setattr(actor_pool, "kill_stale_actors", lambda *_: 0)
+    monkeypatch.setattr(cluster, "cluster_memory", lambda: inf)
+    monkeypatch.setattr(ray_engine, "RayEngine", make_engine)
+    coordinator = RayCoordinator(settings, "me", StopRequest())
     lease = claimed(store)
     heartbeat = Heartbeat(store, lease, 60.0, StopRequest())
-    coordinator._make_engine(lease, JobNotes(lease, store), heartbeat)
+    engine = coordinator._make_engine(lease, lambda: None, JobNotes(lease, store), heartbeat)
+    next(engine.run(Problem(record(), SMALL), empty_archipelago(1, 0), lambda: False))
     read = coordinator._metrics.registry.get_sample_value
     assert (read("islands_running_islands"), read("islands_pending_islands")) == (0.0, 0.0)
     engines[0][-1](2, 6)

@@ -3,8 +3,6 @@
 import pytest
 
 from islands.errors import SettingsError
-from islands_service.coordinator import job_engine
-from islands_service.coordinator.main_loop import make_problem_document
 from islands_service.domain.job_memory import (
     ACTOR_BYTES,
     COORDINATOR_BYTES,
@@ -14,9 +12,7 @@ from islands_service.domain.job_memory import (
 from islands_service.domain.job_spec import Identification
 from islands_service.intake import job_validation
 from islands_service.settings import ServiceSettings
-from islands_service.store import Store
 from support.service import spec
-from support.stores import submitted
 
 LARGE = {"population": 100_000, "islands": 256, "generations": 10}
 
@@ -52,14 +48,3 @@ def test_memory_of_actors_and_coordinator_is_checked_separately():
         memory.check_available(10_000 * ACTOR_BYTES - 1, 1e12)
     with pytest.raises(JobMemoryError, match="in the coordinator, whose machine has 40 MB"):
         memory.check_available(1e12, 10_000 * COORDINATOR_BYTES - 1)
-
-
-def test_started_job_needs_the_memory_of_the_cluster(sqlite_database, monkeypatch):
-    """A job that was accepted does not start on a cluster that is too small for it."""
-    monkeypatch.setattr(job_engine, "cluster_memory", lambda: 1e9)
-    with Store(sqlite_database) as store:
-        small, large = (submitted(store, spec=spec("set", settings=each)) for each in ({}, LARGE))
-    job_engine.check_memory(small)
-    with pytest.raises(JobMemoryError, match="256 islands of 100000 individuals") as error:
-        job_engine.check_memory(large)
-    assert make_problem_document(error.value)["type"] == "insufficient-memory"
