@@ -90,13 +90,17 @@ class StopRequest:
         self._requested = True
         self._bell.put(None)
 
+    def wake(self) -> None:
+        """End a wait before its time. Safe to call from a signal handler."""
+        self._bell.put(None)
+
     @property
     def requested(self) -> bool:
         """Whether a stop was requested. A request cannot be withdrawn."""
         return self._requested
 
     def wait(self, seconds: float) -> bool:
-        """Wait for the request, at most the given time; return whether a stop was requested."""
+        """Wait for the request or for `wake`, at most some seconds; return whether a stop was requested."""
         if not self._requested:
             with suppress(Empty):
                 self._bell.get(timeout=seconds)

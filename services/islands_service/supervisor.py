@@ -29,8 +29,9 @@ from islands_service.liveness import (
     stop_on_signals,
 )
 
-#: Seconds between two checks of the children.
-_POLL_SECONDS = 0.05
+#: Seconds between two checks of the children, and while one of them is starting. The exit of a child is
+#: noticed at once.
+_POLL_SECONDS, _STARTUP_POLL_SECONDS = 0.25, 0.05
 
 #: Seconds before a child is started again after its first exit; doubled with every further one.
 _FIRST_BACKOFF = 0.2
@@ -189,12 +190,13 @@ def supervise(roles: Sequence[Role], environment: Mapping[str, str], log: IO[str
     """
     stopping = StopRequest()
     stop_on_signals(stopping)
+    signal.signal(signal.SIGCHLD, lambda *_: stopping.wake())
     # Ray requires a token of every client.
     environment = {"RAY_AUTH_TOKEN": secrets.token_hex(16), **environment}
     began = monotonic()
     status = 0
     try:
-        while not stopping.wait(_POLL_SECONDS) and status == 0:
+        while not stopping.wait(_choose_pause(roles)) and status == 0:
             now = monotonic()
             waiting = roles[0].last_heartbeat is None and now - began < _API_HEAD_START
             for role in roles[:1] if waiting else roles:
@@ -202,6 +204,11 @@ def supervise(roles: Sequence[Role], environment: Mapping[str, str], log: IO[str
     finally:
         _shut_down(roles, log)
     return status
+
+
+def _choose_pause(roles: Sequence[Role]) -> float:
+    running = all(role.on_demand or (role.process and role.last_heartbeat is not None) for role in roles)
+    return _POLL_SECONDS if running else _STARTUP_POLL_SECONDS
 
 
 def _check_role(

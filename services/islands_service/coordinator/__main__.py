@@ -3,6 +3,7 @@
 import argparse
 import os
 import secrets
+import signal
 import socket
 import sys
 from functools import partial
@@ -28,7 +29,7 @@ from islands_service.store.database import DatabaseDamagedError, StoreError
 
 
 def main() -> int:
-    """Run until SIGTERM or SIGINT."""
+    """Run until SIGTERM or SIGINT. After jobs, a new process takes the place of this one."""
     limit_threads()  # NumPy is not imported yet
     parser = argparse.ArgumentParser(prog="python -m islands_service.coordinator", description=__doc__)
     parser.add_argument(
@@ -46,10 +47,16 @@ def main() -> int:
         metrics = CoordinatorMetrics()
         if port := arguments.metrics_port or settings.metrics_port:
             serve_metrics(metrics.registry, settings.metrics_host, port)
+            metrics.is_served = True
         with watch_supervisor(settings.lifeline) as heartbeats:
             abandon = partial(restart_process, settings.lifeline)
             demand = heartbeats.demand_roles
             Coordinator(settings, arguments.name, stopping, abandon, metrics, demand).run()
+        # From here on a signal ends the process.
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, signal.SIG_DFL)
+        if not stopping.requested:
+            restart_process(settings.lifeline)
     except IslandsError as error:
         print(f"coordinator: {error}", file=sys.stderr)
         if isinstance(error, DatabaseDamagedError):

@@ -6,6 +6,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from functools import partial
 from logging import ERROR, INFO, WARNING
+from math import inf
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -49,8 +50,14 @@ if TYPE_CHECKING:
 
 log = structlog.get_logger()
 
-#: Seconds between two attempts to claim a job.
+#: Seconds between two looks for a change of the database.
 POLL_SECONDS = 0.2
+
+#: Seconds between two attempts to claim a job without such a change: a lease or a pause may have ended.
+CLAIM_SECONDS = 1.0
+
+#: Seconds without a job after which a process that has run jobs ends. Kernels, libraries and Ray keep 150 MB.
+IDLE_SECONDS = 10.0
 
 #: Seconds between two attempts to reach an unavailable store.
 RETRY_SECONDS = 0.5
@@ -98,12 +105,14 @@ class Coordinator:
         self._traces = Traces(settings.telemetry, "coordinator")
         self._demand_ray, self._ray = demand_ray, ExitStack()
         self._connected = self._prepared = False
+        self._ran_at: float | None = None
+        self._claim_at = -inf
         self._cluster_outage = OutageLog("no cluster", "cluster back")
         self._store_outage = OutageLog("store unavailable", "store back")
         self._sweeper = Sweeper(settings, self._store, self._blobs, POLL_SECONDS)
 
     def run(self) -> None:
-        """Process jobs until a stop is requested.
+        """Process jobs until a stop is requested, or until none has come for a while after others.
 
         Raises
         ------
@@ -116,9 +125,18 @@ class Coordinator:
         log.info("coordinator started", name=self._name)
         with self._store, self._ray, closing(self._traces):
             self._blobs.check_settings()
-            while not self._stopping.requested:
+            while not (self._stopping.requested or self._is_dispensable()):
                 if self._can_claim():
                     self._claim_next()
+
+    def _is_dispensable(self) -> bool:
+        """Return whether a new process would do the same with less memory, and no metric would be lost."""
+        ran_at = self._ran_at
+        return (
+            ran_at is not None
+            and monotonic() - ran_at > IDLE_SECONDS
+            and self._metrics.are_read_since(ran_at)
+        )
 
     def _can_claim(self) -> bool:
         """Return whether jobs may be claimed: not while a configured external cluster does not answer."""
@@ -134,12 +152,7 @@ class Coordinator:
     def _claim_next(self) -> None:
         try:
             self._sweeper.sweep_if_due()
-            lease = self._store.leases.claim(
-                self._name,
-                self._settings.lease,
-                most_running=self._settings.max_running,
-                most_islands=self._settings.max_running_islands,
-            )
+            lease = self._claim()
             if lease is None:
                 self._idle()
         except StoreError as error:
@@ -149,6 +162,21 @@ class Coordinator:
             self._store_outage.succeed()
             if lease is not None:
                 self._process(lease)
+
+    def _claim(self) -> Lease | None:
+        """Claim a job; None if there is none, also without an attempt if nothing can have changed."""
+        now = monotonic()
+        if not self._store.database.has_changed() and now < self._claim_at:
+            return None
+        self._claim_at = now  # the next attempt if this one fails
+        lease = self._store.leases.claim(
+            self._name,
+            self._settings.lease,
+            most_running=self._settings.max_running,
+            most_islands=self._settings.max_running_islands,
+        )
+        self._claim_at = now + CLAIM_SECONDS
+        return lease
 
     def _idle(self) -> None:
         self._prepare()
@@ -185,6 +213,8 @@ class Coordinator:
                 log.log(interruption.level, interruption.message, reason=str(error), **details)
                 self._metrics.given_back.labels(interruption.label).inc()
                 interruption.react(self, lease, error)
+            finally:
+                self._ran_at = monotonic()
 
     def _run_job(self, lease: Lease, heartbeat: Heartbeat) -> JobOutcome:
         try:

@@ -1,6 +1,11 @@
 """Prometheus metrics of a coordinator: attempts, outcomes, islands, and the time of durable writes."""
 
-from prometheus_client import Counter, Gauge, Histogram
+from collections.abc import Iterator
+from math import inf
+from time import monotonic
+
+from prometheus_client import Counter, Gauge, Histogram, Metric
+from prometheus_client.registry import Collector
 
 from islands_service.metrics import (
     WRITE_BUCKETS,
@@ -10,7 +15,7 @@ from islands_service.metrics import (
 )
 
 
-class CoordinatorMetrics:
+class CoordinatorMetrics(Collector):
     """Metrics of one coordinator, since the start of its process.
 
     Attributes
@@ -32,10 +37,14 @@ class CoordinatorMetrics:
         Seconds of transactions, and of blobs until they are on the disk. A checkpoint is one of each.
     observe_object : callable
         See `make_object_observer`.
+    is_served : bool
+        Whether Prometheus can read the metrics.
     """
 
     def __init__(self) -> None:
         self.registry = make_registry("coordinator")
+        self.is_served, self._read_at = False, -inf
+        self.registry.register(self)
         self.attempts = Counter(
             "islands_attempts", "Jobs claimed by this coordinator.", ["kind"], registry=self.registry
         )
@@ -73,6 +82,15 @@ class CoordinatorMetrics:
             registry=self.registry,
         )
         self.observe_object = make_object_observer(self.registry)
+
+    def collect(self) -> Iterator[Metric]:
+        """Note that the metrics are being read; called by the registry, which has them."""
+        self._read_at = monotonic()
+        return iter(())
+
+    def are_read_since(self, begin: float) -> bool:
+        """Return whether the end of this process would lose no count that has changed before a time."""
+        return self._read_at > begin or not self.is_served
 
     def observe_islands(self, running: int, pending: int) -> None:
         """Set the numbers of islands with and without a separate CPU."""

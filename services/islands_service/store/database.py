@@ -89,6 +89,9 @@ class Database:
         self._writing = self.engine.execution_options(writes=True)
         self._patient = self.engine.execution_options(patient=True)
         self._waiting: SimpleQueue[_Waiting | None] = SimpleQueue()
+        # Observer of the changes of other connections, and the number of its last state.
+        self._observer: Connection | None = None
+        self._seen: int | None = None
         self._writer: Thread | None = None
         self._closed = False
         #: Called with the seconds of each group commit.
@@ -104,6 +107,8 @@ class Database:
             self._waiting.put(None)
         if writer is not None:
             writer.join()
+        if self._observer is not None:
+            self._observer.close()
         self.engine.dispose()
 
     @contextmanager
@@ -146,6 +151,27 @@ class Database:
                 self._writer = writer
             self._waiting.put((operation, done))
         return done.result()
+
+    def has_changed(self) -> bool:
+        """Return whether the database may have changed since the last call; called from one thread.
+
+        SQLite counts the commits of all connections but the one that asks, in a thousandth of the time of a
+        claim. PostgreSQL has no such number, and any answer is true.
+
+        Raises
+        ------
+        StoreUnavailableError
+        """
+        self._check_open()
+        if self.engine.dialect.name != "sqlite":
+            return True
+        with translate_db_errors():
+            self._observer = self._observer or self.engine.connect()
+            before, self._seen = (
+                self._seen,
+                self._observer.exec_driver_sql("PRAGMA data_version").scalar_one(),
+            )
+        return self._seen != before
 
     @contextmanager
     def snapshot(self) -> Iterator[Connection]:

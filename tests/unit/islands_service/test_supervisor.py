@@ -406,3 +406,11 @@ def test_lock_of_a_killed_service_is_released(tmp_path: Path) -> None:
         owner.wait()
         with folder_lock(tmp_path):
             assert (tmp_path / "lock").read_text() == f"{os.getpid()}\n"
+
+
+def test_exit_of_a_role_is_noticed_at_once(supervised: Start) -> None:
+    running = supervised(role("api"), _POLL_SECONDS=60.0, _FIRST_BACKOFF=0.0, _STABLE_AFTER=0.0)
+    pid = running.started()[0][3]
+    time.sleep(0.5)  # the supervisor has read the first heartbeat
+    os.kill(pid, signal.SIGKILL)
+    running.started(2)

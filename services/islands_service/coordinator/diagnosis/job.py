@@ -1,7 +1,8 @@
 """Discrepancy job: diagnose a simulation, write the report and the extended simulation."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from time import sleep
+from typing import TypeVar
 
 from islands.diagnosis.interim_findings import InterimFindings
 from islands.diagnosis.procedure import diagnose
@@ -20,6 +21,9 @@ from islands_service.outage_log import OutageLog
 from islands_service.runtime.parallel_map import ray_map
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
+
+A = TypeVar("A")
+R = TypeVar("R")
 
 #: Seconds between two attempts to store what a diagnosis has found.
 _RETRY_SECONDS = 1.0
@@ -51,10 +55,7 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
     report("reading the record", 0.0)
     record, columns = read_record_and_columns(spec, datasets, run.blobs)
     simulator = make_simulator(spec.simulation, record, columns)
-    if map_cases is None:
-        run.connect()
-        map_cases = ray_map(check=run.check)
-    fits = state.journal.record(map_cases)
+    fits = state.journal.record(map_cases or _map_on_ray(run))
     interim, artefacts = InterimFindings(), dict[str, str]()
     formula, left_out = None, [FORMULA, REPORT]
 
@@ -88,6 +89,17 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
             artefacts[EXTENDED] = run.blobs.write(extended.encode())
     summary = _make_summary(found, simulator.name, state.note)
     return JobOutcome(ended, found.document, summary=summary, artefacts=artefacts)
+
+
+def _map_on_ray(run: JobRun) -> ParallelMap:
+    """Return a parallel map on the Ray cluster, to which its first call connects."""
+    parallel_map = ray_map(check=run.check)
+
+    def map_on_ray(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
+        run.connect()
+        return parallel_map(function, arguments)
+
+    return map_on_ray
 
 
 def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import signal
 import time
 from collections.abc import Callable
 from threading import Thread
@@ -33,6 +34,7 @@ from islands_service.store.blobs import Blobs
 from islands_service.store.database import StorageFullError, StoreUnavailableError
 from islands_service.store.job_rows import job_claims
 from islands_service.store.job_rows.job_claims import ATTEMPTS
+from islands_service.store.leases import Leases
 from support.coordinators import (
     DONE,
     RayCoordinator,
@@ -155,14 +157,14 @@ class Away(SerialCoordinator):
     def run(self) -> None:
         self._settings = self._settings.model_copy(update={"ray_address": "cluster:6379"})
         self.claims = self.connections = 5
-        self._claim, self._store.leases.claim = self._store.leases.claim, self.claim  # type: ignore[method-assign]
+        self._attempt, self._store.leases.claim = self._store.leases.claim, self.claim  # type: ignore[method-assign]
         super().run()
 
     def claim(self, *arguments: Any, **named: Any) -> Lease | None:
         self.claims -= 1
         if self.claims >= 0:
             raise StoreUnavailableError("the database does not answer")
-        return self._claim(*arguments, **named)
+        return self._attempt(*arguments, **named)
 
     def _connect(self) -> None:
         self.connections -= 1
@@ -378,6 +380,70 @@ def test_wait_for_ray_counts_as_an_attempt_if_it_ends(
     store.leases.count_attempt(lease, ATTEMPTS - 1)
     store.leases.release(lease, attempted=True)
     assert store.leases.claim("another", 60.0) is None  # given up
+
+
+def test_idle_coordinator_attempts_a_claim_only_after_a_change(
+    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace_runner(monkeypatch, lambda _: DONE)
+    monkeypatch.setattr(coordinator_module, "CLAIM_SECONDS", 600.0)
+    claims, claim = [], Leases.claim
+
+    def count(leases: Leases, *arguments: Any, **quotas: Any) -> Any:
+        claims.append(time.monotonic())
+        return claim(leases, *arguments, **quotas)
+
+    monkeypatch.setattr(Leases, "claim", count)
+    coordinator()
+    wait_until_finished(store, job)
+    time.sleep(1.0)
+    before = len(claims)
+    time.sleep(1.0)
+    assert len(claims) == before
+    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
+    assert wait_until_finished(store, second).state == JobState.SUCCEEDED
+
+
+def test_idle_coordinator_ends_after_jobs_and_not_before_one(
+    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace_runner(monkeypatch, lambda _: DONE)
+    monkeypatch.setattr(coordinator_module, "IDLE_SECONDS", 0.3)
+    store.jobs.cancel(ALICE, job.id)
+    thread = coordinator()
+    thread.join(1.5)
+    assert thread.is_alive()
+    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
+    assert wait_until_finished(store, second).state == JobState.SUCCEEDED
+    thread.join(10.0)
+    assert not thread.is_alive()
+
+
+#: A coordinator with short pauses that reports its starts.
+RESTARTING = """
+import sys
+from islands_service.coordinator import __main__ as program, main_loop
+main_loop.IDLE_SECONDS = 0.3
+print("started", flush=True)
+sys.exit(program.main())
+"""
+
+
+@pytest.mark.ci
+def test_coordinator_continues_in_a_new_process_after_jobs(
+    store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ISLANDS_DATA_DIR", str(settings.data_dir))
+    with child(RESTARTING) as process:
+        assert process.stdout is not None
+        for each in (job, store.jobs.submit(Submission(ALICE, job.spec))[0]):
+            assert wait_until_finished(store, each).state == JobState.SUCCEEDED
+        said = [process.stdout.readline() for _ in range(2)]
+        third = store.jobs.submit(Submission(ALICE, job.spec))[0]
+        assert wait_until_finished(store, third).state == JobState.SUCCEEDED
+        process.terminate()
+        assert process.wait(20.0) in (0, -signal.SIGTERM)
+    assert said == ["started\n"] * 2
 
 
 #: A coordinator that reports when it waits for Ray.

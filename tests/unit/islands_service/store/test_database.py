@@ -6,9 +6,10 @@ import threading
 import time
 from contextlib import closing
 from functools import partial
+from uuid import uuid4
 
 import pytest
-from sqlalchemy import event, text
+from sqlalchemy import delete, event, false, insert, text
 from sqlalchemy.exc import DBAPIError, IntegrityError, ProgrammingError
 
 from islands_service.store import Store
@@ -22,6 +23,7 @@ from islands_service.store.database import (
     StoreError,
     StoreUnavailableError,
 )
+from islands_service.store.tables import jobs, owners
 from support.databases import emptied
 from support.stores import at_once
 
@@ -243,3 +245,19 @@ def test_writer_that_cannot_start_blocks_no_later_write(sqlite, monkeypatch):
     monkeypatch.undo()
     (answer,) = at_once([lambda: sqlite.write(executing("SELECT 1")) is not None])
     assert answer is True
+
+
+def test_change_by_any_connection_is_reported_once(sqlite_database: str) -> None:
+    asking, other = Database(sqlite_database), Database(sqlite_database)
+    try:
+        assert asking.has_changed()  # the first time
+        assert not asking.has_changed()
+        for writer in (other, asking):
+            writer.write(lambda connection: connection.execute(delete(jobs).where(false())))
+            assert not asking.has_changed()  # nothing was written
+            writer.write(lambda connection: connection.execute(insert(owners).values(name=uuid4().hex)))
+            assert asking.has_changed()
+            assert not asking.has_changed()
+    finally:
+        asking.close()
+        other.close()
