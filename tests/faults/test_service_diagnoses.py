@@ -121,3 +121,12 @@ def test_cancelled_step_without_checks_is_abandoned(service: Service, tmp_path: 
     assert service.ended(job, seconds=5.0)["state"] == "cancelled"
     assert service.found(service.submit(5))
     assert service.one("coordinator") == coordinator
+
+
+def test_idle_service_keeps_no_worker_of_ray(service: Service, tmp_path: Path) -> None:
+    """A worker keeps the memory of its last calls, and the local Ray keeps one for each core."""
+    coordinator = service.one("coordinator")
+    found(service, submitted(service, tmp_path, 4.0))
+    eventually(lambda: "ray::IDLE" not in " ".join(descendants(service.process.pid).values()), seconds=30.0)
+    assert service.one("coordinator") == coordinator
+    assert service.one("head")

@@ -15,7 +15,7 @@ from threading import Lock, Thread
 from time import monotonic
 from typing import Any, TypeVar
 
-from sqlalchemy import Connection
+from sqlalchemy import Connection, PoolProxiedConnection
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
@@ -90,7 +90,7 @@ class Database:
         self._patient = self.engine.execution_options(patient=True)
         self._waiting: SimpleQueue[_Waiting | None] = SimpleQueue()
         # Observer of the changes of other connections, and the number of its last state.
-        self._observer: Connection | None = None
+        self._observer: PoolProxiedConnection | None = None
         self._seen: int | None = None
         self._writer: Thread | None = None
         self._closed = False
@@ -155,8 +155,8 @@ class Database:
     def has_changed(self) -> bool:
         """Return whether the database may have changed since the last call; called from one thread.
 
-        SQLite counts the commits of all connections but the one that asks, in a thousandth of the time of a
-        claim. PostgreSQL has no such number, and any answer is true.
+        SQLite counts the commits of all connections but the one that asks. That takes microseconds, without
+        the layers above the driver. PostgreSQL has no such number, and the answer is always true.
 
         Raises
         ------
@@ -165,12 +165,16 @@ class Database:
         self._check_open()
         if self.engine.dialect.name != "sqlite":
             return True
-        with translate_db_errors():
-            self._observer = self._observer or self.engine.connect()
-            before, self._seen = (
-                self._seen,
-                self._observer.exec_driver_sql("PRAGMA data_version").scalar_one(),
-            )
+        if self._observer is None:
+            with translate_db_errors():
+                self._observer = self.engine.raw_connection()
+        driver, before = self._observer.driver_connection, self._seen
+        assert driver is not None
+        try:
+            (self._seen,) = driver.execute("PRAGMA data_version").fetchone()
+        except sqlite3.Error:
+            # It may have: the statement that the answer leads to meets the same error.
+            return True
         return self._seen != before
 
     @contextmanager
