@@ -11,6 +11,7 @@ from islands_api.server.asgi import HTTPServer, make_server_config
 from islands_api.server.listener import open_listener
 from islands_api.web.app import create_app
 from islands_api.web.auth import make_verifier
+from islands_service.intake.reader_process import FORK_SERVER
 from islands_service.liveness import FAILED, MISCONFIGURED, UNAVAILABLE
 from islands_service.logging_config import configure_logs
 from islands_service.settings import ServiceSettings, service_settings
@@ -47,6 +48,7 @@ def main() -> int:
     # The throughput is 50 % higher, and the slowest requests take a third of the time.
     freeze_garbage_collector()
     raise_file_limit()
+    FORK_SERVER.ensure_running()
     server.run([listener])
     return 0 if server.started else MISCONFIGURED
 

@@ -1,5 +1,6 @@
 """Supervisor and child processes: heartbeat pipe, exit statuses, and cooperative shutdown."""
 
+import ctypes
 import os
 import signal
 from collections.abc import Iterator
@@ -23,6 +24,15 @@ MISCONFIGURED = 2
 #: Exit status of a child that waits for something outside, such as the database. It is started again as long
 #: as that takes.
 UNAVAILABLE = os.EX_TEMPFAIL
+
+#: Option of Linux's prctl: the signal that a process receives when its parent ends.
+_PR_SET_PDEATHSIG = 1
+
+
+def set_parent_death_signal(number: signal.Signals) -> None:
+    """Let this process receive a signal when its parent ends, as far as the system supports it."""
+    with suppress(AttributeError, OSError):
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
 
 
 def send_heartbeat(descriptor: int | None, message: bytes = ALIVE) -> None:

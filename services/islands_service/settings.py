@@ -159,6 +159,9 @@ class ServiceSettings(BaseSettings):
         ``telemetry``.
     lifeline
         File descriptor of the heartbeat pipe to ``islands serve``, set for its children.
+    readers
+        File descriptor of the socket to the process of ``islands serve`` that forks readers of files, set for
+        its children. Without it a process starts its own.
     require_keys
         Require a key on a loopback address too, for example behind a proxy.
     """
@@ -228,6 +231,7 @@ class ServiceSettings(BaseSettings):
     log_format: Literal["text", "json"] = "text"
     telemetry: str = ""
     lifeline: int | None = None
+    readers: int | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -288,7 +292,7 @@ class ServiceSettings(BaseSettings):
 
         Arguments would be visible to all users of the machine.
         """
-        hidden = {"lifeline"} if self.database_file is None else {"lifeline", "database"}
+        hidden = {"lifeline", "readers"} | ({"database"} if self.database_file is not None else set())
         settings = {
             f"ISLANDS_{name.upper()}": str(value)
             for name, value in self.model_dump(mode="json", exclude=hidden).items()

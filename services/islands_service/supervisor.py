@@ -4,7 +4,6 @@ It uses only the standard library. It locks the data folder, so that a second su
 refused. Its children end with it, even if it is killed.
 """
 
-import ctypes
 import fcntl
 import os
 import secrets
@@ -13,7 +12,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from time import monotonic
@@ -26,6 +25,7 @@ from islands_service.liveness import (
     MISCONFIGURED,
     UNAVAILABLE,
     StopRequest,
+    set_parent_death_signal,
     stop_on_signals,
 )
 
@@ -63,9 +63,6 @@ _MOST_FAILURES = 5
 #: Letter of Linux for a process that waits for a disk and cannot be interrupted.
 _WAITS_FOR_DISK = "D"
 
-#: Option of Linux's prctl: the signal that a process receives when its parent ends.
-_PR_SET_PDEATHSIG = 1
-
 
 class DataDirLockedError(IslandsError):
     """Another ``islands serve`` has locked the data folder."""
@@ -91,6 +88,10 @@ class Role:
         Whether it runs only while another role needs it, and for a while after that.
     address : Path, optional
         File in which the process stores its address. It is deleted when the process has ended.
+    descriptors : mapping of str to int
+        File descriptors that the process inherits, by the environment variables that name them.
+    environment : mapping, optional
+        Environment of the process, if it is not that of the other roles.
     process : Popen, optional
         The running process; None while it waits for its next start.
     pipe : int
@@ -130,6 +131,8 @@ class Role:
     needs: tuple[str, ...] = ()
     on_demand: bool = False
     address: Path | None = None
+    descriptors: Mapping[str, int] = field(default_factory=dict)
+    environment: Mapping[str, str] | None = None
     process: "subprocess.Popen[bytes] | None" = None
     pipe: int = -1
     last_heartbeat: float | None = None
@@ -261,23 +264,21 @@ def _start(role: Role, environment: Mapping[str, str]) -> None:
     reading, writing = os.pipe()
     os.set_blocking(reading, False)
     os.set_blocking(writing, False)
+    inherited = {"ISLANDS_LIFELINE": writing, **role.descriptors}
+    if role.environment is not None:
+        environment = role.environment
     role.process = subprocess.Popen(
         role.command,
-        env={**environment, "ISLANDS_LIFELINE": str(writing)},
+        env={**environment, **{name: str(descriptor) for name, descriptor in inherited.items()}},
         stdin=subprocess.DEVNULL,
-        pass_fds=(writing,),
+        pass_fds=tuple(inherited.values()),
         # A Ctrl-C in the terminal must reach the supervisor alone, which ends the children in order.
         start_new_session=True,
-        preexec_fn=lambda: _set_parent_death_signal(role.orphaned),  # noqa: PLW1509 - this process has one thread
+        preexec_fn=lambda: set_parent_death_signal(role.orphaned),  # noqa: PLW1509 - this process has one thread
     )
     os.close(writing)
     role.pipe, role.last_heartbeat, role.started_at = reading, None, monotonic()
     role.is_killed = role.is_dismissed = role.is_in_need = False
-
-
-def _set_parent_death_signal(number: signal.Signals) -> None:
-    with suppress(AttributeError, OSError):
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
 
 
 def _read_heartbeats(role: Role, now: float) -> None:

@@ -12,6 +12,7 @@ from islands.evolution.engine import SerialEngine
 from islands.facade.identify import identify
 from islands.io.records import read_record
 from islands.io.result_folder import result_document
+from islands_service.intake.confined_process import ENVIRONMENT
 from support.control_groups import memory_limit
 from support.processes import alive, descendants, eventually, kill
 from support.service_processes import ROLES, SPEC, Service, serving
@@ -30,6 +31,7 @@ ESSENTIAL = "coordinator"
 ATTEMPTS = {
     "api": {1},
     "coordinator": {2},
+    "reader": {1},
     "head": {2},
     "raylet": {1, 2},
     "gcs": {1, 2},
@@ -136,3 +138,21 @@ def test_killed_service_leaves_no_process_and_continues_after_a_start(
             assert second.found(waiting) == undisturbed[1]
             assert second.submit(LONG, key="long") == job
     eventually(lambda: not alive(children), seconds=120.0)
+
+
+@pytest.mark.ci
+def test_an_upload_after_a_killed_reader_waits_for_the_next_one(service: Service) -> None:
+    reader = service.one("reader")
+    kill(reader)
+    eventually(lambda: not alive([reader]))
+    record = service.folder.with_suffix(".csv").read_bytes() + b"\n"
+    uploaded = service.client.post("/v1/datasets", files={"file": ("again.csv", record)}, timeout=60.0)
+    assert uploaded.status_code == 201, uploaded.text
+    assert service.one("reader") != reader
+
+
+@pytest.mark.ci
+def test_the_reader_of_a_service_has_no_secret_of_it(service: Service) -> None:
+    environment = Path(f"/proc/{service.one('reader')}/environ").read_bytes().decode().split("\0")
+    names = {entry.partition("=")[0] for entry in environment if entry}
+    assert names == {*ENVIRONMENT, "ISLANDS_READERS", "ISLANDS_LIFELINE"}

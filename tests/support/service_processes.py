@@ -20,6 +20,7 @@ from support.processes import alive, descendants, eventually
 ROLES = {
     "api": "-m islands_api",
     "coordinator": "-m islands_service.coordinator",
+    "reader": "-m islands_service.intake.fork_server",
     "head": "-m islands_service.runtime.ray_head",
     "raylet": "raylet/raylet ",
     "gcs": "gcs/gcs_server ",

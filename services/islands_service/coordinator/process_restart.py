@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
@@ -11,7 +12,7 @@ from typing import NoReturn
 _STANDARD = (0, 1, 2)
 
 
-def restart_process(lifeline: int | None) -> NoReturn:
+def restart_process(kept: Collection[int | None]) -> NoReturn:
     """Start the program of this process again in its place, with the same arguments and environment.
 
     All threads end at once, whatever they compute, and child processes are killed. Ray notices that the
@@ -20,8 +21,8 @@ def restart_process(lifeline: int | None) -> NoReturn:
 
     Parameters
     ----------
-    lifeline : int or None
-        File descriptor that stays open: the heartbeat pipe of the supervisor.
+    kept : collection of int or None
+        File descriptors that stay open: those that the supervisor has passed.
     """
     for child in _find_children():
         with suppress(ProcessLookupError, ChildProcessError):
@@ -29,7 +30,7 @@ def restart_process(lifeline: int | None) -> NoReturn:
             os.waitpid(child, 0)
     for descriptor in [int(each.name) for each in Path("/proc/self/fd").iterdir()]:
         # Without this, Ray's connections would stay open.
-        if descriptor not in (*_STANDARD, lifeline):
+        if descriptor not in (*_STANDARD, *kept):
             with suppress(OSError):
                 os.set_inheritable(descriptor, False)
     os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])

@@ -14,6 +14,9 @@ from islands_service.intake.confinement import confine
 #: Environment of a process, without any secret.
 ENVIRONMENT = {"PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 
+#: Environment variable with the file descriptor of the socket between the service and its fork server.
+REQUESTS = "ISLANDS_READERS"
+
 #: Exit status if the file is unusable and the reason is the answer.
 _REFUSED = 3
 

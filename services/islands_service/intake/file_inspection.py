@@ -5,24 +5,23 @@ A file that exhausts memory, or makes its reader loop, ends only this subprocess
 
 import asyncio
 import json
-from asyncio.subprocess import PIPE
+import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from islands.errors import RecordError, SettingsError, suggest
 from islands_service.intake.confined_process import (
-    ENVIRONMENT,
     check_status,
     enter,
-    make_command,
     make_message,
     refuse,
     send_document,
     timeout_error,
 )
+from islands_service.intake.reader_process import FORK_SERVER, ReaderProcess
 
 if TYPE_CHECKING:
     from islands.io.records import Preview
@@ -86,39 +85,49 @@ async def inspect_file(
     RecordError
         The file or the requested columns cannot be read.
     """
-    process = await asyncio.create_subprocess_exec(
-        *make_command("file_inspection"), stdin=PIPE, stdout=PIPE, stderr=PIPE, env=ENVIRONMENT
-    )
-    try:
-        async with asyncio.timeout(seconds):
-            assert process.stdin is not None
-            process.stdin.write(make_message(path, memory, seconds, asdict(request)))
-            process.stdin.close()
-            answer, complaint = await asyncio.gather(
-                _read_output(process, process.stdout), _read_output(process, process.stderr)
-            )
-            await process.wait()
-    except TimeoutError:
-        raise timeout_error(path.name, seconds) from None
-    finally:
-        if process.returncode is None:
+    with ExitStack() as files:
+        (answers, output), (complaints, errors) = _open_pipe(files), _open_pipe(files)
+        message = make_message(path, memory, seconds, asdict(request))
+        process = files.enter_context(
+            FORK_SERVER.start("file_inspection", message, output.fileno(), errors.fileno())
+        )
+        output.close()
+        errors.close()
+        try:
+            async with asyncio.timeout(seconds):
+                answer, complaint = await asyncio.gather(
+                    _read_output(process, answers), _read_output(process, complaints)
+                )
+                status = await process.wait_async()
+        except TimeoutError:
+            raise timeout_error(path.name, seconds) from None
+        finally:
             process.kill()
-            # A process ends for asyncio when its pipes are read to their end.
-            await process.communicate()
-    check_status(process.returncode, answer, complaint, path.name, memory, seconds)
+            await process.wait_async()
+    check_status(status, answer, complaint, path.name, memory, seconds)
     return dict(json.loads(answer))
 
 
-async def _read_output(process: asyncio.subprocess.Process, stream: asyncio.StreamReader | None) -> bytes:
+def _open_pipe(files: ExitStack) -> tuple[IO[bytes], IO[bytes]]:
+    """Return both ends of a pipe, which are closed with the stack."""
+    reading, writing = os.pipe()
+    return files.enter_context(os.fdopen(reading, "rb", 0)), files.enter_context(os.fdopen(writing, "wb", 0))
+
+
+async def _read_output(process: ReaderProcess, pipe: IO[bytes]) -> bytes:
     """Read an answer to its end; end the process if it is too long."""
-    assert stream is not None
+    stream = asyncio.StreamReader()
+    protocol = asyncio.StreamReaderProtocol(stream)
+    transport, _ = await asyncio.get_running_loop().connect_read_pipe(lambda: protocol, pipe)
     received = bytearray()
-    while chunk := await stream.read(_CHUNK):
-        if len(received) < _MAX_OUTPUT:
-            received += chunk
-        else:
-            with suppress(ProcessLookupError):
+    try:
+        while chunk := await stream.read(_CHUNK):
+            if len(received) < _MAX_OUTPUT:
+                received += chunk
+            else:
                 process.kill()
+    finally:
+        transport.close()
     return bytes(received)
 
 
@@ -140,7 +149,7 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
     RecordError, SettingsError
         The file, the requested columns or the options of reading cannot be used.
     """
-    # Import after the limits are set, so that the imported code is subject to them.
+    # Only the process that reads files imports its readers.
     from islands.io.records.preview import preview_table  # noqa: PLC0415
     from islands.io.records.reader import open_record  # noqa: PLC0415
     from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
@@ -231,7 +240,3 @@ def _check_usable(problems: Mapping[str, str], request: InspectionRequest) -> No
             )
         if problems[source]:
             raise RecordError(problems[source])
-
-
-if __name__ == "__main__":
-    main()

@@ -5,9 +5,7 @@ the columns and rows of the job, so that a record is read for every job, not onc
 """
 
 import json
-import os
 import signal
-import subprocess
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,14 +16,13 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands_service.intake.confined_process import (
-    ENVIRONMENT,
     check_status,
     enter,
-    make_command,
     make_message,
     refuse,
     timeout_error,
 )
+from islands_service.intake.reader_process import FORK_SERVER, open_memory
 
 #: Largest number of bytes of the description of a record, and of an error message.
 _MAX_HEADER = 16_000_000
@@ -67,30 +64,27 @@ def read_confined(path: Path, request: RecordRequest, memory: int, seconds: floa
     MemoryError
         The subprocess was killed, as the kernel does if the machine has too little memory.
     """
-    with _open_memory("record") as output, _open_memory("errors") as errors:
-        command = make_command("record_reading")
-        with subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=output, stderr=errors, env=ENVIRONMENT
-        ) as process:
-            try:
-                process.communicate(make_message(path, memory, seconds, asdict(request)), timeout=seconds)
-            except subprocess.TimeoutExpired:
-                raise timeout_error(path.name, seconds) from None
-            finally:
-                process.kill()
+    message = make_message(path, memory, seconds, asdict(request))
+    with (
+        open_memory("record") as output,
+        open_memory("errors") as errors,
+        FORK_SERVER.start("record_reading", message, output.fileno(), errors.fileno()) as process,
+    ):
+        try:
+            status = process.wait(seconds)
+        except TimeoutError:
+            raise timeout_error(path.name, seconds) from None
+        finally:
+            process.kill()
+            process.wait()
         output.seek(0)
         errors.seek(0)
-        if process.returncode == -signal.SIGKILL:
+        if status == -signal.SIGKILL:
             raise MemoryError(f"the process that reads {path.name} was killed: check the machine's memory")
-        if process.returncode:
+        if status:
             answer, complaint = output.read(_MAX_HEADER), errors.read(_MAX_HEADER)
-            check_status(process.returncode, answer, complaint, path.name, memory, seconds)
+            check_status(status, answer, complaint, path.name, memory, seconds)
         return receive_record(output)
-
-
-def _open_memory(name: str) -> IO[bytes]:
-    """Open a file in memory, whose size the limits of the subprocess bound, unlike that of a pipe."""
-    return os.fdopen(os.memfd_create(name), "w+b")
 
 
 def send_record(record: Dataset, stream: IO[bytes]) -> None:
@@ -127,7 +121,7 @@ def _to_tuple(value: object) -> object:
 def main() -> None:
     """Read the file named on standard input, and write the record to standard output."""
     path, asked, answer = enter(writes=True)
-    # Import after the limits are set, so that the imported code is subject to them.
+    # Only the process that reads files imports its readers.
     from islands.io.records import read_dataset  # noqa: PLC0415
     from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
     from islands.io.records.row_range import parse_rows  # noqa: PLC0415
@@ -148,7 +142,3 @@ def main() -> None:
         refuse(error, answer)
     send_record(record, answer)
     answer.flush()
-
-
-if __name__ == "__main__":
-    main()

@@ -31,7 +31,7 @@ def test_a_port_in_use_is_refused() -> None:
 def test_coordinators_of_one_service_have_different_ports(tmp_path: Path) -> None:
     def ports(**changes: int) -> list[str]:
         settings = ServiceSettings(data_dir=tmp_path, coordinators=2, **changes)
-        commands = [role.command for role in roles(settings) if role.name.startswith("coordinator")]
+        commands = [role.command for role in roles(settings, 3, 4) if role.name.startswith("coordinator")]
         return [command[-1] for command in commands if "--metrics-port" in command]
 
     assert ports(metrics_port=9100) == ["9100", "9101"]

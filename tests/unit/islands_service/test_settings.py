@@ -74,12 +74,13 @@ def test_child_process_has_the_same_settings(monkeypatch, tmp_path):
         log_format="json",
         rate=0.0,
         lifeline=7,
+        readers=8,
     )
     environment = given.environment()
-    assert "ISLANDS_LIFELINE" not in environment
+    assert not {"ISLANDS_LIFELINE", "ISLANDS_READERS"} & environment.keys()
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
-    assert service_settings() == given.model_copy(update={"lifeline": None})
+    assert service_settings() == given.model_copy(update={"lifeline": None, "readers": None})
 
 
 def test_database_is_read_from_a_file_which_child_processes_read_again(monkeypatch, tmp_path):

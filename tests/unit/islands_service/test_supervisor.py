@@ -137,6 +137,22 @@ def test_role_that_exits_is_restarted(supervised: Start) -> None:
     assert running.process.returncode == 0
 
 
+def test_separate_environment_and_descriptors_of_a_role_outlast_a_restart(
+    supervised: Start, tmp_path: Path
+) -> None:
+    script = """
+note("own" if set(os.environ) <= {"JOURNAL", "ISLANDS_LIFELINE", "ERRORS", "LC_CTYPE"} else "foreign")
+os.write(int(os.environ["ERRORS"]), b"written\\n")
+if len(open(os.environ["JOURNAL"]).read().split("own")) < 3: sys.exit(7)
+stay()
+"""
+    environment = {"JOURNAL": str(tmp_path / "journal")}
+    running = supervised(role("api", script, environment=environment, descriptors={"ERRORS": 2}))
+    running.started()
+    assert running.order("own", "foreign") == ["api own"] * 2
+    assert running.end().count("written") == 2
+
+
 def test_role_without_heartbeats_is_killed_and_restarted(supervised: Start) -> None:
     running = supervised(role("api", "LIVE = lambda: None\nstay()", patience=0.3))
     (first, _, _, pid), (second, *_) = running.started(2)[:2]

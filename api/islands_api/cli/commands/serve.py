@@ -2,6 +2,7 @@
 
 import secrets
 import signal
+import socket
 import sys
 from itertools import chain
 from pathlib import Path
@@ -13,11 +14,12 @@ from islands.cli.console import errors
 from islands.distribution import describe_missing_extra, list_missing_packages
 from islands.errors import SettingsError
 from islands_api.cli.service.store_options import refuse_password
+from islands_service.intake.confined_process import ENVIRONMENT, REQUESTS, make_command
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.supervisor import Role, folder_lock, supervise
 
-#: Seconds without a heartbeat after which the API process is restarted.
-_API_HEARTBEAT_TIMEOUT = 10.0
+#: Seconds without a heartbeat after which the API process and the fork server are restarted.
+_HEARTBEAT_TIMEOUT = 10.0
 
 #: Seconds without a heartbeat after which the local Ray head is restarted.
 _RAY_HEARTBEAT_TIMEOUT = 20.0
@@ -78,7 +80,11 @@ def serve(
         )
         # The address of an earlier run's Ray is stale.
         settings.ray_address_file.unlink(missing_ok=True)
-        status = supervise(roles(settings), settings.environment())
+        # Both ends stay open here: requests wait while the fork server starts again.
+        requests, readers = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with requests, readers:
+            children = roles(settings, requests.fileno(), readers.fileno())
+            status = supervise(children, settings.environment())
     sys.exit(status)
 
 
@@ -103,10 +109,29 @@ def check_packages(settings: ServiceSettings) -> None:
         raise SettingsError(describe_missing_extra(user, *filter(absent.get, absent)))
 
 
-def roles(settings: ServiceSettings) -> list[Role]:
-    """Return the child processes: the API, the coordinators, and Ray unless a cluster is given."""
+def roles(settings: ServiceSettings, requests: int, readers: int) -> list[Role]:
+    """Return the child processes: API, fork server, coordinators, and Ray unless a cluster is given.
+
+    Parameters
+    ----------
+    requests, readers : int
+        File descriptors of the socket of the fork server: its own end, and that of its clients.
+    """
     python = (sys.executable, "-m")
-    children = [Role("api", (*python, "islands_api"), _API_HEARTBEAT_TIMEOUT, orphaned=signal.SIGKILL)]
+    clients = {REQUESTS: readers}
+    children = [
+        Role(
+            *("api", (*python, "islands_api"), _HEARTBEAT_TIMEOUT),
+            orphaned=signal.SIGKILL,
+            descriptors=clients,
+        ),
+        Role(
+            *("reader", make_command("fork_server"), _HEARTBEAT_TIMEOUT),
+            orphaned=signal.SIGKILL,
+            descriptors={REQUESTS: requests},
+            environment=ENVIRONMENT,
+        ),
+    ]
     needs = () if settings.ray_address else ("ray",)
     instance = _get_instance(settings.data_dir)
     children += [
@@ -118,6 +143,7 @@ def roles(settings: ServiceSettings) -> list[Role]:
             ),
             max(settings.lease, _MIN_COORDINATOR_TIMEOUT),
             needs=needs,
+            descriptors=clients,
         )
         for index in range(settings.coordinators)
     ]

@@ -22,6 +22,7 @@ from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import Rank, get_model
 from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, MONITORING, REPORT
 from islands_service.domain.job_spec import parse_identification
+from islands_service.intake.confined_process import REQUESTS
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
 from islands_service.store.database import StorageFullError, StoreUnavailableError
@@ -242,6 +243,8 @@ async def _draw(state: AppState, caller: Principal, job: str, rank: int | None) 
 
 async def _run_figure_worker(state: AppState, caller: Principal, job: str, rank: int | None) -> None:
     options = () if rank is None else ("--rank", str(rank))
+    readers = state.settings.readers
+    inherited = {} if readers is None else {REQUESTS: str(readers)}
     process = await asyncio.create_subprocess_exec(
         *(
             sys.executable,
@@ -253,7 +256,8 @@ async def _run_figure_worker(state: AppState, caller: Principal, job: str, rank:
         ),
         stdout=PIPE,
         stderr=PIPE,
-        env=state.settings.environment(),
+        env=state.settings.environment() | inherited,
+        pass_fds=tuple(map(int, inherited.values())),
     )
     try:
         async with asyncio.timeout(_DRAWING_TIMEOUT):

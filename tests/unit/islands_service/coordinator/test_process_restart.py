@@ -24,7 +24,7 @@ other, _ = os.pipe()
 other = os.dup2(other, 100, inheritable=True)
 with open(marker, "w") as file:
     print(child.pid, other, os.getpid(), file=file)
-Timer(0.1, restart_process, (lifeline,)).start()
+Timer(0.1, restart_process, ((lifeline, None),)).start()
 while True:
     pass
 """

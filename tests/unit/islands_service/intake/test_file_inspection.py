@@ -48,12 +48,9 @@ def inspect(path, asked=None, memory=MEMORY, seconds=SECONDS):
 
 
 def inspections():
-    """Return the inspection processes of this process."""
-    return [
-        pid
-        for pid, line in descendants(os.getpid()).items()
-        if "islands_service.intake.file_inspection" in line
-    ]
+    """Return the processes that a fork server of this process has forked."""
+    servers = [pid for pid, line in descendants(os.getpid()).items() if "intake.fork_server" in line]
+    return [pid for server in servers for pid in descendants(server)]
 
 
 @pytest.fixture
@@ -185,7 +182,8 @@ def test_process_has_no_secrets_and_no_files_of_the_service(endless, tmp_path, m
 
     with (tmp_path / "islands.db").open("rb"):
         environment, opened, limits = asyncio.run(run())
-    assert environment.keys() <= {b"PATH", b"OPENBLAS_NUM_THREADS", b"PYTHONDONTWRITEBYTECODE"}
+    names = ("PATH", "OPENBLAS_NUM_THREADS", "PYTHONDONTWRITEBYTECODE", "ISLANDS_READERS")
+    assert environment.keys() <= {name.encode() for name in names}
     assert not [path for path in opened if path.endswith(".db") or path.startswith("socket")]
     assert limits["Max address space"] == [str(MEMORY)] * 2
     assert limits["Max cpu time"] == ["31", "31"]
@@ -245,9 +243,8 @@ def test_the_service_and_other_owners_are_not_delayed_by_the_slow_files_of_one(s
         assert len(service.client.get("/v1/datasets", headers=slow).json()["items"]) == 3
 
 
-def test_an_endless_answer_is_refused(record, monkeypatch):
-    program = ("python3", "-c", "while True: print('0' * 65536)")
-    monkeypatch.setattr(file_inspection, "make_command", lambda _: program)
+def test_an_endless_answer_is_refused(record, monkeypatch, programs):
+    monkeypatch.setattr(file_inspection, "FORK_SERVER", programs("while True: print('0' * 65536)"))
     monkeypatch.setattr(file_inspection, "_MAX_OUTPUT", 1_000_000)
     with pytest.raises(RecordError, match="it is damaged, or unpacks to more"):
         inspect(record)

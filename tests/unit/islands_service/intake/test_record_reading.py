@@ -104,17 +104,16 @@ def test_an_answer_that_is_not_a_record_is_refused(answer):
         ("raise ValueError('boom')", r"cannot be read within 6.0 GB of memory and 1 s \(ValueError: boom\)"),
     ],
 )
-def test_a_process_that_fails_is_a_clear_error(tmp_path, monkeypatch, program, words):
+def test_a_process_that_fails_is_a_clear_error(tmp_path, monkeypatch, programs, program, words):
     path = tmp_path / "a.csv"
     path.touch()
-    monkeypatch.setattr(record_reading, "make_command", lambda _: ("python3", "-c", program))
+    monkeypatch.setattr(record_reading, "FORK_SERVER", programs(program))
     with pytest.raises(RecordError, match=words):
         read_confined(path, RecordRequest(["u"], "y", None, None, {}), MEMORY, 1.0)
 
 
 @pytest.mark.ci
-def test_a_killed_process_is_reported_as_a_lack_of_memory(tmp_path, monkeypatch):
-    script = "import os; os.kill(os.getpid(), 9)"
-    monkeypatch.setattr(record_reading, "make_command", lambda _: ("python3", "-c", script))
+def test_a_killed_process_is_reported_as_a_lack_of_memory(tmp_path, monkeypatch, programs):
+    monkeypatch.setattr(record_reading, "FORK_SERVER", programs("import os; os.kill(os.getpid(), 9)"))
     with pytest.raises(MemoryError, match="was killed"):
         read_confined(Path(tmp_path), RecordRequest(["u"], "y", None, None, {}), MEMORY, 5.0)

@@ -6,6 +6,7 @@ import pytest
 
 from islands.errors import SettingsError
 from islands_api.cli.commands.serve import roles
+from islands_service.intake.confined_process import ENVIRONMENT
 from islands_service.liveness import EVERY
 from islands_service.settings import ServiceSettings, service_settings
 
@@ -13,7 +14,7 @@ from islands_service.settings import ServiceSettings, service_settings
 def coordinator_timeout(folder: Path, lease: float) -> float:
     """Return the heartbeat timeout of a coordinator."""
     settings = ServiceSettings(data_dir=folder, lease=lease)
-    return next(role for role in roles(settings) if role.name == "coordinator 0").patience
+    return next(role for role in roles(settings, 3, 4) if role.name == "coordinator 0").patience
 
 
 def test_coordinator_timeout_is_the_lease_or_several_heartbeats(
@@ -32,6 +33,13 @@ def test_lease_shorter_than_a_second_is_rejected(tmp_path: Path, lease: float) -
 def test_password_of_the_database_is_no_argument_of_a_process(tmp_path: Path) -> None:
     """Every user of the machine can read the arguments."""
     settings = ServiceSettings(data_dir=tmp_path, database="postgresql+psycopg://me:secret@host/islands")
-    commands = [role.command for role in roles(settings)]
-    assert len(commands) == 2 + settings.coordinators
+    commands = [role.command for role in roles(settings, 3, 4)]
+    assert len(commands) == 3 + settings.coordinators
     assert "secret" not in repr(commands)
+
+
+def test_the_reader_of_files_has_no_settings_of_the_service(tmp_path: Path) -> None:
+    """A file may make it execute code, and the settings contain secrets."""
+    (reader,) = [role for role in roles(ServiceSettings(data_dir=tmp_path), 3, 4) if role.name == "reader"]
+    assert reader.environment == ENVIRONMENT
+    assert reader.descriptors == {"ISLANDS_READERS": 3}
