@@ -1,9 +1,20 @@
 """Progress callbacks of long computations, and requests to stop them."""
 
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 from islands.errors import IslandsError
+from islands.parallel import ParallelMap
+
+A = TypeVar("A")
+R = TypeVar("R")
+
+#: Seconds for which no time left is estimated.
+_FIRST_SECONDS = 1.0
+
+#: Part of the time left after which an estimate without a further report is not shown.
+_VALID_PART = 0.75
 
 #: Returns true if the computation must end.
 Stop = Callable[[], bool]
@@ -31,6 +42,144 @@ def ignore_progress(_message: str, _fraction: float | None = None, /) -> None:
 def never_stop() -> bool:
     """Return that the computation may continue."""
     return False
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """Phase of a long computation.
+
+    Attributes
+    ----------
+    beginning : str
+        Beginning of the messages of the phase.
+    share : float
+        Its time relative to that of the other phases, as it was measured.
+    steps : int
+        Number of its messages with this beginning and of its parallel maps, as it was measured.
+    """
+
+    beginning: str
+    share: float
+    steps: int = 1
+
+
+class PhasedProgress:
+    """Progress callback that adds the completed fraction of the whole computation to messages.
+
+    A phase that is skipped takes no time: its share is left out of the whole. Fractions never decrease.
+
+    Parameters
+    ----------
+    progress : ProgressCallback
+        Receives messages with fractions of the whole.
+    phases : sequence of Phase
+        In their order. A message belongs to the first phase with its beginning, from the present one on;
+        one that belongs to none is part of the present phase.
+    """
+
+    def __init__(self, progress: ProgressCallback, phases: Sequence[Phase]) -> None:
+        self._progress, self._phases = progress, phases
+        self._message, self._fraction = "", 0.0
+        self._present, self._before = 0, 0.0
+        self._within, self._steps, self._has_begun = 0.0, 0, False
+
+    @property
+    def rest(self) -> float:
+        """Time of the phases after the present one, relative to that of the present one."""
+        present, *after = self._phases[self._present :]
+        return sum(phase.share for phase in after) / present.share
+
+    def __call__(self, message: str, fraction: float | None = None, /) -> None:
+        """Report a message, with the completed part of its phase if it is known."""
+        found = self._find(message)
+        if found is not None and found > self._present:
+            self._before += self._phases[self._present].share if self._has_begun else 0.0
+            self._present, self._within, self._steps = found, 0.0, 0
+        elif found is not None and self._has_begun and message != self._message:
+            self._steps += 1
+            self._advance(0.0)
+        if found is not None and fraction is not None:
+            self._within = max(self._within, min(fraction, 1.0))
+        self._has_begun = self._has_begun or found is not None
+        self._message = message
+        self._report()
+
+    def count(self, parallel_map: ParallelMap) -> ParallelMap:
+        """Return a map that reports how many of its calls have ended, as a part of the present phase."""
+
+        def counted_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
+            listed = list(arguments)
+            for ended, result in enumerate(parallel_map(function, listed), start=1):
+                yield result
+                self._advance(ended / len(listed))
+                self._report()
+            self._steps += 1
+
+        return counted_map
+
+    def _find(self, message: str) -> int | None:
+        """Return the phase of a message; None if it belongs to none from the present one on."""
+        for index in range(self._present, len(self._phases)):
+            if message.startswith(self._phases[index].beginning):
+                return index
+        return None
+
+    def _advance(self, ended: float) -> None:
+        within = (self._steps + ended) / self._phases[self._present].steps
+        self._within = max(self._within, min(within, 1.0))
+
+    def _report(self) -> None:
+        present, *after = (phase.share for phase in self._phases[self._present :])
+        whole = self._before + present + sum(after)
+        self._fraction = max(self._fraction, (self._before + self._within * present) / whole)
+        self._progress(self._message, self._fraction)
+
+
+def report_part(progress: ProgressCallback, begin: float, end: float) -> ProgressCallback:
+    """Return a callback for a part of a computation, which takes it from one fraction to another."""
+
+    def report(message: str, fraction: float | None = None, /) -> None:
+        progress(message, None if fraction is None else begin + (end - begin) * fraction)
+
+    return report
+
+
+class TimeLeft:
+    """Estimate of the time that a computation still takes, from the fractions that it reports.
+
+    It decreases between two reports. It is None in the first moments, and if no report has come during the
+    larger part of the time that was left: then a step takes longer than expected.
+
+    Parameters
+    ----------
+    began : float
+        Time at which the computation began, in seconds by the clock of the caller.
+    least : float
+        Fraction from which the time left is estimated.
+    """
+
+    def __init__(self, began: float, least: float = 0.05) -> None:
+        self._began, self._least, self._fraction = began, least, 0.0
+        self._estimate: tuple[float, float] | None = None
+
+    def update(self, fraction: float, now: float) -> None:
+        """Estimate the time left from the completed fraction; a smaller one begins another computation."""
+        if fraction < self._fraction:
+            self._began, self._estimate = now, None
+        elif fraction > self._fraction and fraction >= self._least:
+            self.expect((now - self._began) * (1.0 - fraction) / fraction, now)
+        self._fraction = fraction
+
+    def expect(self, seconds: float, now: float) -> None:
+        """Take the time left from another estimate."""
+        self._estimate = seconds, now
+
+    def at(self, now: float) -> float | None:
+        """Return the seconds left at a time; None if they are unknown."""
+        if self._estimate is None or now - self._began < _FIRST_SECONDS:
+            return None
+        seconds, then = self._estimate
+        return None if now - then > _VALID_PART * seconds else seconds - (now - then)
 
 
 class StoppedError(IslandsError):

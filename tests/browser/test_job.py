@@ -42,13 +42,38 @@ def test_the_convergence_chart_grows_with_the_events(
             expect(page.locator(".status .progress-text")).to_have_text(f"{last} / 500")
             expect(page.locator("figure.chart .position").first).to_have_text(f"generation {last}")
             assert legend(page) == pytest.approx(island_errors(last))
-    expect(page.get_by_text("about 6.0 s")).to_be_visible()
+    # It is counted down.
+    expect(page.get_by_text(re.compile(r"about [56]\.\d s"))).to_be_visible()
     lines = page.locator("figure.chart").first.locator("path.line[data-name]")
     # One point for each reported generation.
     assert [line.get_attribute("d").count("L") for line in lines.all()] == [200, 200]
     sizes = page.locator("figure.chart").last
     expect(sizes.locator("circle.line")).to_have_count(5)
     expect(sizes.locator(".position")).to_have_text("terms 5")
+
+
+@pytest.mark.ci
+def test_bar_and_time_left_of_a_search_move_from_its_first_phase_on(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500, name="piezo")
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    bar, text = page.locator(".status progress"), page.locator(".status .progress-text")
+    with stored(desk) as store:
+        lease = taken(store, job)
+        expect(page.locator(".title .state")).to_have_text("running")
+        for phase, fraction, left in (("preset auto: trial of smooth", 0.05, None), ("search", 0.4, 4.0)):
+            progress = {"phase": phase, "fraction": fraction, "seconds_left": left}
+            store.leases.report(lease, ProgressReport(progress))
+            expect(text).to_have_text(phase)
+            assert bar.evaluate("bar => bar.value") == pytest.approx(fraction)
+        facts = page.locator(".status .facts")
+        expect(facts).to_contain_text(re.compile(r"about 3\.\d s"))
+        expect(facts).to_contain_text(re.compile(r"about 1\.\d s"))
+        # Without a further report the estimate is not kept.
+        expect(facts).to_contain_text("longer than expected")
+        advance(store, lease, 0, 250)
+        expect(text).to_have_text("250 / 500")
 
 
 @pytest.mark.ci

@@ -4,11 +4,12 @@ import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from math import inf, isfinite
-from time import monotonic
+from time import monotonic, time
 from typing import Any
 
 from starlette.responses import JSONResponse
 
+from islands.progress import TimeLeft
 from islands_service.domain.job import TERMINAL, WAITING_PHASE, Job, JobState
 from islands_service.domain.monitoring import Monitor
 from islands_service.domain.owner import Owner
@@ -69,7 +70,7 @@ def _select_progress(job: Job) -> dict[str, Any] | None:
     The phase of a job that does not run is its state.
     """
     if job.state == JobState.RUNNING:
-        return None if job.progress is None else dict(job.progress)
+        return None if job.progress is None else _count_down(dict(job.progress), job.updated)
     reached = {name: value for name, value in (job.progress or {}).items() if name not in _OF_ATTEMPTS}
     # The store gives the reason why a job has to wait for its next attempt.
     if job.state == JobState.QUEUED and (job.progress or {}).get("phase") == WAITING_PHASE:
@@ -77,6 +78,15 @@ def _select_progress(job: Job) -> dict[str, Any] | None:
     if job.state in TERMINAL and job.progress is None:
         return None
     return {**reached, "phase": job.state}
+
+
+def _count_down(progress: dict[str, Any], reported: float) -> dict[str, Any]:
+    """Subtract the time since the last report from the time left."""
+    if progress.get("seconds_left") is not None:
+        left = TimeLeft(-inf)
+        left.expect(progress["seconds_left"], reported)
+        progress["seconds_left"] = left.at(max(time(), reported))
+    return progress
 
 
 class QueuePlaces:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from math import isfinite
+from sys import maxsize
 from time import monotonic, sleep
 from typing import Any
 
@@ -19,19 +20,21 @@ from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.coupled.identification import identify_coupled
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.fit import fit
+from islands.facade.identification_progress import CLASS_PHASES, SEARCH, IdentificationProgress
 from islands.facade.identify import identify
 from islands.facade.results.identification import Result
 from islands.io.checkpoints import history_document
 from islands.io.models import NARX, model_json
 from islands.io.result_folder import result_document
 from islands.io.result_text.model_description import describe
-from islands.progress import StoppedError
+from islands.progress import PhasedProgress, ProgressCallback, StoppedError, TimeLeft
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import RUN_TIME, JobOutcome, JobState, ProgressReport
 from islands_service.domain.job_spec import Identification, parse_identification
+from islands_service.domain.search_limits import resolve_job_settings
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.outage_log import OutageLog
 from islands_service.runtime.errors import ClusterError
@@ -60,7 +63,7 @@ def run_identification_job(run: JobRun) -> JobOutcome:
     checkpoints = JobCheckpoints(run.job, run.blobs)
     start = checkpoints.read()
     stop = SearchStop(run.check)
-    reporter = ProgressReporter(run, checkpoints, stop, start, len(spec.outputs))
+    reporter = ProgressReporter(run, checkpoints, stop, start, spec, record.samples)
     try:
         if len(spec.outputs) > 1:
             coupled = _identify_outputs(record, validation, spec, start, run.engine, reporter, stop)
@@ -244,6 +247,14 @@ def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> Job
     return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
 
 
+def _make_progress(progress: ProgressCallback, spec: Identification, samples: int) -> PhasedProgress:
+    if spec.model != NARX:
+        return PhasedProgress(progress, CLASS_PHASES)
+    settings, *_ = resolve_job_settings(spec, maxsize, maxsize)
+    outputs = spec.outputs if len(spec.outputs) > 1 else ()
+    return IdentificationProgress(progress, spec.preset, samples, settings, outputs)
+
+
 class ProgressReporter:
     """Progress callback that stores progress, history and checkpoints of a search."""
 
@@ -253,13 +264,18 @@ class ProgressReporter:
         checkpoints: JobCheckpoints,
         stop: Callable[[], object],
         start: JobStart,
-        outputs: int = 1,
+        spec: Identification,
+        samples: int,
     ) -> None:
-        self._outputs = outputs
+        self._outputs = len(spec.outputs)
+        self._phases = _make_progress(self._keep_stage, spec, samples)
         self._run, self._checkpoints, self._stop = run, checkpoints, stop
         self._started_at = monotonic() - start.spent
         state = start.state and sum_searches(start.state)
-        self._first = (monotonic(), 0 if state is None else state.evaluations)
+        #: Time and evaluations after the first epoch of this process, which the rate begins with.
+        self._first: tuple[float, int] | None = None
+        self._left = TimeLeft(self._started_at)
+        self._stage: dict[str, Any] = {}
         self._note = {"note": start.note} if start.note else {}
         # Number of stored points that will not change. The last point of a history is replaced until the best
         # improves.
@@ -282,16 +298,24 @@ class ProgressReporter:
         if monotonic() >= min(self._report_at, self._checkpoint_at):
             self._report(state, settings)
 
-    def report_stage(self, message: str, _fraction: float | None = None, /) -> None:
+    def report_stage(self, message: str, fraction: float | None = None, /) -> None:
         """Store the stage before or after the epochs as the phase."""
         self._stop()
+        self._phases(message, fraction)
         reached = self._progress(*self._last) if self._last else self._reached_before()
         try:
-            progress = self._run.notes.complete({**reached, "phase": message})
+            progress = self._run.notes.complete({**reached, **self._stage})
             self._run.store.leases.report(self._run.lease, ProgressReport(progress))
         except StoreError as error:
             # Continue the search. The next report has the progress.
             self._outage.fail(error, job=self._run.job.id)
+
+    def _keep_stage(self, message: str, fraction: float | None = None, /) -> None:
+        """Keep the phase, the completed fraction of the job and the time left for the next report."""
+        now = monotonic()
+        assert fraction is not None
+        self._left.update(fraction, now)
+        self._stage = {"phase": message, "fraction": fraction, "seconds_left": self._left.at(now)}
 
     def _reached_before(self) -> dict[str, Any]:
         """Return the progress of earlier attempts, without their note."""
@@ -309,7 +333,9 @@ class ProgressReporter:
         started = monotonic()
         summed = sum_searches(state)
         points, after = self._points(summed)
-        progress = self._run.notes.complete(self._progress(state, settings))
+        reached = self._progress(state, settings)
+        self._keep_search(state, settings, reached["evaluations_per_second"])
+        progress = self._run.notes.complete({**reached, **self._stage})
         report = ProgressReport(progress, points, after=after)
         try:
             if started >= self._checkpoint_at:
@@ -338,20 +364,26 @@ class ProgressReporter:
             # Also after a failure: a checkpoint of thousands of islands takes long, and may fail at its end.
             self._checkpoint_at = now + max(self._run.checkpoint_every, (now - started) / CHECKPOINT_SHARE)
 
+    def _keep_search(self, state: SearchState, settings: Settings, rate: float) -> None:
+        """Keep the completed fraction, and the time left by the speed of the search."""
+        assert isinstance(self._phases, IdentificationProgress)
+        left, now = self._phases.report_epoch(state, settings, rate), monotonic()
+        if left is not None:
+            self._left.expect(left, now)
+        self._stage |= {"phase": SEARCH, "seconds_left": self._left.at(now)}
+
     def _progress(self, searched: SearchState, settings: Settings) -> dict[str, Any]:
-        state = sum_searches(searched)
-        last, generations = state.history[-1], (settings.generations + 1) * self._outputs - 1
-        since, before = self._first
-        rate = (state.evaluations - before) / max(monotonic() - since, 1e-9)
-        left = (generations - last.generation) * settings.population * settings.islands
+        state, outputs = sum_searches(searched), self._outputs
+        last, generations = state.history[-1], (settings.generations + 1) * outputs - 1
+        now = monotonic()
+        since, before = self._first = self._first or (now, state.evaluations)
+        rate = (state.evaluations - before) / max(now - since, 1e-9)
         best = {size: error**0.5 for size, error in last.best.items()}
         return {
-            "phase": "search",
             "generation": last.generation,
             "generations": generations,
             "evaluations": state.evaluations,
             "evaluations_per_second": rate,
-            "seconds_left": left / rate if rate > 0.0 else None,
             "best_error": min((error for error in best.values() if isfinite(error)), default=None),
             "best_by_size": best,
             "islands": [least**0.5 if isfinite(least) else None for least in last.islands],

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from threading import Thread
+from time import monotonic
 from typing import Protocol
 
 from rich.console import Group
@@ -21,6 +22,7 @@ from rich.text import Text
 
 from islands.cli.console import errors
 from islands.cli.stop_requests import end_at_once
+from islands.progress import TimeLeft
 
 #: Fraction from which the time left is estimated.
 MIN_FRACTION = 0.05
@@ -33,41 +35,82 @@ _JOIN_SECONDS = 0.1
 class Display(Protocol):
     """Progress callback that can show lines below its bar."""
 
-    def __call__(self, message: str, fraction: float | None = None, /, lines: Sequence[str] = ()) -> None:
-        """Show a message next to the bar, the completed fraction, and lines below the bar."""
+    def __call__(
+        self,
+        message: str,
+        fraction: float | None = None,
+        /,
+        lines: Sequence[str] = (),
+        seconds_left: float | None = None,
+    ) -> None:
+        """Show a message next to the bar, the completed fraction, and lines below the bar.
+
+        The time left follows from the fractions, unless it is given.
+        """
         ...
 
 
 class FractionColumn(ProgressColumn):
-    """The completed fraction, and the time left if the rest takes as long in proportion."""
+    """The completed fraction, and the time left.
+
+    Parameters
+    ----------
+    left : TimeLeft
+        Estimate by the clock of the bar.
+    """
+
+    def __init__(self, left: TimeLeft) -> None:
+        super().__init__()
+        self._left = left
 
     def render(self, task: Task) -> Text:
-        """Return the text; it is empty as long as the fraction is small."""
-        if task.completed < MIN_FRACTION or task.elapsed is None:
+        """Return the text; it is empty before the first fraction."""
+        if not task.completed:
             return Text()
-        left = task.elapsed * (1.0 - task.completed) / task.completed
-        duration = f"{left:.0f} s" if left < 100 else f"{left / 60:.0f} min"
-        return Text(f"{task.completed:.0%}, {duration} left")
+        left = self._left.at(task.get_time())
+        return Text(f"{task.completed:.0%}{'' if left is None else f', {format_duration(left)} left'}")
+
+
+def format_duration(seconds: float) -> str:
+    """Return a duration as text."""
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 @contextmanager
-def progress(title: str) -> Iterator[Display]:
-    """Show a progress bar during the context."""
+def progress(title: str, least: float = MIN_FRACTION) -> Iterator[Display]:
+    """Show a progress bar during the context.
+
+    Parameters
+    ----------
+    least : float
+        Fraction from which the time left is shown.
+    """
+    left = TimeLeft(monotonic(), least)
     columns = (
         SpinnerColumn(),
         TextColumn("{task.fields[title]}"),
         BarColumn(),
         TimeElapsedColumn(),
-        FractionColumn(),
+        FractionColumn(left),
         TextColumn("{task.description}"),
     )
-    bar = Progress(*columns, console=errors)
+    bar = Progress(*columns, console=errors, get_time=monotonic)
     task = bar.add_task("", total=1.0, title=title)
     # The thread that refreshes the bar takes time from the command; a file or a pipe shows no bar.
     shown = errors.is_terminal
     with Live(bar, console=errors, transient=True, refresh_per_second=10, auto_refresh=shown) as live:
 
-        def show(message: str, fraction: float | None = None, /, lines: Sequence[str] = ()) -> None:
+        def show(
+            message: str,
+            fraction: float | None = None,
+            /,
+            lines: Sequence[str] = (),
+            seconds_left: float | None = None,
+        ) -> None:
+            if fraction is not None:
+                left.update(fraction, monotonic())
+            if seconds_left is not None:
+                left.expect(seconds_left, monotonic())
             bar.update(task, description=message, completed=fraction)
             live.update(Group(bar, *(Text(line) for line in lines)))
 

@@ -9,30 +9,56 @@ from islands.cli.progress_display import Display
 from islands.evolution.history import HistoryPoint
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
+from islands.facade.identification_progress import IdentificationProgress
 
 #: Largest number of islands that have a line each.
 SHOWN_ISLANDS = 16
 
 
-def search_progress(show: Display) -> Callable[[SearchState, Settings], None]:
-    """Return a callback that shows generation, speed, time left, and the best error by size and by island."""
-    began: list[tuple[float, int]] = []
+class SearchDisplay:
+    """Progress callbacks of an identification that show its messages and epochs in a bar.
 
-    def update(state: SearchState, settings: Settings) -> None:
+    Parameters
+    ----------
+    show : Display
+    preset, samples, settings, outputs
+        See `islands.facade.identification_progress.identification_phases`.
+    """
+
+    def __init__(
+        self,
+        show: Display,
+        preset: object,
+        samples: int,
+        settings: Settings,
+        outputs: Sequence[str] = (),
+    ) -> None:
+        self._show = show
+        self._progress = IdentificationProgress(self._show_stage, preset, samples, settings, outputs)
+        self._fraction = 0.0
+        self._first: tuple[float, int] | None = None
+
+    def __call__(self, message: str, fraction: float | None = None, /) -> None:
+        """Show a message of a stage before or after the epochs."""
+        self._progress(message, fraction)
+
+    def show_epoch(self, state: SearchState, settings: Settings) -> None:
+        """Show generation, speed, time left, and the best error by size and by island."""
         now = monotonic()
-        began[:] = began or [(now, state.evaluations)]
-        rate = (state.evaluations - began[0][1]) / max(now - began[0][0], 1e-9)
-        done, last = state.history[-1].generation, settings.generations
-        left = (last - done) * settings.population * len(state.archipelago.islands) / max(rate, 1e-9)
+        since, before = self._first = self._first or (now, state.evaluations)
+        rate = (state.evaluations - before) / max(now - since, 1e-9)
+        left = self._progress.report_epoch(state, settings, rate)
         best = " ".join(f"{size}:{error**0.5:.3g}" for size, error in state.history[-1].best.items())
-        remaining = f", {left:.0f} s left" if rate else ""
-        show(
-            f"generation {done}/{last}, {rate:.0f}/s{remaining}",
-            done / max(1, last),
+        self._show(
+            f"generation {state.history[-1].generation}/{settings.generations}, {rate:.0f}/s",
+            self._fraction,
             [f"  RMSE by terms  {best}", *_island_lines(state.history)],
+            left,
         )
 
-    return update
+    def _show_stage(self, message: str, fraction: float | None = None, /) -> None:
+        self._fraction = fraction or 0.0
+        self._show(message, fraction)
 
 
 def _has_error(island: int, error: float) -> Callable[[HistoryPoint], bool]:

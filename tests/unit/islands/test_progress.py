@@ -3,7 +3,7 @@
 import pytest
 
 from islands.errors import IslandsError
-from islands.progress import Steps, StoppedError
+from islands.progress import Phase, PhasedProgress, Steps, StoppedError, TimeLeft, report_part
 
 
 def test_needed_steps_are_reported_until_a_stop_is_requested() -> None:
@@ -35,3 +35,83 @@ def test_without_a_stop_function_no_step_is_left_out() -> None:
     steps = Steps()
     steps("search")
     assert not steps.skip("figures")
+
+
+PHASES = (Phase("read", 1.0), Phase("trial of", 2.0, 4), Phase("search", 4.0), Phase("assess", 1.0))
+
+
+def phased() -> tuple[PhasedProgress, list[tuple[str, float]]]:
+    reported: list[tuple[str, float]] = []
+    return PhasedProgress(
+        lambda message, fraction=None: reported.append((message, fraction)), PHASES
+    ), reported
+
+
+def test_fractions_are_those_of_the_whole_by_the_shares_of_the_phases() -> None:
+    progress, reported = phased()
+    for message, fraction in (("reading", None), ("trial of a", None), ("search", 0.5), ("assess", None)):
+        progress(message, fraction)
+    assert [fraction for _, fraction in reported] == pytest.approx([0.0, 1 / 8, 5 / 8, 7 / 8])
+
+
+def test_the_share_of_a_skipped_phase_is_no_part_of_the_whole() -> None:
+    progress, reported = phased()
+    progress("reading")
+    progress("search")
+    assert reported[-1] == ("search", pytest.approx(1 / 6))
+    first, seen = phased()
+    first("search", 0.0)
+    assert seen[-1] == ("search", 0.0)
+
+
+def test_messages_and_calls_of_a_phase_increase_the_fraction() -> None:
+    progress, reported = phased()
+    progress("trial of a")
+    progress("trial of b")
+    assert reported[-1][1] == pytest.approx(0.5 / 7)
+    assert list(progress.count(map)(abs, [-1, -2])) == [1, 2]
+    assert [fraction for _, fraction in reported[-2:]] == pytest.approx([0.75 / 7, 1 / 7])
+    progress("a message of no phase", 0.1)
+    progress("reading again", 0.0)
+    progress("search", 0.5)
+    progress("search", 0.2)
+    fractions = [fraction for _, fraction in reported]
+    assert fractions == sorted(fractions)
+    for _ in range(20):
+        list(progress.count(map)(abs, [1]))
+    assert reported[-1][1] == pytest.approx(6 / 7)
+
+
+def test_a_part_of_a_computation_takes_it_from_one_fraction_to_another() -> None:
+    reported: list[float | None] = []
+    report = report_part(lambda _, fraction=None: reported.append(fraction), 0.6, 0.8)
+    report("begins", 0.0)
+    report("unknown")
+    report("ends", 1.0)
+    assert reported == pytest.approx([0.6, None, 0.8])
+
+
+def test_time_left_decreases_between_reports_until_it_is_unknown() -> None:
+    left = TimeLeft(100.0)
+    left.update(0.5, 100.4)
+    assert left.at(100.5) is None  # in the first moments
+    left.update(0.6, 106.0)
+    assert [left.at(now) for now in (106.0, 107.0, 109.0, 109.1)] == pytest.approx([4.0, 3.0, 1.0, None])
+    left.update(0.6, 110.0)
+    assert left.at(110.0) is None  # the same fraction is no progress
+    left.update(0.8, 120.0)
+    assert left.at(120.0) == pytest.approx(5.0)
+
+
+def test_time_left_begins_again_with_a_smaller_fraction() -> None:
+    left = TimeLeft(0.0, least=0.3)
+    left.update(0.2, 10.0)
+    assert left.at(10.0) is None
+    left.update(0.5, 20.0)
+    assert left.at(20.0) == pytest.approx(20.0)
+    left.update(0.0, 30.0)
+    assert left.at(30.0) is None
+    left.update(0.5, 34.0)
+    assert left.at(34.0) == pytest.approx(4.0)
+    left.expect(60.0, 34.0)
+    assert left.at(35.0) == pytest.approx(59.0)

@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -147,7 +148,8 @@ def _describe_recommended(client: Client, job: JobView, models: Sequence[ModelVi
 @contextmanager
 def job_progress_bar() -> Iterator[Callable[[JobView], None]]:
     """Show the progress of a job in a bar; yield the function that updates it."""
-    with progress("job") as show:
+    # The service estimates the time left: this command may begin in the middle of a job.
+    with progress("job", inf) as show:
 
         def update(job: JobView) -> None:
             status = job.progress or {}
@@ -164,7 +166,8 @@ def job_progress_bar() -> Iterator[Callable[[JobView], None]]:
                 for index, error in enumerate(status.get("islands", ())[:_SHOWN_ISLANDS])
             ]
             fraction = status.get("fraction", done / last)
-            show(text, fraction if job.state not in TERMINAL else 1.0, islands)
+            left = status.get("seconds_left")
+            show(text, fraction if job.state not in TERMINAL else 1.0, islands, left)
 
         yield update
 

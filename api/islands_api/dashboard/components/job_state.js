@@ -63,13 +63,11 @@ export function makeProgressBar({ showsReason = false } = {}) {
   return {
     node: el("div", { class: "progress" }, bar, text),
     show(job) {
-      const { generation = 0, generations = 1 } = job.progress ?? {};
-      bar.value = job.state === "succeeded" ? 1 : generation / Math.max(1, generations);
-      if (!isSearch(job) && job.state === "running") {
-        const { fraction } = job.progress ?? {};
-        if (Number.isFinite(fraction)) bar.value = fraction;
-        else bar.removeAttribute("value");
-      }
+      const { fraction, generation = 0, generations = 1 } = job.progress ?? {};
+      const reached = Number.isFinite(fraction) ? fraction : generation / Math.max(1, generations);
+      bar.value = job.state === "succeeded" ? 1 : reached;
+      // Before the first report.
+      if (job.state === "running" && reached === 0) bar.removeAttribute("value");
       bar.className = getState(job);
       const reason = showsReason && job.state === "failed" ? job.problem?.detail : null;
       text.classList.toggle("reason", Boolean(reason));

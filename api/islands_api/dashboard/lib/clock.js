@@ -1,6 +1,7 @@
-/** Ages of events by the clock of the service, which may differ from the clock of this machine. */
+/** Ages of events by the clock of the service, which may differ from the clock of this machine; times left. */
 
 import { el, setText } from "./dom.js";
+import { formatDuration } from "./numbers.js";
 
 /** Milliseconds that the clock of the service is ahead of the local clock. */
 let offset = 0;
@@ -33,6 +34,27 @@ export const makeAge = (text) => {
   const attributes = { datetime: text, title: text && formatUtc(text), "data-age": true };
   return text && el("time", attributes, formatAge(Date.parse(text)));
 };
+
+/** Part of the time left after which an estimate without a further report is not shown. */
+const VALID_PART = 0.75;
+
+const LATE = "longer than expected";
+
+function formatLeft({ left, since }) {
+  const passed = (performance.now() - Number(since)) / 1000;
+  return passed > VALID_PART * Number(left) ? LATE : `about ${formatDuration(Number(left) - passed)}`;
+}
+
+/** Make an element with the time left, which decreases until the next report replaces it. */
+export function makeCountdown(seconds) {
+  const node = el("span", { "data-left": seconds, "data-since": performance.now() });
+  setText(node, formatLeft(node.dataset));
+  return node;
+}
+
+setInterval(() => {
+  for (const node of document.querySelectorAll("[data-left]")) setText(node, formatLeft(node.dataset));
+}, 1000);
 
 setInterval(() => {
   for (const node of document.querySelectorAll("time[data-age]"))

@@ -16,7 +16,7 @@ import {
 } from "../components/job_state.js";
 import { makeModelsPanel } from "../components/models.js";
 import { download, getJson, sendRequest } from "../lib/api.js";
-import { formatUtc, makeAge } from "../lib/clock.js";
+import { formatUtc, makeAge, makeCountdown } from "../lib/clock.js";
 import { announce, el, makeFacts, runOnceAtATime, setText } from "../lib/dom.js";
 import { formatCount, formatDuration, formatNumber } from "../lib/numbers.js";
 import { followJob } from "../lib/polling.js";
@@ -114,7 +114,7 @@ function makeJobFacts(job, unit) {
     ["Best error", bestError],
     ["Evaluations", progress.evaluations === undefined ? null : formatCount(progress.evaluations)],
     ["Per second", running && rate ? formatCount(rate) : null],
-    ["Time left", running && Number.isFinite(left) ? `about ${formatDuration(left)}` : null],
+    ["Time left", running && Number.isFinite(left) ? makeCountdown(left) : null],
     ["Run time", formatRunTime(job)],
     ["Note", running && progress.note ? progress.note : null],
     ["Duration", job.finished && job.started ? formatDuration(getSeconds(job)) : null],

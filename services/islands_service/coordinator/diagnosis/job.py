@@ -6,9 +6,10 @@ from typing import TypeVar
 
 from islands.diagnosis.interim_findings import InterimFindings
 from islands.diagnosis.procedure import diagnose
-from islands.facade.explain_residual import FORMULA, explain_residual
+from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT, FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.parallel import ParallelMap
+from islands.progress import report_part
 from islands.simulators.specification.factory import make_simulator
 from islands_service.coordinator.diagnosis.checkpoints import DiagnosisCheckpoints
 from islands_service.coordinator.diagnosis.progress import DiagnosisProgress
@@ -65,14 +66,15 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
 
     try:
         diagnosed = diagnose(
-            record, simulator, spec.tolerance, spec.seed, report, report.count(fits), interim=interim
+            *(record, simulator, spec.tolerance, spec.seed, report_part(report, 0.0, BEFORE_FORMULA), fits),
+            interim=interim,
         )
-        report(FORMULA, 0.95)
+        report(FORMULA, BEFORE_FORMULA)
         start = state.begin_search(diagnosed)
         formula = explain_residual(diagnosed, spec.seed, on_epoch=report.count_epochs, stop=stop, start=start)
         left_out.remove(FORMULA)
         found = DiagnosisResult.from_diagnosis(diagnosed, formula, wall_s=report.spent)
-        report("writing the report", 0.98)
+        report("writing the report", BEFORE_REPORT)
         names = ", ".join(datasets[part.dataset].name for part in spec.parts)
         artefacts[REPORT] = _keep(found.write_report(names), run.blobs, run.check)
         left_out.remove(REPORT)

@@ -1,12 +1,12 @@
 """Progress of a diagnosis: its phase, the completed fraction, the time left, and its checkpoints."""
 
-from collections.abc import Callable, Iterable, Iterator
 from time import monotonic
-from typing import TypeVar
 
+from islands.diagnosis.procedure import LEAST_FRACTION
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.parallel import ParallelMap
+from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT
+from islands.progress import TimeLeft
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.diagnosis.checkpoints import DiagnosisCheckpoints, DiagnosisState
 from islands_service.coordinator.job_run import JobRun
@@ -17,18 +17,6 @@ from islands_service.store.database import StoreError
 #: Seconds between two reports within a step.
 REPORT_EVERY = 0.5
 
-#: Fraction of a diagnosis that the fits of a step take.
-STEP = 0.2
-
-#: Fraction of a diagnosis that the search for a formula takes.
-SEARCH = 0.03
-
-#: Fraction from which the time left is estimated.
-MIN_FRACTION = 0.05
-
-A = TypeVar("A")
-R = TypeVar("R")
-
 
 class DiagnosisProgress:
     """Progress callback that stores progress and checkpoints of a diagnosis.
@@ -36,7 +24,7 @@ class DiagnosisProgress:
     Parameters
     ----------
     run : JobRun
-        Its check is called at the start of each step.
+        Its check is called at each call.
     checkpoints : DiagnosisCheckpoints
     state : DiagnosisState
         What the diagnosis has computed; read for each checkpoint.
@@ -47,7 +35,8 @@ class DiagnosisProgress:
         self._reported_at = self._checkpoint_at = monotonic()
         self._started_at = self._reported_at - state.spent
         self._stored = state.reached
-        self._phase, self._begin = "", 0.0
+        self._left = TimeLeft(self._started_at, BEFORE_FORMULA * LEAST_FRACTION)
+        self._phase, self._fraction = "", 0.0
         self._report_outage = OutageLog("report failed", "reports stored again")
         self._checkpoint_outage = OutageLog("no checkpoint", "checkpoints stored again")
 
@@ -57,35 +46,28 @@ class DiagnosisProgress:
         return monotonic() - self._started_at
 
     def __call__(self, message: str, fraction: float | None = None, /) -> None:
-        """Store the start of a step."""
+        """Store the start of a step at once, and the fraction within a step if a report is due."""
         self._run.check()
-        self._phase = message
-        self._begin = self._begin if fraction is None else fraction
-        self._report(self._begin)
-
-    def count(self, parallel_map: ParallelMap) -> ParallelMap:
-        """Return a map that reports how many of its calls have ended, as a part of the current step."""
-
-        def counted_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
-            listed = list(arguments)
-            for ended, result in enumerate(parallel_map(function, listed), start=1):
-                yield result
-                if monotonic() - self._reported_at > REPORT_EVERY:
-                    self._report(min(1.0, self._begin + STEP * ended / len(listed)))
-
-        return counted_map
+        if fraction is not None:
+            self._fraction = fraction
+        if message != self._phase or monotonic() - self._reported_at > REPORT_EVERY:
+            self._phase = message
+            self._report()
 
     def count_epochs(self, state: SearchState, settings: Settings) -> None:
-        """Store the state of the search for a formula, as a part of the current step; called every epoch."""
-        self._run.check()
+        """Store the state of the search for a formula; called every epoch."""
         self._state.search = state
-        if monotonic() - self._reported_at > REPORT_EVERY:
-            self._report(self._begin + SEARCH * state.archipelago.generation / settings.generations)
+        done = state.archipelago.generation / settings.generations
+        self(self._phase, BEFORE_FORMULA + (BEFORE_REPORT - BEFORE_FORMULA) * done)
 
-    def _report(self, fraction: float) -> None:
+    def _report(self) -> None:
         began = self._reported_at = monotonic()
-        left = self.spent * (1.0 - fraction) / fraction if fraction >= MIN_FRACTION else None
-        progress = {"phase": self._phase, "fraction": fraction, "seconds_left": left}
+        self._left.update(self._fraction, began)
+        progress = {
+            "phase": self._phase,
+            "fraction": self._fraction,
+            "seconds_left": self._left.at(began),
+        }
         if self._state.note:
             progress["note"] = self._state.note
         reached = self._state.reached

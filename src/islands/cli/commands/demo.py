@@ -14,10 +14,10 @@ from islands.cli.console import output, print_message
 from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
 from islands.cli.output_folder import RESULT_FILES, check_folder
 from islands.cli.progress_display import compile_kernels, progress
-from islands.cli.search_progress import search_progress
+from islands.cli.search_progress import SearchDisplay
 from islands.cli.stop_requests import stop_requests
 from islands.data.dataset import Dataset
-from islands.evolution.presets import PRESETS
+from islands.evolution.presets import PRESETS, resolve_settings
 from islands.figures.names import ALL_FIGURES
 from islands.io.records import write_record
 from islands.models.protocol import DynamicModel
@@ -74,14 +74,16 @@ def demo(
         with progress("demo") as show, start_engine(default_engine(ISLANDS), None, print_message) as engine:
             # As in `islands.cli.runs.identify`.
             stop = handlers.enter_context(stop_requests())
+            settings = resolve_settings(PRESET, {"islands": ISLANDS})
+            searching = SearchDisplay(show, PRESET, estimation.samples, settings)
             began = perf_counter()
             found = islands.identify(
                 estimation,
                 validation=validation,
                 preset=PRESET,
                 islands=ISLANDS,
-                progress=show,
-                on_epoch=search_progress(show),
+                progress=searching,
+                on_epoch=searching.show_epoch,
                 stop=stop,
                 engine=engine,
             )

@@ -35,15 +35,16 @@ from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import InterimFindings
 from islands.diagnosis.planning.experiment_plan import plan_experiment
+from islands.diagnosis.procedure import LEAST_FRACTION
 from islands.diagnosis.procedure import diagnose as run_diagnosis
 from islands.diagnosis.result import Diagnosis
 from islands.errors import SettingsError
-from islands.facade.explain_residual import FORMULA, explain_residual
+from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT, FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, REPORT_FILE, DiagnosisResult
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.result_text.text_layout import wrap
 from islands.processes.pool import process_pool
-from islands.progress import Steps, StoppedError
+from islands.progress import Steps, StoppedError, report_part
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import ColumnSpec, innermost, parse_spec
@@ -102,7 +103,7 @@ def diagnose(
         raise SettingsError("a diagnosis needs a record and --output: give both, or --plan before any data")
     check_folder(out, force, DIAGNOSIS_FILE)
     compile_kernels()
-    with progress("diagnose") as show:
+    with progress("diagnose", BEFORE_FORMULA * LEAST_FRACTION) as show:
         show("reading", 0.0)
         spec = parse_spec(simulated)
         inner = innermost(spec)
@@ -114,17 +115,18 @@ def diagnose(
         simulator = make_simulator(spec, data, columns)
         tolerances = simulation_options.tolerances(tolerance or [])
         began = perf_counter()
-        run = partial(run_diagnosis, data, simulator, tolerances, seed, show)
+        report = report_part(show, 0.0, BEFORE_FORMULA)
+        run = partial(run_diagnosis, data, simulator, tolerances, seed, report)
         diagnosis, fits, before = _diagnose_until_stopped(run, out, seed, workers)
         with stop_requests(before) as stop:
             steps = Steps(show, stop)
-            show(FORMULA, 0.8)
+            show(FORMULA, BEFORE_FORMULA)
             formula = _find_formula(diagnosis, seed, steps)
             wall = perf_counter() - began
             limits = None
             if tested and diagnosis.verdict != Verdict.GROSS_ERROR:
                 limits = _run_self_test(diagnosis, simulator, tolerances, seed, workers, steps)
-            show(REPORT_FILE, 0.9)
+            show(REPORT_FILE, BEFORE_REPORT)
             found = DiagnosisResult.from_diagnosis(diagnosis, formula, limits, wall)
             found.save(out, ", ".join(path.name for path in records), steps)
             if steps.left_out:
@@ -202,27 +204,21 @@ def _run_self_test(
     workers: int | None,
     steps: Steps,
 ) -> SelfTest | None:
-    """Run the self-test, as an optional step, and show the remaining time."""
+    """Run the self-test, as an optional step, with a separate progress bar."""
     if steps.skip(SELF_TEST):
         return None
     steps.report(SELF_TEST, 0.0)
-    began = perf_counter()
 
     def check() -> None:
         if steps.skip(SELF_TEST):
             raise StoppedError(SELF_TEST)
 
     def update(message: str, fraction: float | None = None, /) -> None:
-        left = (perf_counter() - began) * (1 / fraction - 1) if fraction else 0.0
-        steps.report(f"{SELF_TEST}, {message}, {_format_duration(left)} left", fraction)
+        steps.report(f"{SELF_TEST}, {message}", fraction)
 
     with suppress(StoppedError), process_pool(workers, check=check) as parallel:
         return self_test(diagnosis, simulator, tolerance, seed, parallel, progress=update)
     return None
-
-
-def _format_duration(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 def _read_record(

@@ -24,11 +24,12 @@ from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.facade.identification_progress import CLASS_PHASES, fit_phases
 from islands.figures.names import FREE_RUN, parse_figures
 from islands.io.models import NARX
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.models.candidate_library import LIBRARIES
-from islands.progress import Steps
+from islands.progress import PhasedProgress, Steps
 
 #: Default library for several outputs.
 SEVERAL_OUTPUTS = "polynomial"
@@ -114,6 +115,7 @@ def fit(
         held_out = recordings.read_held_out(validation, rows)
     with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()
+        phases = fit_phases(library, outputs if len(outputs) > 1 else ()) if model == NARX else CLASS_PHASES
         given: dict[str, Any] = {
             "model": model,
             "library": library,
@@ -128,7 +130,7 @@ def fit(
             "shooting": shooting,
             "certificate": certificate,
             "seed": seed,
-            "progress": show,
+            "progress": PhasedProgress(show, phases),
             "stop": stop,
         }
         result: islands.Result | islands.CoupledResult

@@ -18,7 +18,7 @@ from islands.cli.recordings import Recordings, measured_names
 from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
 from islands.cli.runs.held_out_test import TEST, evaluate_test
 from islands.cli.runs.timed_engine import TimedEngine
-from islands.cli.search_progress import search_progress
+from islands.cli.search_progress import SearchDisplay
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands.data.compatibility import match_record
 from islands.data.coupled_record import CoupledRecord
@@ -44,7 +44,7 @@ from islands.io.checkpoints import (
 )
 from islands.io.records import fingerprint
 from islands.io.records.reading_options import ReadingOptions
-from islands.progress import Steps
+from islands.progress import ProgressCallback, Steps
 
 #: File of the search state.
 CHECKPOINT = "checkpoint.json"
@@ -128,11 +128,12 @@ def run(
                 for name in (CHECKPOINT, HALL, TEST):
                     (folder / name).unlink(missing_ok=True)
             preset = job["preset"]
+            searching = _make_display(show, job, data, possible[0])
             if preset == AUTO and "outputs" not in job:
-                preset = _choose_preset(data, held_out, job, show, stop, folder, run_options.figures)
+                preset = _choose_preset(data, held_out, job, searching, stop, folder, run_options.figures)
                 # Checkpoints contain the job, so a resumed run does not choose again.
                 job = {**job, "choice": preset.to_document()}
-            checkpoints = _CheckpointWriter(folder, job, show, state, spent)
+            checkpoints = _CheckpointWriter(folder, job, searching, state, spent)
             began = perf_counter() - spent
             try:
                 result = _search(
@@ -142,7 +143,7 @@ def run(
                     job["changes"],
                     validation=held_out,
                     start=state,
-                    progress=show,
+                    progress=searching,
                     on_epoch=checkpoints,
                     stop=stop,
                     engine=engine,
@@ -200,11 +201,20 @@ def _show_run(
                 output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
 
 
+def _make_display(
+    show: Display, job: dict[str, Any], data: islands.Dataset | CoupledRecord, settings: Settings
+) -> SearchDisplay:
+    preset = job.get("choice") or job["preset"]
+    if isinstance(data, islands.Dataset):
+        return SearchDisplay(show, preset, data.samples, settings)
+    return SearchDisplay(show, preset, data.samples, settings, data.output_names)
+
+
 def _choose_preset(
     data: Any,
     held_out: Any,
     job: dict[str, Any],
-    show: Display,
+    progress: ProgressCallback,
     stop: StopRequests,
     folder: Path,
     figures: Sequence[str],
@@ -216,7 +226,7 @@ def _choose_preset(
     if stored := job.get("choice"):
         return choice_from_document(stored)
     try:
-        return choose_preset(data, held_out, job["changes"], show, stop)
+        return choose_preset(data, held_out, job["changes"], progress, stop)
     except StoppedChoiceError as stopped:
         result, drawing = islands.Result.from_search(stopped.found), Steps(stop=stop)
         result.save(folder, drawing, figures)
@@ -300,17 +310,22 @@ class _CheckpointWriter:
     """Search callback that shows the progress and writes checkpoints."""
 
     def __init__(
-        self, folder: Path, job: dict[str, Any], show: Display, state: SearchState | None, spent: float
+        self,
+        folder: Path,
+        job: dict[str, Any],
+        display: SearchDisplay,
+        state: SearchState | None,
+        spent: float,
     ) -> None:
         self._folder, self._job = folder, job
-        self._show = search_progress(show)
+        self._display = display
         self._next = -inf  # the first populations are written immediately
         self._began = monotonic() - spent
         self._state = state
 
     def __call__(self, state: SearchState, settings: Settings) -> None:
         self._state = state
-        self._show(state, settings)
+        self._display.show_epoch(state, settings)
         if monotonic() > self._next:
             self.write()
 

@@ -73,7 +73,7 @@ def stepwise_search(
         is_first = not beam[0].effects
         if not is_first:
             names = [effect.name for effect in beam[0].effects]
-            run.progress(f"effects in addition to {' and '.join(names)}", min(0.1 + 0.2 * len(names), 0.7))
+            run.progress(f"effects in addition to {' and '.join(names)}")
         min_gain = MIN_GAIN if is_first else _get_min_further_gain(target, run.effects)
         is_open = is_first and pairs
         width = PAIR_SEEDS if is_open else BEAM_WIDTH
@@ -161,7 +161,7 @@ def refine_by_swaps(
         alternatives: tuple[Alternatives, ...] = ()
         candidates = []
         if len(hypothesis.effects) > 1:
-            run.progress("screening alternative causes", 0.7)
+            run.progress("screening alternative causes")
             alternatives = find_alternatives(hypothesis, target, run)
             candidates = [
                 with_effect(each.without, screened) for each in alternatives for screened in each.screened[:1]

@@ -43,6 +43,9 @@ from islands.effects.interface.effect import Effect
 from islands.effects.model_form import CORE_SHAPE
 from islands.parallel import memoised_map
 
+#: Beginning of the messages of a search that takes the residual for model error.
+WITH_MODEL_ERROR = "with model error: "
+
 #: Fraction of the misfit that some single effect has to explain before pairs are searched for; no effect
 #: explains as much of noise.
 MIN_SINGLE_FRACTION = 0.1
@@ -104,7 +107,7 @@ def search_with_ar_noise(
     best = best_single(base, screened)
     if best.noise.order:
         # Ordinary least squares would fit the coloured noise as well.
-        run.progress("the noise is coloured: repeating with whitened residuals", 0.1)
+        run.progress("the noise is coloured: repeating with whitened residuals")
         target = whiten_target(target, best)
         base = calibrate(base.simulation, target, base.values)
         screened = screen_effects(base, target, run)
@@ -114,11 +117,17 @@ def search_with_ar_noise(
 
 def search_with_model_error(base: CalibrationResult, target: Target, run: DiagnosisRun) -> SearchOutcome:
     """Search for effects under the assumption that the residual is model error."""
-    run.progress("the residual is model error: repeating with unweighted residuals", 0.4)
+    run.progress("the residual is model error: repeating with unweighted residuals")
     screened: Sequence[ScreenedEffect] = ()
     hypothesis = Hypothesis(base, base.score, ())
+
+    report = run.progress
     # The effective sample size changes the score of a fit, but not the fit: both passes share results.
-    run = replace(run, parallel_map=memoised_map(run.parallel_map, StartsCalibrator, make_task_key))
+    run = replace(
+        run,
+        parallel_map=memoised_map(run.parallel_map, StartsCalibrator, make_task_key),
+        progress=lambda message, fraction=None, /: report(f"{WITH_MODEL_ERROR}{message}", fraction),
+    )
     for _ in range(2):
         # Model error correlates neighbouring samples: the second pass counts them with the best effects
         # included.

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from islands.cli import progress_display
 from islands.cli import search_progress as showing
-from islands.cli.search_progress import SHOWN_ISLANDS, search_progress
+from islands.cli.search_progress import SHOWN_ISLANDS, SearchDisplay
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.history import HistoryPoint
 from islands.evolution.search_state import SearchState
@@ -23,10 +23,14 @@ def displayed(monkeypatch):
     def show(settings, *states):
         found, clock = [], [100.0]
         monkeypatch.setattr(showing, "monotonic", lambda: clock[0])
-        update = search_progress(lambda text, share, lines=(): found.append((text, share, list(lines))))
+        search = SearchDisplay(
+            lambda text, share, lines=None, left=None: found.append((text, share, lines, left)),
+            *("narx", 1000, settings),
+        )
         for state in states:
-            update(state, settings)
+            search.show_epoch(state, settings)
             clock[0] += 4.0
+        found = [each for each in found if each[2] is not None]
         return found
 
     return show
@@ -51,21 +55,28 @@ def test_display_has_generation_speed_time_left_and_best_by_size(displayed):
         Settings(population=50, generations=20),
         *(at(0, 50, [0.25]), at(2, 150, [0.25], [0.25], [0.0625])),
     )
-    # The first generation includes compilation and is not counted: 100 in 4 s, 18 generations of 50 left.
-    assert found == [
-        ("generation 0/20, 0/s", 0.0, ["  RMSE by terms  1:2 3:0.5"]),
-        ("generation 2/20, 25/s, 36 s left", 0.1, ["  RMSE by terms  1:2 3:0.25"]),
+    assert [(text, lines) for text, _, lines, _ in found] == [
+        ("generation 0/20, 0/s", ["  RMSE by terms  1:2 3:0.5"]),
+        ("generation 2/20, 25/s", ["  RMSE by terms  1:2 3:0.25"]),
     ]
+    # The first generation includes compilation and is not counted: 100 in 4 s, 18 generations of 50 left. The
+    # final models follow.
+    assert found[0][3] is None
+    assert found[1][3] > 36.0
+    assert 0.0 < found[0][1] < found[1][1] < 1.0
 
 
 def test_time_left_counts_all_islands(displayed):
     states = (at(0, 150, [0.25] * 3), at(2, 450, [0.25] * 3))
     # 300 in 4 s; 18 generations of three times 50.
-    assert "75/s, 36 s left" in displayed(Settings(population=50, generations=20, islands=3), *states)[1][0]
+    text, _, _, left = displayed(Settings(population=50, generations=20, islands=3), *states)[1]
+    one = displayed(Settings(population=50, generations=20), at(0, 50, [0.25]), at(2, 150, [0.25]))[1][3]
+    assert "75/s" in text
+    assert 36.0 < left < one
 
 
 def test_search_without_generations_is_displayed(displayed):
-    assert displayed(Settings(generations=0), at(0, 50, [0.25]))[0][1] == 0.0
+    assert 0.0 < displayed(Settings(generations=0), at(0, 50, [0.25]))[0][1] < 1.0
 
 
 def test_each_island_has_its_best_error_and_its_age(displayed):

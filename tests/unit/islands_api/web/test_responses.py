@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from islands_api.dataset_schemas import DatasetView
 from islands_api.schemas import JobRequest, JobView
+from islands_api.web import responses
 from islands_api.web.responses import JSONDocument, dataset_document, job_document, json_text
 from islands_service.domain.job import Job, JobState, ProgressReport
 from support.service import kept, queued, spec
@@ -121,10 +122,19 @@ WAITING = {
 
 
 @pytest.mark.parametrize("state", JobState)
-def test_the_progress_of_a_job_that_does_not_run_has_only_reached_values(service, state):
+def test_the_progress_of_a_job_that_does_not_run_has_only_reached_values(service, monkeypatch, state):
     job = replace(queued(service.store), state=state, progress=WAITING)
+    monkeypatch.setattr(responses, "time", lambda: job.updated)
     reached = WAITING if state == JobState.RUNNING else {"phase": state, "generation": 4}
     assert job_document(job, 3600)["progress"] == reached
+
+
+@pytest.mark.parametrize(("age", "left"), [(2.0, 10.0), (9.5, None), (100.0, None)])
+def test_the_time_left_of_a_job_decreases_between_its_reports(service, monkeypatch, age, left):
+    job = replace(queued(service.store), state=JobState.RUNNING, progress=WAITING)
+    monkeypatch.setattr(responses, "time", lambda: job.updated + age)
+    found = job_document(job, 3600)["progress"]["seconds_left"]
+    assert found == (None if left is None else pytest.approx(left))
 
 
 def test_a_queued_job_has_the_reason_of_its_wait_until_it_ends(service):

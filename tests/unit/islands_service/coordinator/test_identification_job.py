@@ -235,6 +235,10 @@ def test_stages_of_a_job_are_its_phases_and_keep_its_generation(store: Store, bl
     assert ended["phase"] == "search"
     reached = [progress.get("generation", -1) for progress in seen if progress]
     assert reached == sorted(reached)
+    fractions = [progress["fraction"] for progress in seen if progress]
+    assert fractions == sorted(fractions)
+    searching = phases.index("search")
+    assert fractions[searching] < fractions[-1] <= 1.0
 
 
 def test_first_populations_are_stored_in_a_checkpoint_at_once(store: Store, blobs: Blobs, job: Job) -> None:

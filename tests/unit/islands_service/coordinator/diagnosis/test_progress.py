@@ -6,7 +6,7 @@ import pytest
 
 from islands_service.coordinator.diagnosis import progress as diagnosis_progress
 from islands_service.coordinator.diagnosis.checkpoints import DiagnosisState
-from islands_service.coordinator.diagnosis.progress import STEP, DiagnosisProgress
+from islands_service.coordinator.diagnosis.progress import DiagnosisProgress
 from islands_service.store.database import CommitUnknownError, StorageFullError
 from support.job_runs import make_run
 from support.stores import ALICE, claimed, submitted
@@ -19,29 +19,34 @@ def clock(monkeypatch):
     return now
 
 
-def test_time_left_follows_the_fraction_of_steps_and_fits(store, clock):
+def test_fraction_and_time_left_follow_the_reports_of_a_step(store, clock):
     job = submitted(store)
     lease, state, seen = claimed(store), DiagnosisState(spent=3.0), []
     # Without new fits no checkpoint is written: the job would never be given up.
     report = DiagnosisProgress(make_run(lease, store, None, checkpoint_every=1e-9), None, state)
 
-    def look(_):
-        clock[0] += 1.0
+    def look():
         seen.append(store.jobs.get(ALICE, job.id).progress)
 
     report("calibrating", 0.0)
-    assert store.jobs.get(ALICE, job.id).progress == {
-        "phase": "calibrating",
-        "fraction": 0.0,
-        "seconds_left": None,
-    }
-    report("screening 4 effects", 0.3)
-    assert list(report.count(map)(look, range(4))) == [None] * 4
-    assert [each["fraction"] for each in seen] == pytest.approx([0.3 + STEP * k / 4 for k in range(4)])
-    assert seen[0] == {"phase": "screening 4 effects", "fraction": 0.3, "seconds_left": pytest.approx(7.0)}
-    assert seen[1]["seconds_left"] == pytest.approx(4.0 * 0.65 / 0.35)
+    look()
+    for fraction in (0.3, 0.35, 0.4):
+        report("with model error", fraction)
+        look()
+        clock[0] += 1.0
     report("no fraction is known")
-    assert store.jobs.get(ALICE, job.id).progress["fraction"] == 0.3
+    look()
+    assert seen[0] == {"phase": "calibrating", "fraction": 0.0, "seconds_left": None}
+    assert [each["fraction"] for each in seen[1:]] == [0.3, 0.35, 0.4, 0.4]
+    expected = [3.0 * 0.7 / 0.3, 4.0 * 0.65 / 0.35, 5.0 * 0.6 / 0.4, 5.0 * 0.6 / 0.4 - 1.0]
+    assert [each["seconds_left"] for each in seen[1:]] == pytest.approx(expected)
+
+
+def test_the_time_left_is_unknown_before_the_phases_that_follow_are_known(store, clock):
+    job = submitted(store)
+    report = DiagnosisProgress(make_run(claimed(store), store, None), None, DiagnosisState(spent=30.0))
+    report("screening", 0.2)
+    assert store.jobs.get(ALICE, job.id).progress["seconds_left"] is None
 
 
 class Checkpoints:

@@ -41,7 +41,7 @@ def watched(monkeypatch):
     """Return a function that registers an action to be run after each epoch."""
 
     def by(watch):
-        monkeypatch.setattr(command, "search_progress", lambda _show: lambda state, _settings: watch(state))
+        monkeypatch.setattr(command.SearchDisplay, "show_epoch", lambda _, state, _settings: watch(state))
 
     return by
 

@@ -1,0 +1,71 @@
+"""Progress of an identification: honest about the time left over recorded runs, in every phase."""
+
+from itertools import pairwise
+
+import pytest
+
+from islands.evolution.presets import AUTO
+from islands.evolution.settings import Settings
+from islands.facade.identification_progress import fit_phases, identification_phases
+from islands.progress import PhasedProgress
+from support.recorded_runs import late, replay
+
+#: Recorded runs with the largest error of the time left beyond half of it, in seconds, as measured.
+EXCESS = {
+    "identification-500": 2.0,
+    "identification-2000": 3.0,
+    "identification-20000": 6.0,
+    "identification-narx": 2.0,
+}
+
+
+@pytest.mark.parametrize("name", EXCESS)
+def test_time_left_is_within_half_of_the_truth_and_some_seconds(name):
+    shown = [each for each in late(replay(name)) if each.left is not None]
+    assert len(shown) > 60
+    assert all(abs(each.left - each.truth) <= 0.5 * each.truth + EXCESS[name] for each in shown)
+
+
+@pytest.mark.parametrize("name", EXCESS)
+def test_bar_moves_from_the_first_phase_on_and_never_back(name):
+    moments = replay(name)
+    fractions = [each.fraction for each in moments]
+    assert fractions == sorted(fractions)
+    quarters = [fractions[len(fractions) * quarter // 4 - 1] for quarter in (1, 2, 3, 4)]
+    assert 0.0 < quarters[0] < quarters[1] < quarters[2] <= quarters[3] <= 1.0
+
+
+@pytest.mark.parametrize("name", EXCESS)
+def test_time_left_is_never_constant_while_time_passes(name):
+    moments = replay(name)
+    for one, other in pairwise(moments):
+        assert one.left is None or one.left != other.left
+
+
+def test_a_longer_search_has_a_larger_share():
+    def share(generations):
+        phases = identification_phases(AUTO, 1000, Settings(generations=generations))
+        return next(phase.share for phase in phases if phase.beginning == "search") / sum(
+            phase.share for phase in phases
+        )
+
+    assert share(10) < share(100) < share(10_000)
+    assert share(10_000) > 0.9
+
+
+@pytest.mark.parametrize(
+    "phases", [identification_phases("narx", 1000, Settings(), ("a", "b")), fit_phases(AUTO, ("a", "b"))]
+)
+def test_several_outputs_pass_the_same_phases_one_after_the_other(phases):
+    seen = []
+    progress = PhasedProgress(lambda _, fraction=None: seen.append(fraction), phases)
+    for message in (
+        "a: best subsets of",
+        "a: estimation of the final models",
+        "b: best subsets of",
+        "b: estimation of the final models",
+        "choice of the equations",
+    ):
+        progress(message)
+    assert seen == sorted(seen)
+    assert 0.2 < seen[-2] < seen[-1] < 1.0
