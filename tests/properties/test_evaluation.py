@@ -15,11 +15,11 @@ from islands.evolution.individual import Individual
 from islands.evolution.island import first_generation
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
-from islands.evolution.variation import random_genes
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Constant, Lagged
 from islands.simulation.outcome import Status
 from support.searches import SMALL, evolved, record
+from support.variation import random_genes
 
 FREE = Settings(
     constraints="none",
@@ -264,9 +264,9 @@ def test_duplicates_consume_random_draws():
     class Spy(Evaluator):
         decisions, known = (), 0
 
-        def evaluate(self, population, thresholds=None):
-            self.decisions = [pruned for _, pruned in population]
-            found, self.known = super().evaluate(population, thresholds)
+        def evaluate_genes(self, individuals, pruned, thresholds=None):
+            self.decisions = pruned.tolist()
+            found, self.known = super().evaluate_genes(individuals, pruned, thresholds)
             return found, self.known
 
     setting = replace(SMALL, prune=0.5, initial_terms=(1, 1), initial_height=0)

@@ -14,10 +14,10 @@ from islands.evolution.gene_index import GeneIndex
 from islands.evolution.individual import Individual
 from islands.evolution.island import first_generation, step
 from islands.evolution.rng import Purpose, Stream
-from islands.evolution.variation import random_gene
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from support.searches import SMALL, evolved, islands_of, record
+from support.variation import random_gene
 
 LIMITS = Limits(pairs=1 << 14, genes=100_000, structures=40_000)
 

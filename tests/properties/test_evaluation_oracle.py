@@ -14,7 +14,6 @@ from islands.evolution.fitness import FITNESSES
 from islands.evolution.individual import Individual
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
-from islands.evolution.variation import random_genes
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.models.narx import Model, canonical_order
@@ -22,6 +21,7 @@ from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting
 from support.searches import distinct_genes, record
+from support.variation import random_genes
 
 SETTINGS = Settings(
     shooting=50,

@@ -17,7 +17,7 @@ from islands.evolution.engine import SerialEngine
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import Individual, make_regressor, unique_niches
-from islands.evolution.island import _breed_pair, first_generation, select_elite, step
+from islands.evolution.island import first_generation, select_elite, step
 from islands.evolution.problem import make_problem
 from islands.evolution.rng import Purpose, Stream
 from islands.expressions.parsing import parse
@@ -25,6 +25,7 @@ from islands.expressions.tree import Lagged
 from islands.io.checkpoints import write_checkpoint
 from support.repository import ROOT
 from support.searches import SMALL, distinct_genes, evolved, exactly, islands_of, record
+from support.variation import breed_compiled, find_structure
 
 
 def digest():
@@ -312,10 +313,11 @@ def test_bred_children_differ_from_their_parents(crossover):
     for seed in range(6):
         island = islands_of(evaluator, 3, seed)[-1]
         rng = Stream(seed, 0, 4, Purpose.VARIATION)
-        for one, other in pairwise(island.population):
-            parents = [one.genes, other.genes]
-            known = {evaluator.gene_indices(Individual(genes)) for genes in parents}
-            for genes in _breed_pair(parents, evaluator, setting, rng, ()):
-                bred += 1
-                same += evaluator.gene_indices(Individual(genes)) in known
+        parents = [each.genes for couple in pairwise(island.population) for each in couple]
+        children = breed_compiled(parents, setting, 1, rng)
+        for place, genes in enumerate(children):
+            first = place - place % 2
+            known = {find_structure(each, setting) for each in parents[first : first + 2]}
+            bred += 1
+            same += find_structure(genes, setting) in known
     assert same < 0.1 * bred

@@ -13,21 +13,13 @@ from islands.evolution.island import first_generation, step
 from islands.evolution.problem import make_problem
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
-from islands.evolution.variation import (
-    high_level_crossover,
-    inner_mutation,
-    low_level_crossover,
-    outer_mutation,
-    random_gene,
-    random_genes,
-    repair_genes,
-    with_required_genes,
-)
+from islands.evolution.variation import repair_genes, with_required_genes
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.printing import plain
 from islands.expressions.tree import Apply, Lagged, Shift, children, walk
 from support.searches import SMALL, record
+from support.variation import breed_compiled, outer_mutation, random_gene, random_genes
 
 # Independent definition of valid genes.
 
@@ -161,28 +153,31 @@ def stream(seed, purpose=Purpose.VARIATION):
 # Children of valid parents are valid.
 
 
-@given(parents(2), seeds, st.sampled_from([low_level_crossover, high_level_crossover]))
-def test_children_of_a_crossover_are_valid(drawn, seed, crossover):
-    setting, inputs, (one, other) = drawn
-    for child in crossover(one, other, setting, stream(seed)):
-        assert faults(with_required_genes(child, setting), setting, inputs) == []
+@given(parents(2), seeds, st.sampled_from([0.0, 1.0]))
+def test_children_of_a_crossover_are_valid(drawn, seed, high_level):
+    setting, inputs, couple = drawn
+    recombining = replace(setting, crossover=1.0, high_level=high_level)
+    for child in breed_compiled(couple, recombining, inputs, stream(seed)):
+        assert faults(child, setting, inputs) == []
 
 
-@given(parents(1), seeds)
+@given(parents(2), seeds)
 def test_children_of_an_inner_mutation_are_valid(drawn, seed):
-    setting, inputs, (genes,) = drawn
-    child = inner_mutation(genes, setting, inputs, stream(seed))
-    assert faults(with_required_genes(child, setting), setting, inputs) == []
+    setting, inputs, couple = drawn
+    mutating = replace(setting, crossover=0.0, mutation=1.0, outer=0.0)
+    for child in breed_compiled(couple, mutating, inputs, stream(seed)):
+        assert faults(child, setting, inputs) == []
 
 
-@given(parents(1), seeds)
+@given(parents(2), seeds)
 def test_children_of_an_outer_mutation_are_valid(drawn, seed):
-    setting, inputs, (genes,) = drawn
+    setting, inputs, couple = drawn
+    mutating = replace(setting, crossover=0.0, mutation=1.0, outer=1.0)
     # The pool of a problem has only genes within the height limit.
-    pool = [Lagged(0), Lagged(inputs), *genes]
+    pool = [Lagged(0), Lagged(inputs), *couple[0]]
     for given_pool in ((), pool):
-        child = outer_mutation(genes, setting, inputs, stream(seed), given_pool)
-        assert faults(with_required_genes(child, setting), setting, inputs) == []
+        for child in breed_compiled(couple, mutating, inputs, stream(seed), given_pool):
+            assert faults(child, setting, inputs) == []
 
 
 @given(parents(1), seeds)

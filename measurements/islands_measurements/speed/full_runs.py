@@ -6,11 +6,15 @@ from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
 
+import numpy as np
+from numpy.typing import NDArray
+
 from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Individual, Population
+from islands.evolution.individual import Population
 from islands.evolution.island import first_generation, step
 from islands.evolution.settings import Settings
+from islands.kernels.breeding import Individuals
 from islands.processes.pool import prepare_process
 from islands_measurements.speed import kernel_evaluator
 from islands_measurements.speed.clock import cpu, wall
@@ -112,12 +116,15 @@ class _Timed(Evaluator):
         self.spent = 0.0
         self.duplicates = 0
 
-    def evaluate(
-        self, population: Sequence[tuple[Individual, bool]], bars: Sequence[float] | None = None
+    def evaluate_genes(
+        self,
+        individuals: Individuals,
+        pruned: NDArray[np.bool_],
+        thresholds: Sequence[float] | None = None,
     ) -> tuple[Population, int]:
         began = cpu()
-        evaluated, duplicates = super().evaluate(population, bars)
+        evaluated, duplicates = super().evaluate_genes(individuals, pruned, thresholds)
         self.spent += cpu() - began
-        # A call without bars has no new individuals: it evaluates abandoned ones to the end.
-        self.duplicates += duplicates if bars is not None else 0
+        # A call without thresholds has no new individuals: it evaluates abandoned ones to the end.
+        self.duplicates += duplicates if thresholds is not None else 0
         return evaluated, duplicates

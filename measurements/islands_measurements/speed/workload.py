@@ -10,6 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
+import numpy as np
+from numpy.typing import NDArray
+
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.evolution.evaluation import Evaluator
@@ -19,6 +22,7 @@ from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
 from islands.expressions.primitives import MUL, SIGN, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged
+from islands.kernels.breeding import Individuals
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor, regressor
 from islands.systems.catalogue import make_record
@@ -177,15 +181,21 @@ class _RecordingEvaluator(Evaluator):
         self.bred: list[Individual] = []
         self._seen_structures: set[tuple[frozenset[int], bool]] = set()
 
-    def evaluate(
-        self, population: Sequence[tuple[Individual, bool]], bars: Sequence[float] | None = None
+    def evaluate_genes(
+        self,
+        individuals: Individuals,
+        pruned: NDArray[np.bool_],
+        thresholds: Sequence[float] | None = None,
     ) -> tuple[Population, int]:
-        for individual, pruned in population:
-            key = self.gene_indices(individual), pruned
+        index = self.gene_index
+        rows = zip(*(array.tolist() for array in (*individuals, pruned)), strict=True)
+        for numbers, length, decision in rows:
+            genes = tuple([index.genes[number] for number in numbers[:length]])
+            key = frozenset(map(index.index_of, genes)), decision
             if key not in self._seen_structures:
                 self._seen_structures.add(key)
-                self.bred.append(individual)
-        return super().evaluate(population, bars)
+                self.bred.append(Individual(genes))
+        return super().evaluate_genes(individuals, pruned, thresholds)
 
 
 def _find_bounded(individuals: Sequence[Individual], evaluator: Evaluator) -> WorkloadModel:

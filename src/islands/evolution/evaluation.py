@@ -16,11 +16,13 @@ from islands.errors import RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.err_targets import ERR_TARGETS
 from islands.evolution.fitness import FITNESSES
-from islands.evolution.gene_index import GeneIndex
+from islands.evolution.gene_index import ZERO, GeneIndex
+from islands.evolution.gene_structure import STRUCTURES
 from islands.evolution.individual import Individual
 from islands.evolution.settings import Settings
 from islands.expressions.tree import Expression, Lagged
 from islands.kernels import population as kernel
+from islands.kernels.breeding import UNUSED, Individuals
 from islands.kernels.pair_table import PLACE_BYTES, clear, complete_pairs, pair_table
 from islands.models.regressor import Regressor
 from islands.program.regressor_matrix import select_rows
@@ -70,10 +72,10 @@ class Limits:
 
 
 #: Approximate sizes of a cached evaluation and of a cached selection of terms, in bytes.
-_EVALUATION_BYTES, _SELECTION_BYTES = 1_000, 600
+_EVALUATION_BYTES, _SELECTION_BYTES = 700, 250
 
-#: A structure and the decision whether to prune it.
-_Key = tuple[frozenset[int], bool]
+#: Numbers of the terms of a structure in ascending order, and the decision whether to prune it, as bytes.
+_Key = bytes
 
 #: Terms that remain after pruning and constraints, ordered by content.
 _Terms = tuple[int, ...]
@@ -100,11 +102,11 @@ class Evaluation:
     fitness: float
     outcome: EvaluationOutcome
 
-    def is_sufficient(self, allowed: NDArray[np.float64]) -> bool:
+    def is_sufficient(self, allowed: Sequence[float]) -> bool:
         """Return whether this evaluation answers a request with these thresholds by size."""
         return self.outcome is not _ABANDONED or self.fitness >= allowed[len(self.numbers)]
 
-    def exceeds(self, allowed: NDArray[np.float64]) -> bool:
+    def exceeds(self, allowed: Sequence[float]) -> bool:
         """Return whether the error exceeds its threshold; after divergence, whether that is finite."""
         if self.outcome is _ABANDONED:
             return True
@@ -154,7 +156,8 @@ class Evaluator:
         self._gene_index = self._empty_index()
 
     def _empty_index(self) -> GeneIndex:
-        return GeneIndex(self._constraint, (Lagged(0, 0), Lagged(0, 1)), self._root_rule)
+        targets = Lagged(0, 0), Lagged(0, 1)
+        return GeneIndex(self._constraint, targets, self._root_rule, STRUCTURES[self.settings.structure])
 
     @property
     def context(self) -> kernel.PopulationContext:
@@ -185,12 +188,10 @@ class Evaluator:
     def _structure_bytes(self) -> int:
         return _EVALUATION_BYTES * len(self._evaluations) + _SELECTION_BYTES * len(self._selections)
 
-    def gene_indices(self, individual: Individual) -> frozenset[int]:
-        """Return the indices of an individual's genes: equal sets mean equal structures.
-
-        The indices are valid until the caches are cleared.
-        """
-        return frozenset(map(self._gene_index.index_of, individual.genes))
+    @property
+    def gene_index(self) -> GeneIndex:
+        """Index of the genes; valid until `prepare` or `evaluate` is called."""
+        return self._gene_index
 
     def clear_caches(self) -> None:
         """Empty all caches."""
@@ -222,20 +223,28 @@ class Evaluator:
         duplicates : int
             Number of individuals whose terms, after pruning, occur earlier in the population or in the cache.
         """
-        self._enforce_limits()
-        number_genes = self._gene_index.number_genes
-        genes = [number_genes(individual.genes) for individual, _ in population]
-        keys = [
-            (frozenset(numbered), pruned) for numbered, (_, pruned) in zip(genes, population, strict=True)
-        ]
+        self.prepare()
+        individuals = self._gene_index.number_genes([individual.genes for individual, _ in population])
+        return self.evaluate_genes(
+            individuals, np.array([pruned for _, pruned in population], np.bool_), thresholds
+        )
+
+    def evaluate_genes(
+        self, individuals: Individuals, pruned: NDArray[np.bool_], thresholds: Sequence[float] | None = None
+    ) -> tuple[tuple[Individual, ...], int]:
+        """Evaluate individuals of the gene index; see `evaluate`."""
         self._check_lags()
-        largest = max(map(len, genes), default=0)
-        allowed = np.full(max(largest + 1, len(thresholds or ())), inf)
+        terms = self._number_terms(individuals.genes)
+        ordered = np.sort(terms, axis=1)
+        largest = max(terms.shape[1], len(thresholds or ()))
+        allowed = [inf] * (largest + 1)
         if thresholds is not None and self.abandon:
             allowed[: len(thresholds)] = thresholds
         selections, cache = self._selections, self._evaluations
-        unknown = list(dict.fromkeys(key for key in keys if key not in selections))
-        selections.update(zip(unknown, self._select_terms(unknown), strict=True))
+        keys = list(map(bytes, np.column_stack([ordered, pruned])))
+        unknown = {key: place for place, key in enumerate(keys) if key not in selections}
+        places = np.array(list(unknown.values()), np.int64)
+        selections.update(zip(unknown, self._select_terms(ordered[places], pruned[places]), strict=True))
         remaining = [selections[key] for key in keys]
         missing = list(
             dict.fromkeys(
@@ -243,11 +252,24 @@ class Evaluator:
             )
         )
         cache.update(zip(missing, self._evaluate_terms(missing, allowed), strict=True))
+        genes = self._gene_index.genes
         evaluated = tuple(
-            _make_evaluated(individual, numbered, cache[terms], allowed)
-            for (individual, _), numbered, terms in zip(population, genes, remaining, strict=True)
+            [
+                _make_evaluated(row, numbers, cache[kept], allowed, genes)
+                for row, numbers, kept in zip(
+                    individuals.genes.tolist(), terms.tolist(), remaining, strict=True
+                )
+            ]
         )
         return evaluated, len(keys) - len(missing)
+
+    def _number_terms(self, genes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the number of the regressor of each gene; `ZERO` in place of numbers that occur before."""
+        terms = np.where(genes == UNUSED, ZERO, self._gene_index.table.term[genes])
+        for place in range(1, terms.shape[1]):
+            repeated = (terms[:, :place] == terms[:, place : place + 1]).any(axis=1)
+            terms[repeated, place] = ZERO
+        return terms
 
     def _check_lags(self) -> None:
         # The kernels do not check bounds: they would read samples of another signal or outside the record.
@@ -258,7 +280,8 @@ class Evaluator:
                 raise RecordError(f"the genes use input {channel}, the record has {self.record.inputs}")
             raise SettingsError(f"the genes have lags up to {lag}, the settings allow {self.warm_up}")
 
-    def _enforce_limits(self) -> None:
+    def prepare(self) -> None:
+        """Empty the caches that exceed their limit."""
         if self._gene_index.bytes > self.limits.genes:
             self.clear_caches()
         if self._structure_bytes > self.limits.structures:
@@ -268,24 +291,22 @@ class Evaluator:
         """Evaluate abandoned individuals completely."""
         return self.evaluate([(each, False) for each in abandoned])[0]
 
-    def _select_terms(self, keys: Sequence[_Key]) -> list[_Terms]:
+    def _select_terms(self, ordered: NDArray[np.int64], pruned: NDArray[np.bool_]) -> list[_Terms]:
         """Return the terms of structures that pruning and constraints leave."""
-        ranks = self._gene_index.rank(set().union(*(numbers for numbers, _ in keys)))
-        structures = [tuple(sorted(numbers, key=ranks.__getitem__)) for numbers, _ in keys]
-        pruned = np.array([decision for _, decision in keys], np.bool_)
         remaining: list[_Terms] = []
-        for part, given in self._make_batches(structures):
+        for part, given in self._make_batches(self._gene_index.sort_by_content(ordered)):
             selected = kernel.empty_terms(*given.terms.shape)
             kernel.select_terms(given, pruned[part], self.context, selected)
             remaining += _list_terms(selected)
         return remaining
 
-    def _evaluate_terms(self, terms: Sequence[_Terms], allowed: NDArray[np.float64]) -> list[Evaluation]:
+    def _evaluate_terms(self, terms: Sequence[_Terms], allowed: Sequence[float]) -> list[Evaluation]:
         """Estimate and simulate models of these terms."""
         evaluations: list[Evaluation] = []
-        for part, given in self._make_batches(terms):
+        limits = np.array(allowed) * self._predicted
+        for part, given in self._make_batches(_make_selected(terms)):
             results = kernel.empty_results(*given.terms.shape)
-            kernel.evaluate_individuals(given, allowed * self._predicted, self.context, results)
+            kernel.evaluate_individuals(given, limits, self.context, results)
             for numbers, parameters, squares, code in zip(
                 terms[part], *(array.tolist() for array in results), strict=True
             ):
@@ -295,33 +316,37 @@ class Evaluator:
                         numbers,
                         self._gene_index.regressors(numbers),
                         tuple(parameters[:length]) if outcome is OK else (),
-                        float(allowed[length]) if outcome is _ABANDONED else squares / self._predicted,
+                        allowed[length] if outcome is _ABANDONED else squares / self._predicted,
                         outcome,
                     )
                 )
         return evaluations
 
-    def _make_batches(self, structures: Sequence[_Terms]) -> Iterator[tuple[slice, kernel.SelectedTerms]]:
+    def _make_batches(self, structures: kernel.SelectedTerms) -> Iterator[tuple[slice, kernel.SelectedTerms]]:
         """Yield structures in batches whose inner products the table of pairs has room for, and has."""
-        largest = max(map(len, structures), default=0)
+        largest = max(structures.lengths.tolist(), default=0)
         pairs = (largest + 1) * (largest + 2) // 2
         if 2 * pairs > len(self._pairs.keys):
             # The table must have room for one individual, even if that exceeds the limit.
             self._pairs = pair_table(4 * pairs * PLACE_BYTES)
         places = len(self._pairs.keys)
         batch = max(1, places // 2 // pairs)
-        for begin in range(0, len(structures), batch):
+        for begin in range(0, len(structures.lengths), batch):
             part = slice(begin, begin + batch)
-            count = len(structures[part])
-            if int(self._pairs.taken[0]) + pairs * count > places * 3 // 4:
+            given = kernel.SelectedTerms(structures.terms[part, :largest], structures.lengths[part])
+            if int(self._pairs.taken[0]) + pairs * len(given.lengths) > places * 3 // 4:
                 clear(self._pairs)
-            terms = np.zeros((count, largest), np.int64)
-            for row, structure in zip(terms, structures[part], strict=True):
-                row[: len(structure)] = structure
-            given = kernel.SelectedTerms(terms, np.array([len(each) for each in structures[part]], np.int64))
             context = self.context
             complete_pairs(*given, context.target, context.nodes, context.pairs, context.rows)
             yield part, given
+
+
+def _make_selected(structures: Sequence[_Terms]) -> kernel.SelectedTerms:
+    lengths = np.array([len(each) for each in structures], np.int64)
+    terms = np.zeros((len(structures), max(lengths.tolist(), default=0)), np.int64)
+    for row, structure in zip(terms, structures, strict=True):
+        row[: len(structure)] = structure
+    return kernel.SelectedTerms(terms, lengths)
 
 
 def _list_terms(selected: kernel.SelectedTerms) -> list[_Terms]:
@@ -330,10 +355,16 @@ def _list_terms(selected: kernel.SelectedTerms) -> list[_Terms]:
 
 
 def _make_evaluated(
-    individual: Individual, genes: dict[int, Expression], evaluation: Evaluation, allowed: NDArray[np.float64]
+    row: list[int],
+    numbers: list[int],
+    evaluation: Evaluation,
+    allowed: Sequence[float],
+    genes: Sequence[Expression],
 ) -> Individual:
-    kept = tuple([gene for number, gene in genes.items() if number in evaluation.numbers])
+    chosen = evaluation.numbers
+    kept = tuple([genes[gene] for gene, number in zip(row, numbers, strict=True) if number in chosen])
     if evaluation.exceeds(allowed):
         return Individual(kept, evaluation.regressors, (), inf, _ABANDONED)
-    terms, theta = evaluation.regressors, evaluation.theta
-    return Individual(kept or individual.genes, terms, theta, evaluation.fitness, evaluation.outcome)
+    if not kept:
+        kept = tuple([genes[gene] for gene in row if gene != UNUSED])
+    return Individual(kept, evaluation.regressors, evaluation.theta, evaluation.fitness, evaluation.outcome)

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from math import inf, isnan
 
@@ -35,6 +35,7 @@ class Individual:
     theta: tuple[float, ...] = ()
     fitness: float = inf
     outcome: EvaluationOutcome = OK
+    _key: tuple[str, ...] | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if isnan(self.fitness):
@@ -48,7 +49,12 @@ class Individual:
     @property
     def key(self) -> tuple[str, ...]:
         """Structure of the model as text; equal keys mean equal structures."""
-        return tuple(item.text for item in self.regressors)
+        key = self._key
+        if key is None:
+            # Elite, hall of fame and statistics of every generation compare the keys of all individuals.
+            key = tuple([item.text for item in self.regressors])
+            object.__setattr__(self, "_key", key)
+        return key
 
     @property
     def niche(self) -> tuple[str, ...]:

@@ -1,9 +1,8 @@
 """State of one island, and the step from one generation to the next."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import inf, isfinite
 
 from islands.evolution.evaluation import Evaluator
@@ -12,23 +11,12 @@ from islands.evolution.individual import Individual, Population, unique_niches, 
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.selection import run_tournaments
 from islands.evolution.settings import Settings
-from islands.evolution.variation import (
-    Genes,
-    high_level_crossover,
-    inner_mutation,
-    low_level_crossover,
-    outer_mutation,
-    random_genes,
-    repair_genes,
-    with_required_genes,
-)
+from islands.evolution.variation import Genes, breed, random_individuals, repair_genes
 from islands.expressions.tree import Expression
+from islands.kernels.breeding import Individuals
 
 #: Quantile of the parents' fitness that defines the abandon threshold.
 _THRESHOLD_QUANTILE = 0.8
-
-#: Attempts to breed children that differ from their parents. About a quarter of single attempts fail.
-_ATTEMPTS = 5
 
 #: Part of the first population that seeds may take, if there are more seeds than sizes.
 _SEEDED = 0.25
@@ -106,11 +94,13 @@ def first_generation(
     settings = settings or evaluator.settings
     rng = Stream(seed, index, 0, Purpose.INITIAL)
     given = [repair_genes(genes[: settings.max_terms], settings) for genes in seeds[: _count_seeds(settings)]]
-    drawn = [
-        random_genes(settings, evaluator.record.inputs, rng) for _ in range(settings.population - len(given))
-    ]
+    evaluator.prepare()
+    genes = evaluator.gene_index
+    drawn = random_individuals(
+        settings.population - len(given), settings, evaluator.record.inputs, genes, rng
+    )
     empty = Island(index, seed, 0, (), (), HallOfFame())
-    return _evaluate_generation(empty, [*given, *drawn], evaluator, settings)
+    return _evaluate_generation(empty, genes.number_genes([*given, *drawn]), evaluator, settings)
 
 
 def _count_seeds(settings: Settings) -> int:
@@ -143,72 +133,32 @@ def step(
         island.abandon_threshold,
         evaluator.evaluate_abandoned,
     )
-    offspring: list[Genes] = []
-    for couple in range(pairs):
-        pair = [parent.genes for parent in parents[2 * couple : 2 * couple + 2]]
-        offspring += _breed_pair(pair, evaluator, settings, rng, pool)
-    copied = frozenset[Genes]() if settings.prune_copies else frozenset(each.genes for each in parents)
-    return _evaluate_generation(following, offspring[: settings.population], evaluator, settings, copied)
-
-
-def _breed_pair(
-    parents: Sequence[Genes],
-    evaluator: Evaluator,
-    settings: Settings,
-    rng: Stream,
-    pool: Sequence[Expression],
-) -> list[Genes]:
-    """Recombine two parents, or mutate each with the given probability."""
-    if rng.chance(settings.crossover):
-        one, other = parents
-        cross = high_level_crossover if rng.chance(settings.high_level) else low_level_crossover
-        return _breed_new(partial(cross, one, other, settings, rng), parents, evaluator, settings)
-    inputs, children = evaluator.record.inputs, []
-    for genes in parents:
-        if not rng.chance(settings.mutation):
-            children.append(with_required_genes(genes, settings))
-            continue
-        mutate = partial(_mutate, genes, settings, inputs, rng, pool, rng.chance(settings.outer))
-        children += _breed_new(mutate, [genes], evaluator, settings)
-    return children
-
-
-def _mutate(
-    genes: Genes, settings: Settings, inputs: int, rng: Stream, pool: Sequence[Expression], outer: bool
-) -> tuple[Genes]:
-    if outer:
-        return (outer_mutation(genes, settings, inputs, rng, pool),)
-    return (inner_mutation(genes, settings, inputs, rng),)
-
-
-def _breed_new(
-    breed: Callable[[], Sequence[Genes]], parents: Sequence[Genes], evaluator: Evaluator, settings: Settings
-) -> list[Genes]:
-    """Breed until there are children with new structures, at most `_ATTEMPTS` times."""
-    known = {evaluator.gene_indices(Individual(genes)) for genes in parents}
-    new: list[Genes] = []
-    for _ in range(_ATTEMPTS):
-        children = [with_required_genes(genes, settings) for genes in breed()]
-        new += [genes for genes in children if evaluator.gene_indices(Individual(genes)) not in known]
-        if len(new) >= len(children):
-            break
-    return [*new, *children][: len(children)]
+    evaluator.prepare()
+    genes = evaluator.gene_index
+    couples = genes.number_genes([parent.genes for parent in parents], settings.max_terms)
+    children = breed(couples, settings, evaluator.record.inputs, genes, rng, pool)
+    offspring = Individuals(*(array[: settings.population] for array in children))
+    copied = None if settings.prune_copies else couples
+    return _evaluate_generation(following, offspring, evaluator, settings, copied)
 
 
 def _evaluate_generation(
     island: Island,
-    genes: Sequence[Genes],
+    individuals: Individuals,
     evaluator: Evaluator,
     settings: Settings,
-    copied: Collection[Genes] = (),
+    copied: Individuals | None = None,
 ) -> tuple[Island, StepInfo]:
-    """Evaluate the genes of a generation; copies of parents remain as they are, the others may be pruned."""
+    """Evaluate the individuals of a generation; copies of parents are not pruned, the others may be."""
     rng = Stream(island.seed, island.index, island.generation, Purpose.PRUNING)
     # Draw for every individual, also for known structures, so that caches never change the random stream.
-    candidates = [(Individual(each), rng.chance(settings.prune) and each not in copied) for each in genes]
+    pruned = rng.draw(len(individuals.lengths)) < settings.prune
+    if copied is not None:
+        copies = set(map(bytes, copied.genes))
+        pruned &= [bytes(each) not in copies for each in individuals.genes]
     threshold = _abandon_threshold(island, settings)
     thresholds = _thresholds_by_size(island.hall_of_fame, threshold, settings.max_terms)
-    population, _ = evaluator.evaluate(candidates, thresholds)
+    population, _ = evaluator.evaluate_genes(individuals, pruned, thresholds)
     worst = _elite_threshold(island, settings)
     contenders = (each for each in (*island.elite, *population) if each.fitness <= worst)
     elite = select_elite(contenders, settings.elites, settings.distinct, settings.niches)

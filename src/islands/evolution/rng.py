@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from enum import IntEnum
-from random import Random
 from typing import TypeVar
 
-from numpy.random import SeedSequence
+import numpy as np
+from numpy.random import RandomState, SeedSequence
+from numpy.typing import NDArray
 
 T = TypeVar("T")
 
@@ -25,14 +26,20 @@ class Purpose(IntEnum):
 class Stream:
     """Random stream for one purpose, generation and island.
 
-    All draws use ``Random.random``, whose sequence is guaranteed to be equal in all Python versions.
+    All draws use ``RandomState.random_sample``, whose sequence is guaranteed to be equal in all versions of
+    NumPy. It is that of ``random.Random`` with the words as one integer, the least significant first.
     """
 
     __slots__ = ("_uniform",)
 
     def __init__(self, seed: int, island: int, generation: int, purpose: Purpose) -> None:
         words = SeedSequence(seed, spawn_key=(island, generation, int(purpose))).generate_state(4)
-        self._uniform = Random(int.from_bytes(words.tobytes(), "little")).random
+        # An integer has no leading zeros.
+        self._uniform = RandomState(np.trim_zeros(words, "b")).random_sample
+
+    def draw(self, count: int) -> NDArray[np.float64]:
+        """Return random numbers in [0, 1)."""
+        return self._uniform(count)
 
     def chance(self, probability: float) -> bool:
         """Return true with a probability."""

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from islands.evolution.individual import Individual
 from islands.evolution.rng import Stream
 from islands.simulation.outcome import Status
@@ -35,18 +37,12 @@ def run_tournaments(
         Evaluates abandoned individuals completely. It is called only for those that may win, so the winners
         do not depend on which individuals were abandoned.
     """
-    drawn = [[rng.randrange(len(pool)) for _ in range(contestants)] for _ in range(count)]
-    fitness = [each.fitness for each in pool]
-    abandoned = {place for place, each in enumerate(pool) if each.outcome.verdict is Status.ABANDONED}
-    undecided = sorted(
-        {
-            place
-            for places in drawn
-            if min(fitness[place] for place in places) > abandon_threshold
-            for place in abandoned.intersection(places)
-        }
-    )
+    drawn = (rng.draw(count * contestants) * len(pool)).astype(np.int64).reshape(count, contestants)
+    fitness = np.array([each.fitness for each in pool])
+    abandoned = np.array([each.outcome.verdict is Status.ABANDONED for each in pool])
+    is_open = fitness[drawn].min(axis=1) > abandon_threshold
+    undecided = np.unique(drawn[is_open][abandoned[drawn[is_open]]]).tolist()
     evaluated = evaluate_abandoned([pool[place] for place in undecided])
-    for place, each in zip(undecided, evaluated, strict=True):
-        fitness[place] = each.fitness
-    return [pool[min(places, key=fitness.__getitem__)] for places in drawn]
+    fitness[undecided] = [each.fitness for each in evaluated]
+    first = fitness[drawn].argmin(axis=1)
+    return [pool[place] for place in drawn[np.arange(count), first].tolist()]

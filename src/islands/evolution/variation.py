@@ -2,110 +2,117 @@
 
 An individual recombines or mutates, never both. Children of valid parents are valid by construction: genes
 above the height limit are replaced by the parent's gene, the number of genes is limited, phi functions of new
-genes are repaired, and individuals under a parameter constraint have a linear output gene.
+genes are repaired, and individuals under a parameter constraint have a linear output gene. The operators are
+in `islands.kernels.breeding`.
 """
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from islands.estimation.parameter_constraints import constraint
+from islands.evolution.gene_index import GeneIndex
 from islands.evolution.gene_structure import LINEAR_OUTPUT, PHI, STRUCTURES, is_linear_output, with_phi
 from islands.evolution.individual import make_regressor
 from islands.evolution.rng import Stream
 from islands.evolution.settings import Settings
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Apply, Expression, Lagged, Primitive, Shift, children, height
+from islands.expressions.tree import Expression, Lagged, Primitive
+from islands.kernels import breeding
+from islands.kernels.breeding import Draws, Individuals, Variation, empty_individuals
 
 Genes = tuple[Expression, ...]
 
-#: Probability that a random tree ends in a leaf before its height limit.
-_LEAF_PROBABILITY = 0.15
-
-#: Probability that an inner node of a random tree is a back-shift.
-_SHIFT_PROBABILITY = 0.4
+#: Random numbers that are drawn for each individual of a generation at first.
+_DRAWS = 32
 
 
-def random_gene(settings: Settings, inputs: int, rng: Stream, limit: int | None = None) -> Expression:
-    """Draw a tree of functions and back-shifts by the grow method, up to a limit or the initial height."""
-    limit = settings.initial_height if limit is None else limit
-    if limit == 0 or rng.chance(_LEAF_PROBABILITY):
-        return Lagged(rng.randrange(inputs + 1))
-    if settings.shifts and (not settings.primitives or rng.chance(_SHIFT_PROBABILITY)):
-        return Shift(rng.choice(settings.shifts), random_gene(settings, inputs, rng, limit - 1))
-    entry = rng.choice(settings.primitives)
-    primitive = entry if isinstance(entry, Primitive) else PRIMITIVES[entry]
-    if settings.structure != "free" and primitive.name in PHI:
-        channel = 1 + rng.randrange(inputs)
-        arguments = [_lagged_input(settings, channel, rng, limit - 1) for _ in range(primitive.arity)]
-    else:
-        arguments = [random_gene(settings, inputs, rng, limit - 1) for _ in range(primitive.arity)]
-    return Apply(primitive, tuple(arguments))
+def random_individuals(
+    count: int, settings: Settings, inputs: int, index: GeneIndex, rng: Stream
+) -> list[Genes]:
+    """Draw the genes of individuals of the first population."""
+    found = empty_individuals(count, settings.max_terms)
+    _breed(empty_individuals(0, 0), found, make_variation(settings, inputs, index), index, rng)
+    rows = zip(*(array.tolist() for array in found), strict=True)
+    drawn = [tuple([index.genes[number] for number in genes[:length]]) for genes, length in rows]
+    return [repair_genes(genes, settings) for genes in drawn]
 
 
-def _lagged_input(settings: Settings, channel: int, rng: Stream, limit: int) -> Expression:
-    leaf: Expression = Lagged(channel)
-    while limit > 0 and settings.shifts and not rng.chance(_SHIFT_PROBABILITY):
-        leaf = Shift(rng.choice(settings.shifts), leaf)
-        limit -= 1
-    return leaf
+def breed(
+    parents: Individuals,
+    settings: Settings,
+    inputs: int,
+    index: GeneIndex,
+    rng: Stream,
+    pool: Sequence[Expression] = (),
+) -> Individuals:
+    """Recombine each pair of parents, or mutate each of the two, with the probabilities of the settings.
 
-
-def random_genes(settings: Settings, inputs: int, rng: Stream) -> Genes:
-    """Draw the genes of an individual of the first population."""
-    fewest, most = settings.initial_terms
-    count = fewest + rng.randrange(most - fewest + 1)
-    return repair_genes(tuple(random_gene(settings, inputs, rng) for _ in range(count)), settings)
-
-
-def low_level_crossover(one: Genes, other: Genes, settings: Settings, rng: Stream) -> tuple[Genes, Genes]:
-    """Exchange a subtree between one gene of each parent."""
-    i, j = rng.randrange(len(one)), rng.randrange(len(other))
-    here, there = _random_path(one[i], rng), _random_path(other[j], rng)
-    first = _replace_subtree(one[i], here, _get_subtree(other[j], there))
-    second = _replace_subtree(other[j], there, _get_subtree(one[i], here))
-    return _with_gene(one, i, first, settings), _with_gene(other, j, second, settings)
-
-
-def high_level_crossover(one: Genes, other: Genes, settings: Settings, rng: Stream) -> tuple[Genes, Genes]:
-    """Exchange the genes after a cut point in each parent; the number of genes may change.
-
-    Children with too many genes are truncated, or replaced by a parent.
+    Parameters
+    ----------
+    parents : Individuals
+        An even number, with room for the largest number of genes.
+    settings : Settings
+    inputs : int
+    index : GeneIndex
+        New genes are added.
+    rng : Stream
+    pool : sequence of Expression
+        Genes that an outer mutation may take whole. Without a pool the outer mutation is that of the paper: a
+        random gene replaces one gene.
     """
-    i, j = rng.randrange(len(one) + 1), rng.randrange(len(other) + 1)
-    first, second = one[:i] + other[j:], other[:j] + one[i:]
-    if settings.overlong == "parent":
-        first, second = (
-            child if len(child) <= settings.max_terms else parent
-            for child, parent in ((first, one), (second, other))
-        )
-    return first[: settings.max_terms] or one, second[: settings.max_terms] or other
+    children = empty_individuals(*parents.genes.shape)
+    _breed(parents, children, make_variation(settings, inputs, index, pool), index, rng)
+    return children
 
 
-def inner_mutation(genes: Genes, settings: Settings, inputs: int, rng: Stream) -> Genes:
-    """Replace a subtree of one gene by a random tree."""
-    position = rng.randrange(len(genes))
-    path = _random_path(genes[position], rng)
-    return _with_gene(
-        genes, position, _replace_subtree(genes[position], path, random_gene(settings, inputs, rng)), settings
+def _breed(
+    parents: Individuals, children: Individuals, variation: Variation, index: GeneIndex, rng: Stream
+) -> None:
+    """Call the kernel until it is complete; before the next call, provide what was missing."""
+    done, position = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    numbers = rng.draw(_DRAWS * len(children.lengths))
+    while status := breeding.breed(parents, children, done, variation, index.table, Draws(numbers, position)):
+        if status == breeding.NUMBERS_USED:
+            numbers = np.append(numbers, rng.draw(numbers.size))
+        elif status == breeding.TABLE_FULL:
+            index.grow()
+        index.complete()
+    index.complete()
+
+
+def make_variation(
+    settings: Settings, inputs: int, index: GeneIndex, pool: Sequence[Expression] = ()
+) -> Variation:
+    """Return the settings of variation in the layout of the kernels."""
+    entries = [entry if isinstance(entry, Primitive) else PRIMITIVES[entry] for entry in settings.primitives]
+    lagged = [settings.structure != "free" and entry.name in PHI for entry in entries]
+    required, leads = index.required_genes()
+    library = index.repair(pool)
+
+    def number(symbols: list[int]) -> np.ndarray:
+        return np.array(symbols, np.int64)
+
+    return Variation(
+        float(settings.crossover),
+        float(settings.high_level),
+        float(settings.mutation),
+        float(settings.outer),
+        float(settings.from_library),
+        settings.max_terms,
+        settings.max_height,
+        settings.initial_height,
+        *settings.initial_terms,
+        settings.overlong == "truncate",
+        number([index.symbol(Lagged(channel), 0) for channel in range(max(inputs, 1) + 1)]),
+        number([index.symbol(samples, 1) for samples in settings.shifts]),
+        number([index.symbol((entry, entry.arity), entry.arity) for entry in entries]),
+        np.array(lagged, np.bool_),
+        inputs,
+        number(required),
+        np.array(leads, np.bool_),
+        number(library),
     )
-
-
-def outer_mutation(
-    genes: Genes, settings: Settings, inputs: int, rng: Stream, pool: Sequence[Expression]
-) -> Genes:
-    """Replace one gene by a random gene, or replace, remove or add a gene using the pool.
-
-    Without a pool this is the outer mutation of the paper: a random gene replaces one gene.
-    """
-    position = rng.randrange(len(genes))
-    if not (pool and rng.chance(settings.from_library)):
-        return _with_gene(genes, position, random_gene(settings, inputs, rng), settings)
-    gene = STRUCTURES[settings.structure](rng.choice(pool))
-    match rng.randrange(4):
-        case 0 if len(genes) > 1:
-            return genes[:position] + genes[position + 1 :]
-        case 1 if len(genes) < settings.max_terms:
-            return (*genes, gene)
-    return (*genes[:position], gene, *genes[position + 1 :])
 
 
 def repair_genes(genes: Genes, settings: Settings) -> Genes:
@@ -123,44 +130,3 @@ def with_required_genes(genes: Genes, settings: Settings) -> Genes:
         if not any(make_regressor(gene) in terms for gene in genes):
             genes = (*genes[: settings.max_terms - 1], with_phi(terms[0].expression))
     return genes
-
-
-def _with_gene(genes: Genes, position: int, gene: Expression, settings: Settings) -> Genes:
-    """Replace a gene by a repaired new one; keep the parent's gene if the new one is too high."""
-    if height(gene) > settings.max_height:
-        return genes
-    return (*genes[:position], STRUCTURES[settings.structure](gene), *genes[position + 1 :])
-
-
-_Path = tuple[int, ...]
-
-
-def _random_path(gene: Expression, rng: Stream) -> _Path:
-    """Draw a node uniformly and return its path from the root."""
-    return rng.choice(_list_paths(gene))
-
-
-def _list_paths(gene: Expression, above: _Path = ()) -> list[_Path]:
-    paths = [above]
-    for position, child in enumerate(children(gene)):
-        paths += _list_paths(child, (*above, position))
-    return paths
-
-
-def _get_subtree(gene: Expression, path: _Path) -> Expression:
-    for position in path:
-        gene = children(gene)[position]
-    return gene
-
-
-def _replace_subtree(gene: Expression, path: _Path, subtree: Expression) -> Expression:
-    if not path:
-        return subtree
-    match gene:
-        case Shift(samples, argument):
-            return Shift(samples, _replace_subtree(argument, path[1:], subtree))
-        case Apply(primitive, arguments):
-            here = path[0]
-            changed = _replace_subtree(arguments[here], path[1:], subtree)
-            return Apply(primitive, (*arguments[:here], changed, *arguments[here + 1 :]))
-    return subtree

@@ -19,6 +19,8 @@ from islands.estimation.forward_selection import SelectionProblem, make_selectio
 from islands.estimation.structure_selection.certificate import certify
 from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.presets import resolve_settings
+from islands.evolution.rng import Purpose, Stream
+from islands.evolution.variation import random_individuals
 from islands.expressions.tree import Lagged
 from islands.facade.fit import fit
 from islands.facade.identify import identify
@@ -88,6 +90,10 @@ def use_other_kernels() -> None:
     context = _make_context(record)
     complete_pairs(*_ONE_TERM, context.target, context.nodes, context.pairs, context.rows)
     select_terms(_ONE_TERM, np.ones(1, np.bool_), context, empty_terms(1, 1))
+    evaluator = _make_evaluator(record)
+    random_individuals(
+        1, evaluator.settings, record.inputs, evaluator.gene_index, Stream(0, 0, 0, Purpose.INITIAL)
+    )
     model = PUBLISHED["13"].model
     problem = make_selection_problem(model.regressors, record, "none")
     if isinstance(problem, SelectionProblem):
@@ -134,7 +140,11 @@ def _second_process() -> Iterator[None]:
 
 def _make_context(record: Dataset) -> PopulationContext:
     """Return the context of a population of a search on the record."""
-    return Evaluator(record, resolve_settings("hysteresis", SMALL), Limits(pairs=0)).context
+    return _make_evaluator(record).context
+
+
+def _make_evaluator(record: Dataset) -> Evaluator:
+    return Evaluator(record, resolve_settings("hysteresis", SMALL), Limits(pairs=0))
 
 
 def _evaluate_individual(context: PopulationContext) -> None:

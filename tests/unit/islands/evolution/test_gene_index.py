@@ -1,8 +1,11 @@
-"""Index of genes: numbers of their regressors, and the order of these."""
+"""Index of genes: their numbers, the numbers of their regressors, and the order of these."""
+
+import numpy as np
 
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.gene_index import GeneIndex
+from islands.evolution.gene_index import ZERO, GeneIndex
 from islands.expressions.parsing import parse
+from islands.expressions.printing import plain
 from islands.expressions.tree import Constant, Lagged
 
 TEXTS = ("u(k-2)", "y(k-1)*u(k-1)", "2*u(k-2)", "y(k-1)", "tanh(u(k-1))")
@@ -12,19 +15,42 @@ def make_index():
     return GeneIndex(constraint("none"), (Lagged(0, 0), Lagged(0, 1)))
 
 
-def test_genes_of_one_regressor_have_one_number_and_the_first_is_kept():
+def test_genes_of_one_regressor_have_one_term():
     index, genes = make_index(), [parse(text) for text in TEXTS]
-    numbered = index.number_genes([*genes, Constant(0.0)])
-    assert list(numbered.values()) == [genes[0], genes[1], genes[3], genes[4]]
-    assert numbered == {index.index_of(gene): gene for gene in reversed(genes)}
-    assert [item.text for item in index.regressors(numbered)][-2:] == ["y(k-1)", "tanh(u1(k-1))"]
+    terms = [index.index_of(gene) for gene in [*genes, Constant(0.0)]]
+    assert terms[0] == terms[2]
+    assert terms[-1] == ZERO
+    assert len({*terms}) == 5
+    assert [item.text for item in index.regressors(terms[3:5])] == ["y(k-1)", "tanh(u1(k-1))"]
 
 
-def test_rank_does_not_depend_on_the_order_of_insertion():
+def test_equal_genes_have_one_number_and_one_object():
+    index, genes = make_index(), [parse(text) for text in TEXTS]
+    numbers = [index.number_gene(gene) for gene in genes]
+    assert len(set(numbers)) == len(TEXTS)
+    assert [index.number_gene(parse(text)) for text in TEXTS] == numbers
+    assert [index.genes[number] for number in numbers] == genes
+
+
+def test_numbers_of_genes_remain_when_the_table_grows():
+    index = make_index()
+    genes = [parse(f"y(k-{one})*u(k-{other})") for one in range(1, 51) for other in range(1, 51)]
+    room = index.table.repaired.size
+    numbers = [index.number_gene(gene) for gene in genes]
+    assert index.table.repaired.size > room
+    assert index.table.arity.size > 64
+    assert [index.number_gene(parse(plain(gene))) for gene in genes] == numbers
+
+
+def test_order_of_terms_does_not_depend_on_the_order_of_insertion():
     orders = []
     for texts in (TEXTS, TEXTS[::-1]):
         index = make_index()
-        ranks = index.rank(index.number_genes([parse(text) for text in texts]))
-        assert sorted(ranks.values()) == [0, 1, 2, 3]
-        orders.append([item.text for item in index.regressors(sorted(ranks, key=ranks.__getitem__))])
-    assert orders[0] == orders[1]
+        numbers = [index.index_of(parse(text)) for text in texts]
+        structures = np.array([[*numbers[:2], *numbers[3:]], [numbers[1], ZERO, ZERO, numbers[0]]])
+        given = index.sort_by_content(structures)
+        assert given.lengths.tolist() == [4, 2]
+        rows = zip(given.terms.tolist(), given.lengths.tolist(), strict=True)
+        orders.append([[item.text for item in index.regressors(row[:length])] for row, length in rows])
+    assert orders[0][0] == orders[1][0]
+    assert [set(order[1]) < set(order[0]) for order in orders] == [True, True]

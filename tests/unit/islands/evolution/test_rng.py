@@ -1,8 +1,10 @@
 """Derived random streams: golden values, dependence on the key, distributions."""
 
 from collections import Counter
+from random import Random
 
 import pytest
+from numpy.random import SeedSequence
 
 from islands.evolution.rng import Purpose, Stream
 
@@ -44,6 +46,17 @@ def test_streams_differ_by_seed_island_generation_and_purpose():
 
 def test_streams_with_equal_keys_draw_equal_numbers():
     assert draws(5, 1, 9, Purpose.PRUNING, count=50) == draws(5, 1, 9, Purpose.PRUNING, count=50)
+
+
+def test_many_draws_are_those_of_single_draws_and_of_the_standard_library():
+    for island in range(50):
+        key = 5, island, 9, Purpose.PRUNING
+        one, many = Stream(*key), Stream(*key)
+        words = SeedSequence(5, spawn_key=(island, 9, Purpose.PRUNING)).generate_state(4)
+        expected = Random(int.from_bytes(words.tobytes(), "little"))
+        drawn = [*many.draw(3).tolist(), *many.draw(4).tolist()]
+        assert drawn == [expected.random() for _ in range(7)]
+        assert [one.chance(each) for each in drawn] == [False] * 7
 
 
 def test_chance_has_the_given_probability():

@@ -1,4 +1,7 @@
-"""The two crossovers and the two mutations (the paper, section 5.1, Figure 1)."""
+"""The two crossovers and the two mutations (the paper, section 5.1, Figure 1).
+
+The kernel and the operators on trees breed the same children. The other laws are those of the operators.
+"""
 
 from collections import Counter
 from dataclasses import replace
@@ -7,18 +10,22 @@ import pytest
 
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
-from islands.evolution.variation import (
-    high_level_crossover,
-    inner_mutation,
-    low_level_crossover,
-    outer_mutation,
-    random_gene,
-    random_genes,
-    repair_genes,
-)
+from islands.evolution.variation import random_individuals, repair_genes
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.expressions.tree import Lagged, height, walk
+from islands.expressions.user_primitive import primitive
+from support.variation import (
+    breed_compiled,
+    breed_trees,
+    high_level_crossover,
+    inner_mutation,
+    low_level_crossover,
+    make_index,
+    outer_mutation,
+    random_gene,
+    random_genes,
+)
 
 SETTINGS = Settings(constraints="none", structure="free", max_terms=6, initial_terms=(1, 6))
 SEEDS = range(300)
@@ -38,6 +45,70 @@ def texts(found):
 
 LETTERS = genes("y(k-1)", "y(k-2)", "y(k-3)", "y(k-4)")
 NUMBERS = genes("u(k-1)", "u(k-2)")
+
+
+# The kernel.
+
+WIDE = replace(
+    SETTINGS,
+    crossover=0.6,
+    mutation=0.8,
+    primitives=("mul", "phi1", "phi2", "tanh", "add"),
+    structure="phi",
+    constraints="hysteresis",
+)
+
+VARIANTS = {
+    "paper": WIDE,
+    "long genes": replace(WIDE, structure="free", constraints="none", max_height=9, initial_height=7),
+    "leaves": replace(WIDE, max_height=0, initial_height=0),
+    "no shifts": replace(
+        WIDE, structure="free", constraints="none", shifts=(), max_height=2, initial_height=2
+    ),
+    "no functions": replace(WIDE, structure="increment", primitives=()),
+    "increment": replace(WIDE, structure="increment", from_library=0.5, overlong="parent"),
+    "one term": replace(WIDE, max_terms=1, initial_terms=(1, 1)),
+    "requirements": replace(
+        WIDE,
+        structure="free",
+        constraints="[u1(k-1)] + [u1(k-2)] = 2; [y(k-1)*u2(k-1)] = 1",
+        overlong="parent",
+    ),
+    "user's functions": replace(
+        WIDE,
+        structure="free",
+        constraints="odd",
+        primitives=("mul", primitive("bend", lambda a: a / (1 + a * a), parity=-1)),
+    ),
+}
+
+LIBRARY = genes(
+    "u1(k-3)", "y(k-2)*u1(k-1)*u2(k-2)*u1(k-1)", "phi1(u1(k-3), u1(k-1))", "2*u2(k-1)", "q2(y(k-3))"
+)
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_kernel_breeds_the_children_of_the_operators_on_trees(name):
+    """Each generation has the children of the one before as parents, so that genes get long and repeat."""
+    settings, index = VARIANTS[name], make_index(VARIANTS[name])
+    for seed in range(4):
+        parents = [random_genes(settings, 2, stream(100 + 60 * seed + place)) for place in range(40)]
+        for generation in range(5):
+            pool = LIBRARY if generation % 2 else ()
+            expected = breed_trees(parents, settings, 2, Stream(seed, 0, generation, Purpose.VARIATION), pool)
+            compiled = breed_compiled(
+                parents, settings, 2, Stream(seed, 0, generation, Purpose.VARIATION), pool, index
+            )
+            assert compiled == expected
+            parents = compiled[::-1]
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_kernel_draws_the_random_genes_of_the_first_population(name):
+    settings = VARIANTS[name]
+    draws = stream(3), stream(3)
+    expected = [random_genes(settings, 2, draws[0]) for _ in range(100)]
+    assert random_individuals(100, settings, 2, make_index(settings), draws[1]) == expected
 
 
 # High-level crossover: whole genes.

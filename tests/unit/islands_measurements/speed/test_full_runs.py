@@ -45,10 +45,10 @@ def test_duplicates_are_offspring_with_a_known_structure(piezo):
     class Counting(Evaluator):
         offspring = others = 0
 
-        def evaluate(self, population, bars=None):
-            found, known = super().evaluate(population, bars)
-            self.offspring += known if bars is not None else 0
-            self.others += known if bars is None else 0
+        def evaluate_genes(self, individuals, pruned, thresholds=None):
+            found, known = super().evaluate_genes(individuals, pruned, thresholds)
+            self.offspring += known if thresholds is not None else 0
+            self.others += known if thresholds is None else 0
             return found, known
 
     # In tournaments of size one abandoned individuals win as well, some of them repeatedly.
