@@ -56,12 +56,13 @@ def with_entries(hall: HallOfFame, individuals: Iterable[Individual]) -> HallOfF
     ordered = HallOfFame(tuple(sorted(found.values(), key=_order)))
     # Store genes in canonical form, so that the result does not depend on which notation came first.
     return HallOfFame(
-        tuple(
-            replace(entry, genes=tuple(item.expression for item in entry.regressors))
-            for rank, entry in ordered.ranked()
-            if rank <= DEPTH
-        )
+        tuple(_with_canonical_genes(entry) for rank, entry in ordered.ranked() if rank <= DEPTH)
     )
+
+
+def _with_canonical_genes(entry: Individual) -> Individual:
+    genes = tuple([item.expression for item in entry.regressors])
+    return entry if entry.genes == genes else replace(entry, genes=genes)
 
 
 def pareto_front(individuals: Iterable[Individual]) -> tuple[Individual, ...]:

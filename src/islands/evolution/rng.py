@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from enum import IntEnum
+from random import Random
 from typing import TypeVar
 
 import numpy as np
-from numpy.random import RandomState, SeedSequence
+from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
 T = TypeVar("T")
@@ -26,20 +27,22 @@ class Purpose(IntEnum):
 class Stream:
     """Random stream for one purpose, generation and island.
 
-    All draws use ``RandomState.random_sample``, whose sequence is guaranteed to be equal in all versions of
-    NumPy. It is that of ``random.Random`` with the words as one integer, the least significant first.
+    All draws have the sequence of ``Random.random``, which is guaranteed to be equal in all Python versions.
     """
 
-    __slots__ = ("_uniform",)
+    __slots__ = ("_bits", "_uniform")
 
     def __init__(self, seed: int, island: int, generation: int, purpose: Purpose) -> None:
         words = SeedSequence(seed, spawn_key=(island, generation, int(purpose))).generate_state(4)
-        # An integer has no leading zeros.
-        self._uniform = RandomState(np.trim_zeros(words, "b")).random_sample
+        random = Random(int.from_bytes(words.tobytes(), "little"))
+        self._uniform, self._bits = random.random, random.getrandbits
 
     def draw(self, count: int) -> NDArray[np.float64]:
         """Return random numbers in [0, 1)."""
-        return self._uniform(count)
+        # Random.random takes 27 and 26 bits of two words of the generator.
+        words = np.frombuffer(self._bits(64 * count).to_bytes(8 * count, "little"), "<u4")
+        high, low = words[::2] >> 5, words[1::2] >> 6
+        return (high * 2.0**26 + low) / 2.0**53
 
     def chance(self, probability: float) -> bool:
         """Return true with a probability."""

@@ -24,7 +24,7 @@ from islands.kernels.breeding import Draws, Individuals, Variation, empty_indivi
 Genes = tuple[Expression, ...]
 
 #: Random numbers that are drawn for each individual of a generation at first.
-_DRAWS = 32
+_DRAWS = 16
 
 
 def random_individuals(
