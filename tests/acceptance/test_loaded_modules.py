@@ -23,6 +23,7 @@ LIMITS = {
     "jobs --help": (870, ""),
     "jobs list --url http://127.0.0.1:9": (820, ""),
     "show published:13": (915, "numba scipy"),
+    "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1310, "numba scipy"),
     "simulate published:13 {record} --input u_V --output y_um": (1240, "numba scipy"),
 }
 
@@ -38,7 +39,7 @@ def record(tmp_path_factory):
 @pytest.mark.ci
 @pytest.mark.parametrize("command", LIMITS)
 def test_a_command_loads_the_modules_that_it_needs(command, record):
-    arguments = [part.format(record=record) for part in command.split()]
+    arguments = [part.format(record=record, folder=record.parent / "fit") for part in command.split()]
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, *arguments], capture_output=True, text=True, check=False
     )
