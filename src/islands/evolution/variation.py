@@ -19,7 +19,7 @@ from islands.evolution.settings import Settings
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Expression, Lagged, Primitive
 from islands.kernels import breeding
-from islands.kernels.breeding import Draws, Individuals, Variation, empty_individuals
+from islands.kernels.breeding import UNUSED, Draws, Individuals, Variation, empty_individuals
 
 Genes = tuple[Expression, ...]
 
@@ -63,6 +63,8 @@ def breed(
     """
     children = empty_individuals(*parents.genes.shape)
     _breed(parents, children, make_variation(settings, inputs, index, pool), index, rng)
+    after = np.arange(children.genes.shape[1]) >= children.lengths[:, None]
+    children.genes[after] = UNUSED
     return children
 
 

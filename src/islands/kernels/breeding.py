@@ -265,7 +265,9 @@ def _breed_couple(first, parents, children, scratch, variation, table, draws):
             status = max(status, found)
         else:
             _copy(parents, parent, children, parent)
-            _add_required(children, parent, variation, table)
+            _add_required(
+                children, parent, variation.required, variation.leads, variation.max_terms, table.meets
+            )
     return status
 
 
@@ -278,15 +280,17 @@ def _breed_new(first, count, whole, parents, children, scratch, variation, table
     status, new = COMPLETE, 0
     for _ in range(_ATTEMPTS):
         if whole and count == 2:
-            _exchange_genes(first, parents, scratch, variation, draws)
+            _exchange_genes(first, parents, scratch, variation.max_terms, variation.truncate, draws)
         else:
             found = _change_genes(first, count, whole, parents, scratch, variation, table, draws)
             if found > NEW_GENES:
                 return found
             status = max(status, found)
         for child in range(count):
-            _add_required(scratch, child, variation, table)
-            if new < count and _is_new(scratch, child, parents, first, count, table):
+            _add_required(
+                scratch, child, variation.required, variation.leads, variation.max_terms, table.meets
+            )
+            if new < count and _is_new(scratch, child, parents, first, count, table.term):
                 _copy(scratch, child, children, first + new)
                 new += 1
         if new >= count:
@@ -298,85 +302,79 @@ def _breed_new(first, count, whole, parents, children, scratch, variation, table
 
 @kernel(_nrt=False)
 def _copy(source, one, target, other):
-    """Copy an individual."""
+    """Copy an individual; the elements after its last gene keep their values."""
     length = source.lengths[one]
     for place in range(length):
         target.genes[other, place] = source.genes[one, place]
-    for place in range(length, target.genes.shape[1]):
-        target.genes[other, place] = UNUSED
     target.lengths[other] = length
 
 
 @kernel(_nrt=False)
-def _is_new(scratch, child, parents, first, count, table):
+def _is_new(scratch, child, parents, first, count, terms):
     """Return whether the terms of a child differ from those of each parent."""
     for parent in range(first, first + count):
-        if _contains(scratch, child, parents, parent, table) and _contains(
-            parents, parent, scratch, child, table
+        if _contains(scratch, child, parents, parent, terms) and _contains(
+            parents, parent, scratch, child, terms
         ):
             return False
     return True
 
 
 @kernel(_nrt=False)
-def _contains(individuals, index, others, other, table):
+def _contains(individuals, index, others, other, terms):
     """Return whether an individual has all terms of another; an unknown term is in no individual."""
     for place in range(others.lengths[other]):
-        term = table.term[others.genes[other, place]]
+        term = terms[others.genes[other, place]]
         found = False
         for position in range(individuals.lengths[index]):
-            found |= table.term[individuals.genes[index, position]] == term != UNKNOWN
+            found |= terms[individuals.genes[index, position]] == term != UNKNOWN
         if not found:
             return False
     return True
 
 
 @kernel(_nrt=False)
-def _add_required(individuals, index, variation, table):
+def _add_required(individuals, index, required, leads, max_terms, meets):
     """Add the genes that the parameter constraint needs to an individual."""
     genes = individuals.genes[index]
-    for requirement in range(variation.required.size):
+    for requirement in range(required.size):
         length = individuals.lengths[index]
         met = False
         for place in range(length):
-            met |= table.meets[genes[place], requirement]
+            met |= meets[genes[place], requirement]
         if met:
             continue
-        length = min(length, variation.max_terms - 1)
+        length = min(length, max_terms - 1)
         place = length
-        if variation.leads[requirement]:
+        if leads[requirement]:
             for later in range(length, 0, -1):
                 genes[later] = genes[later - 1]
             place = 0
-        genes[place] = variation.required[requirement]
+        genes[place] = required[requirement]
         individuals.lengths[index] = length + 1
 
 
 @kernel(_nrt=False)
-def _exchange_genes(first, parents, scratch, variation, draws):
-    """Exchange the genes after a cut point in each parent: the high-level crossover."""
-    one, other = parents.lengths[first], parents.lengths[first + 1]
-    i, j = _draw_below(one + 1, draws), _draw_below(other + 1, draws)
-    _join(first, i, first + 1, j, parents, scratch, 0, variation)
-    _join(first + 1, j, first, i, parents, scratch, 1, variation)
+def _exchange_genes(first, parents, scratch, max_terms, truncate, draws):
+    """Exchange the genes after a cut point in each parent: the high-level crossover.
 
-
-@kernel(_nrt=False)
-def _join(one, i, other, j, parents, scratch, child, variation):
-    """Make a child of the genes before ``i`` of a parent and those from ``j`` on of another."""
-    length = i + parents.lengths[other] - j
-    if length == 0 or (length > variation.max_terms and not variation.truncate):
-        _copy(parents, one, scratch, child)
-        if length > 0:
-            scratch.lengths[child] = min(scratch.lengths[child], variation.max_terms)
-        return
-    length = min(length, variation.max_terms)
-    for place in range(length):
-        before = place < i
-        scratch.genes[child, place] = (
-            parents.genes[one, place] if before else parents.genes[other, j + place - i]
-        )
-    scratch.lengths[child] = length
+    A child with too many genes is truncated or replaced by its parent, as one without genes.
+    """
+    i = _draw_below(parents.lengths[first] + 1, draws)
+    j = _draw_below(parents.lengths[first + 1] + 1, draws)
+    for child in range(2):
+        one, other = first + child, first + 1 - child
+        length = i + parents.lengths[other] - j
+        if length == 0 or (length > max_terms and not truncate):
+            _copy(parents, one, scratch, child)
+            length = scratch.lengths[child] if length == 0 else min(scratch.lengths[child], max_terms)
+        else:
+            length = min(length, max_terms)
+            for place in range(length):
+                row, column = (one, place) if place < i else (other, j + place - i)
+                scratch.genes[child, place] = parents.genes[row, column]
+        scratch.lengths[child] = length
+        i, j = j, i
 
 
 @kernel
@@ -390,7 +388,7 @@ def _change_genes(first, count, whole, parents, scratch, variation, table, draws
     for child in range(count):
         position[child] = _draw_below(parents.lengths[first + child], draws)
     if whole and variation.library.size > 0 and _draw(draws) < variation.from_library:
-        _use_library(first, position[0], parents, scratch, variation, draws)
+        _use_library(first, position[0], parents, scratch, variation.library, variation.max_terms, draws)
         return COMPLETE
     for child in range(count):
         gene = parents.genes[first + child, position[child]]
@@ -406,7 +404,16 @@ def _change_genes(first, count, whole, parents, scratch, variation, table, draws
     for child in range(count):
         _copy(parents, first + child, scratch, child)
         gene = scratch.genes[child, position[child]]
-        code = _splice(gene, begin[child], end[child], source, start, stop, table)
+        code = _splice(
+            table.symbols,
+            table.start[gene],
+            begin[child],
+            end[child],
+            table.start[gene + 1],
+            source,
+            start,
+            stop,
+        )
         start, stop = begin[0], end[0]
         # The child keeps the gene of its parent if the new one is too high.
         if measure_height(code, table.arity) <= variation.max_height:
@@ -423,33 +430,34 @@ def _change_genes(first, count, whole, parents, scratch, variation, table, draws
 
 
 @kernel
-def _splice(gene, begin, end, source, start, stop, table):
-    """Return the code of a gene with the symbols of a source in place of a subtree."""
-    before, after = table.start[gene], table.start[gene + 1]
-    code, count = np.empty(begin - before + stop - start + after - end, np.int64), 0
-    for symbols, one, other in (
-        (table.symbols, before, begin),
-        (source, start, stop),
-        (table.symbols, end, after),
-    ):
-        for place in range(one, other):
-            code[count] = symbols[place]
-            count += 1
+def _splice(symbols, first, begin, end, last, source, start, stop):
+    """Return the code of a gene with some symbols of a source in place of the subtree."""
+    code = np.empty(begin - first + stop - start + last - end, np.int64)
+    count = 0
+    for place in range(first, begin):
+        code[count] = symbols[place]
+        count += 1
+    for place in range(start, stop):
+        code[count] = source[place]
+        count += 1
+    for place in range(end, last):
+        code[count] = symbols[place]
+        count += 1
     return code
 
 
 @kernel(_nrt=False)
-def _use_library(parent, position, parents, scratch, variation, draws):
+def _use_library(parent, position, parents, scratch, library, max_terms, draws):
     """Replace, remove or add a gene; a new one is of the library."""
     genes, length = scratch.genes[0], parents.lengths[parent]
     _copy(parents, parent, scratch, 0)
-    gene = variation.library[_draw_below(variation.library.size, draws)]
+    gene = library[_draw_below(library.size, draws)]
     kind = _draw_below(4, draws)
     if kind == 0 and length > 1:
         for place in range(position, length - 1):
             genes[place] = genes[place + 1]
         scratch.lengths[0] = length - 1
-    elif kind == 1 and length < variation.max_terms:
+    elif kind == 1 and length < max_terms:
         genes[length] = gene
         scratch.lengths[0] = length + 1
     else:
