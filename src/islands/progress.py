@@ -95,12 +95,12 @@ class PhasedProgress:
         if found is not None and found > self._present:
             self._before += self._phases[self._present].share if self._has_begun else 0.0
             self._present, self._within, self._steps = found, 0.0, 0
-        elif found is not None and self._has_begun and message != self._message:
+        elif found is not None and fraction is None and self._has_begun and message != self._message:
             self._steps += 1
             self._advance(0.0)
-        if found is not None and fraction is not None:
-            self._within = max(self._within, min(fraction, 1.0))
-        self._has_begun = self._has_begun or found is not None
+        if found is not None:
+            self._within = max(self._within, min(fraction or 0.0, 1.0))
+            self._has_begun = True
         self._message = message
         self._report()
 

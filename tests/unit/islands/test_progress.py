@@ -73,7 +73,9 @@ def test_messages_and_calls_of_a_phase_increase_the_fraction() -> None:
     assert [fraction for _, fraction in reported[-2:]] == pytest.approx([0.75 / 7, 1 / 7])
     progress("a message of no phase", 0.1)
     progress("reading again", 0.0)
-    progress("search", 0.5)
+    progress("search: first of four", 0.25)
+    progress("search: second of four", 0.5)
+    assert reported[-1][1] == pytest.approx(4 / 7)
     progress("search", 0.2)
     fractions = [fraction for _, fraction in reported]
     assert fractions == sorted(fractions)
