@@ -10,6 +10,9 @@ from islands.parallel import ParallelMap
 A = TypeVar("A")
 R = TypeVar("R")
 
+#: Fraction from which the time left is estimated.
+MIN_FRACTION = 0.1
+
 #: Seconds for which no time left is estimated.
 _FIRST_SECONDS = 1.0
 
@@ -158,7 +161,7 @@ class TimeLeft:
         Fraction from which the time left is estimated.
     """
 
-    def __init__(self, began: float, least: float = 0.05) -> None:
+    def __init__(self, began: float, least: float = MIN_FRACTION) -> None:
         self._began, self._least, self._fraction = began, least, 0.0
         self._estimate: tuple[float, float] | None = None
 

@@ -12,7 +12,7 @@ from islands.evolution.presets import AUTO, resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT, FORMULA
 from islands.facade.identification_progress import IdentificationProgress
-from islands.progress import PhasedProgress, TimeLeft, report_part
+from islands.progress import MIN_FRACTION, PhasedProgress, TimeLeft, report_part
 
 RECORDED = Path(__file__).parent / "recorded_progress"
 
@@ -60,7 +60,7 @@ class _Identification(_Bar):
     """The bar of `islands identify`."""
 
     def __init__(self, document: dict[str, Any]) -> None:
-        super().__init__(0.05)
+        super().__init__(MIN_FRACTION)
         sizes = {name: document[name] for name in ("population", "islands", "generations")}
         preset, self._settings = document["preset"], resolve_settings("narx", sizes)
         assert preset in (AUTO, "narx")

@@ -22,11 +22,7 @@ from rich.text import Text
 
 from islands.cli.console import errors
 from islands.cli.stop_requests import end_at_once
-from islands.progress import TimeLeft
-
-#: Fraction from which the time left is estimated.
-MIN_FRACTION = 0.05
-
+from islands.progress import MIN_FRACTION, TimeLeft
 
 #: Seconds between two checks whether another thread has ended.
 _JOIN_SECONDS = 0.1

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from islands.evolution.presets import AUTO
-from islands.progress import Phase, PhasedProgress, ProgressCallback
+from islands.progress import MIN_FRACTION, Phase, PhasedProgress, ProgressCallback
 
 if TYPE_CHECKING:
     from islands.evolution.search_state import SearchState
@@ -116,7 +116,7 @@ class IdentificationProgress(PhasedProgress):
         super().__call__(message, fraction)
 
     def report_epoch(self, state: "SearchState", settings: "Settings", rate: float) -> float | None:
-        """Report the present search, and return the seconds left by its speed.
+        """Report the present search, and return the seconds left by its speed, None in its first epochs.
 
         Parameters
         ----------
@@ -126,4 +126,5 @@ class IdentificationProgress(PhasedProgress):
         done = (state.history[-1].generation + 1) / (settings.generations + 1)
         self(f"{self._prefix}{SEARCH}", done)
         whole = settings.population * settings.islands * (settings.generations + 1)
-        return whole / rate * (1.0 - done + self.rest) if rate > 0.0 else None
+        is_known = rate > 0.0 and done >= MIN_FRACTION
+        return whole / rate * (1.0 - done + self.rest) if is_known else None

@@ -9,7 +9,7 @@ from islands.progress import TimeLeft
 
 @pytest.mark.parametrize(
     ("fraction", "text"),
-    [(0.01, "1%"), (0.25, "25%, 30 s left"), (0.05, "5%, 3 min left"), (1.0, "100%, 0 s left")],
+    [(0.01, "1%"), (0.25, "25%, 30 s left"), (0.05, "5%"), (0.1, "10%, 90 s left"), (1.0, "100%, 0 s left")],
 )
 def test_bar_shows_the_fraction_and_the_time_left(fraction: float, text: str) -> None:
     left = TimeLeft(0.0)
