@@ -20,10 +20,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+from islands.data.coupled_record import couple
 from islands.data.dataset import Dataset
 from islands.diagnosis.procedure import PHASES, diagnose
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
 from islands.facade.automatic.preset_choice import choose_preset
+from islands.facade.coupled.identification import identify_coupled, resolve_coupled_settings
 from islands.facade.explain_residual import FORMULA, explain_residual
 from islands.facade.identification_progress import identification_phases
 from islands.facade.identify import identify
@@ -96,6 +98,24 @@ def run_identification(samples: int, preset: str = AUTO, **changes: Any) -> Reco
     return recording
 
 
+def run_outputs(samples: int) -> Recording:
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-1, 1, samples // 10), 10)
+    states = np.zeros((samples, 2))
+    for k in range(1, samples):
+        first, second = states[k - 1]
+        states[k, 0] = 0.8 * first + 0.2 * u[k - 1] + 0.1 * second
+        states[k, 1] = 0.7 * second + 0.2 * states[k, 0]
+    y = states + rng.normal(0, 0.003, states.shape)
+    whole = Dataset(np.column_stack([u, y[:, 1]]), y[:, 0], 0.01, ("u", "b"), "a")
+    settings = resolve_coupled_settings(AUTO, {})
+    sizes = {name: getattr(settings, name) for name in ("population", "islands", "generations")}
+    recording = Recording(kind="outputs", outputs=["a", "b"], preset=AUTO, samples=samples, **sizes)
+    identify_coupled(couple(whole, 2), seed=1, progress=recording, on_epoch=recording.epoch)
+    recording.add("end")
+    return recording
+
+
 def run_diagnosis(record: Dataset, simulation: str) -> Recording:
     simulator = make_simulator(parse_spec(simulation), record)
     recording = Recording(kind="diagnosis", simulation=simulation, samples=record.samples)
@@ -113,6 +133,7 @@ RUNS: dict[str, Callable[[], Recording]] = {
     "identification-2000": lambda: run_identification(2000),
     "identification-20000": lambda: run_identification(20_000),
     "identification-narx": lambda: run_identification(3000, "narx", generations=400),
+    "outputs": lambda: run_outputs(1500),
     "diagnosis-linear": lambda: run_diagnosis(make_process(3000), "linear:1"),
     "diagnosis-second-order": lambda: run_diagnosis(make_saturating_process(1500), "second-order"),
     "diagnosis-short": lambda: run_diagnosis(make_process(500), "second-order"),
@@ -127,18 +148,25 @@ def list_phases(document: dict[str, Any]) -> tuple[Phase, ...]:
     preset = "narx" if document["preset"] == AUTO else document["preset"]
     sizes = {name: document[name] for name in ("population", "islands", "generations")}
     settings = resolve_settings(preset, sizes)
-    return identification_phases(document["preset"], document["samples"], settings)
+    outputs = document.get("outputs", ())
+    return identification_phases(document["preset"], document["samples"], settings, outputs)
+
+
+def before_colon(message: str) -> str:
+    return message.partition(": ")[0]
 
 
 def measure_phases(document: dict[str, Any]) -> list[tuple[str, float, int]]:
     """Return the seconds and the steps of each phase of a recorded run."""
     phases = list_phases(document)
     found = [[each.beginning, 0.0, 0] for each in phases]
-    present, before = 0, document["rows"][0][0]
+    present, output, before = 0, "", document["rows"][0][0]
     for seconds, name, _ in document["rows"]:
         found[present][1] += seconds - before
         before = seconds
-        message = "search" if name == EPOCH and document["kind"] == "identification" else name
+        output = f"{prefix}: " if (prefix := before_colon(name)) in document.get("outputs", ()) else output
+        is_search = name == EPOCH and document["kind"] != "diagnosis"
+        message = f"{output}search" if is_search else name
         following = range(present, len(phases))
         begun = next((at for at in following if message.startswith(phases[at].beginning)), present)
         found[begun][2] += begun == present and (name == MAP or message.startswith(phases[begun].beginning))

@@ -34,7 +34,7 @@ def replay(name: str) -> list[Moment]:
     document = json.loads((RECORDED / f"{name}.json").read_text())
     rows = document["rows"]
     began, whole = rows[0][0], rows[-1][0] - rows[0][0]
-    bar = (_Identification if document["kind"] == "identification" else _Diagnosis)(document)
+    bar = (_Diagnosis if document["kind"] == "diagnosis" else _Identification)(document)
     moments = iter([whole * k / MOMENTS for k in range(1, MOMENTS)])
     moment, found = next(moments), []
     for at, *row in rows:
@@ -64,8 +64,9 @@ class _Identification(_Bar):
         sizes = {name: document[name] for name in ("population", "islands", "generations")}
         preset, self._settings = document["preset"], resolve_settings("narx", sizes)
         assert preset in (AUTO, "narx")
-        self._progress = IdentificationProgress(self.show, preset, document["samples"], self._settings)
-        self._began: float | None = None
+        about = document["samples"], self._settings, document.get("outputs", ())
+        self._progress = IdentificationProgress(self.show, preset, *about)
+        self._began = 0.0
 
     def report(self, name: str, value: float | None) -> None:
         if name == "end":
@@ -73,7 +74,7 @@ class _Identification(_Bar):
         if name != "epoch":
             self._progress(name, value)
             return
-        self._began = self.now if self._began is None else self._began
+        self._began = self.now if value == 0 else self._began
         per_generation = self._settings.population * self._settings.islands
         rate = value * per_generation / max(self.now - self._began, 1e-9)
         state = SearchState(empty_archipelago(1, 0), history=(HistoryPoint(int(value), 0, {1: 1.0}, (1.0,)),))

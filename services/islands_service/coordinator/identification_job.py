@@ -272,8 +272,8 @@ class ProgressReporter:
         self._run, self._checkpoints, self._stop = run, checkpoints, stop
         self._started_at = monotonic() - start.spent
         state = start.state and sum_searches(start.state)
-        #: Time and evaluations after the first epoch of this process, which the rate begins with.
-        self._first: tuple[float, int] | None = None
+        #: Number of the search of an output, and time and evaluations after its first epoch in this process.
+        self._first: tuple[int, float, int] | None = None
         self._left = TimeLeft(self._started_at)
         self._stage: dict[str, Any] = {}
         self._note = {"note": start.note} if start.note else {}
@@ -375,8 +375,10 @@ class ProgressReporter:
     def _progress(self, searched: SearchState, settings: Settings) -> dict[str, Any]:
         state, outputs = sum_searches(searched), self._outputs
         last, generations = state.history[-1], (settings.generations + 1) * outputs - 1
-        now = monotonic()
-        since, before = self._first = self._first or (now, state.evaluations)
+        now, number = monotonic(), len(searched.earlier)
+        if self._first is None or self._first[0] != number:
+            self._first = number, now, state.evaluations
+        _, since, before = self._first
         rate = (state.evaluations - before) / max(now - since, 1e-9)
         best = {size: error**0.5 for size, error in last.best.items()}
         return {

@@ -36,7 +36,8 @@ class SearchDisplay:
         self._show = show
         self._progress = IdentificationProgress(self._show_stage, preset, samples, settings, outputs)
         self._fraction = 0.0
-        self._first: tuple[float, int] | None = None
+        #: Number of the search of an output, and time and evaluations after its first epoch.
+        self._first: tuple[int, float, int] | None = None
 
     def __call__(self, message: str, fraction: float | None = None, /) -> None:
         """Show a message of a stage before or after the epochs."""
@@ -44,8 +45,10 @@ class SearchDisplay:
 
     def show_epoch(self, state: SearchState, settings: Settings) -> None:
         """Show generation, speed, time left, and the best error by size and by island."""
-        now = monotonic()
-        since, before = self._first = self._first or (now, state.evaluations)
+        now, number = monotonic(), len(state.earlier)
+        if self._first is None or self._first[0] != number:
+            self._first = number, now, state.evaluations
+        _, since, before = self._first
         rate = (state.evaluations - before) / max(now - since, 1e-9)
         left = self._progress.report_epoch(state, settings, rate)
         best = " ".join(f"{size}:{error**0.5:.3g}" for size, error in state.history[-1].best.items())

@@ -81,7 +81,7 @@ def _repeat(phases: Sequence[Phase], outputs: Sequence[str]) -> tuple[Phase, ...
     return (
         *(replace(each, beginning=f"{name}: {each.beginning}") for name in outputs for each in phases),
         Phase("choice of the equations", 0.1),
-        Phase("refinement of all equations", 1.0),
+        Phase("refinement of all equations", 0.1),
         *(each for each in phases if each.beginning == "prediction bands"),
     )
 

@@ -13,16 +13,17 @@ from support.recorded_runs import late, replay
 #: Recorded runs with the largest error of the time left beyond half of it, in seconds, as measured.
 EXCESS = {
     "identification-500": 1.0,
-    "identification-2000": 3.0,
+    "identification-2000": 1.0,
     "identification-20000": 3.0,
     "identification-narx": 1.0,
+    "outputs": 3.0,
 }
 
 
 @pytest.mark.parametrize("name", EXCESS)
 def test_time_left_is_within_half_of_the_truth_and_some_seconds(name):
     shown = [each for each in late(replay(name)) if each.left is not None]
-    assert len(shown) > 130
+    assert len(shown) > 120
     assert all(abs(each.left - each.truth) <= 0.5 * each.truth + EXCESS[name] for each in shown)
 
 
