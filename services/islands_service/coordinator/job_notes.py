@@ -39,10 +39,20 @@ class JobNotes:
         self._message, self._until = message, monotonic() + SHOWN_SECONDS
         phase = {"phase": WAITING} if message.startswith(WAITING) else {}
         try:
-            self._store.leases.report(self._lease, ProgressReport({**self.complete(self._progress), **phase}))
+            self.report({**phase, "note": message})
         except StoreError as error:
             # The next report of the search contains the message.
             log.warning("report failed", job=self._lease.job.id, reason=str(error))
+
+    def report(self, changes: Mapping[str, Any]) -> None:
+        """Store the last progress with changes, and without its time left, which is that of the last report.
+
+        Raises
+        ------
+        StoreError
+        """
+        reached = {name: value for name, value in self._progress.items() if name != "seconds_left"}
+        self._store.leases.report(self._lease, ProgressReport({**reached, **changes}))
 
     def complete(self, progress: Mapping[str, Any]) -> dict[str, Any]:
         """Return a new progress of the job with the last message, unless that is old."""

@@ -33,7 +33,6 @@ from islands_service.domain.job import (
     JobState,
     Lease,
     LeaseLostError,
-    ProgressReport,
 )
 from islands_service.liveness import StopRequest, stop_on_signals
 from islands_service.outage_log import OutageLog
@@ -222,7 +221,7 @@ class Coordinator:
             self._prepare()
             self._demand_ray_early(lease.job)
             notes = JobNotes(lease, self._store)
-            connect = partial(self._wait_for_ray, lease, heartbeat)
+            connect = partial(self._wait_for_ray, lease, notes, heartbeat)
             run = JobRun(
                 lease,
                 self._store,
@@ -301,13 +300,12 @@ class Coordinator:
             # Another coordinator claims the job after the lease has expired.
             log.warning("job not released", reason=str(error))
 
-    def _wait_for_ray(self, lease: Lease, heartbeat: Heartbeat) -> None:
+    def _wait_for_ray(self, lease: Lease, notes: JobNotes, heartbeat: Heartbeat) -> None:
         if self._connected:
             return
         self._demand_ray()
         if self._find_address() is None:
-            report = ProgressReport({"phase": "starting", "note": "waiting for Ray"})
-            self._store.leases.report(lease, report)
+            notes.report({"phase": "starting", "note": "waiting for Ray"})
             # The supervisor kills this process if Ray ends. Five of its starts must not make the job fail.
             self._store.leases.count_attempt(lease, -1)
             try:

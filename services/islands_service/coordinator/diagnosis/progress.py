@@ -75,7 +75,8 @@ class DiagnosisProgress:
             self._write_checkpoint() if began >= self._checkpoint_at and reached != self._stored else None
         )
         try:
-            self._run.store.leases.report(self._run.lease, ProgressReport(progress, checkpoint=checkpoint))
+            report = ProgressReport(self._run.notes.complete(progress), checkpoint=checkpoint)
+            self._run.store.leases.report(self._run.lease, report)
         except StoreError as error:
             # Continue the analysis. The next report has the progress.
             self._report_outage.fail(error, job=self._run.job.id)

@@ -40,6 +40,13 @@ def test_running_search_keeps_its_figures_and_the_message_for_a_while(store, lea
     assert notes.complete({"generation": 9}) == {"generation": 9}
 
 
+def test_a_change_between_two_reports_keeps_the_fraction_and_no_old_time_left(store, lease):
+    notes = JobNotes(lease, store)
+    notes.complete({"phase": "screening", "fraction": 0.1, "seconds_left": 20.0})
+    notes.report({"phase": "starting", "note": "waiting for Ray"})
+    assert progress_of(store, lease) == {"phase": "starting", "note": "waiting for Ray", "fraction": 0.1}
+
+
 def test_message_about_waiting_is_repeated_while_the_progress_shows_it(monkeypatch):
     """Otherwise the owner would no longer see it after a minute."""
     assert actor_pool.WAITING_NOTICE_EVERY < job_notes.SHOWN_SECONDS
