@@ -104,7 +104,7 @@ class LibraryFit:
         All models that were estimated.
     warm_up : int
         Number of samples before the first prediction.
-    selections : tuple of Selection
+    selections : tuple of LibrarySelection
         Selections whose structures were estimated.
     refit : callable
         Fits the library again, with other subsets in place of those of the selections.
@@ -116,7 +116,7 @@ class LibraryFit:
     average: int
     estimates: list[ValidatedModel[DynamicModel]]
     warm_up: int
-    selections: tuple["Selection", ...]
+    selections: tuple["LibrarySelection", ...]
     refit: Callable[[Sequence[Subsets]], "LibraryFit"]
     steps: Steps
 
@@ -159,8 +159,8 @@ class LibraryFit:
 
 
 @dataclass(frozen=True, slots=True)
-class Selection:
-    """Selection of structures, and the best subsets that exchanges found."""
+class LibrarySelection:
+    """LibrarySelection of structures, and the best subsets that exchanges found."""
 
     problem: SelectionProblem
     subsets: Subsets
@@ -301,7 +301,7 @@ def _select(
     exchange: bool,
     subsets: Sequence[Subsets],
     steps: Steps,
-) -> tuple[list[tuple[Structure, Offsets]], tuple[Selection, ...], int]:
+) -> tuple[list[tuple[Structure, Offsets]], tuple[LibrarySelection, ...], int]:
     """Return structures, each with the offsets of its signals, the selections, and the largest lag."""
     # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
     # in deviations from it. The validation data tell which one holds.
@@ -310,7 +310,7 @@ def _select(
     if constraint(constraints).allows_offsets:
         tried = [find_offsets(record, limit) for limit in (LARGE_OFFSET, OPERATING_POINT)]
     structures: list[tuple[Structure, Offsets]] = []
-    selections: list[Selection] = []
+    selections: list[LibrarySelection] = []
     warm_up = 0
     for offsets in dict.fromkeys(tried):
         deviations = Split(*(subtract_offsets(part, offsets) for part in (record, split.validation)))
@@ -329,7 +329,7 @@ def _select(
             best = subsets[len(selections)]
         elif exchange:
             best = find_subsets(problem, settings.max_terms)
-        selections.append(Selection(problem, best))
+        selections.append(LibrarySelection(problem, best))
         starts += best
         exchanged = select_pool(pool, problem, settings.max_terms)
         chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, steps)]
