@@ -11,8 +11,9 @@ from threading import Event, Thread
 #: Seconds between two heartbeats.
 EVERY = 0.5
 
-#: Heartbeat of a process, and of one that uses the roles which it may need.
-ALIVE, IN_NEED = b".", b"n"
+#: Heartbeat of a process, of one that uses the roles which it may need, and of one that starts its program
+#: again.
+ALIVE, IN_NEED, STARTING = b".", b"n", b"s"
 
 #: Exit status after an error that only its message describes.
 FAILED = 1

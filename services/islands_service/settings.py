@@ -67,7 +67,7 @@ class ServiceSettings(BaseSettings):
         Path under which a proxy offers the service, for example ``/islands``; it precedes the path of every
         ``Location``.
     ray_address
-        ``HOST:PORT`` of a Ray cluster; by default a Ray head is started on this machine.
+        ``HOST:PORT`` of a Ray cluster; by default a Ray head is started on this machine when a job needs it.
     autoscaling
         Whether the cluster starts machines for islands that wait for a CPU, such as one of KubeRay with an
         autoscaler. A job then requests a CPU for each island, even if the cluster has fewer.

@@ -23,6 +23,7 @@ from islands_service.liveness import (
     FAILED,
     IN_NEED,
     MISCONFIGURED,
+    STARTING,
     UNAVAILABLE,
     StopRequest,
     set_parent_death_signal,
@@ -97,7 +98,7 @@ class Role:
     pipe : int
         File descriptor from which heartbeats are read; -1 if the process does not run.
     last_heartbeat : float, optional
-        Time of the last heartbeat; None before the first one.
+        Time of the last heartbeat; None before the first one of the program.
     last_active : float
         Time of the last heartbeat, or of a later check that has found it reading pages from a disk.
     is_in_need : bool
@@ -289,6 +290,10 @@ def _read_heartbeats(role: Role, now: float) -> None:
             if role.is_in_need:
                 role.needed_at = now
             role.page_faults, _ = _read_state(role)
+            if received.endswith(STARTING):
+                role.has_run = True
+                role.is_stable = role.is_stable or now - role.started_at > _STABLE_AFTER
+                role.last_heartbeat, role.started_at = None, now
 
 
 def _is_hanging(role: Role, now: float) -> bool:

@@ -50,14 +50,14 @@ def main() -> int:
             metrics.is_served = True
         inherited = settings.lifeline, settings.readers
         with watch_supervisor(settings.lifeline) as heartbeats:
-            abandon = partial(restart_process, inherited)
+            abandon = partial(restart_process, *inherited)
             demand = heartbeats.demand_roles
             Coordinator(settings, arguments.name, stopping, abandon, metrics, demand).run()
         # From here on a signal ends the process.
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, signal.SIG_DFL)
         if not stopping.requested:
-            restart_process(inherited)
+            restart_process(*inherited)
     except IslandsError as error:
         print(f"coordinator: {error}", file=sys.stderr)
         if isinstance(error, DatabaseDamagedError):

@@ -127,6 +127,8 @@ class Coordinator:
             while not (self._stopping.requested or self._is_dispensable()):
                 if self._can_claim():
                     self._claim_next()
+            if not self._stopping.requested:
+                log.info("coordinator ends to free memory", name=self._name)
 
     def _is_dispensable(self) -> bool:
         """Return whether a new process would do the same with less memory, and no metric would be lost."""

@@ -3,16 +3,17 @@
 import os
 import signal
 import sys
-from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
+
+from islands_service.liveness import STARTING, send_heartbeat
 
 #: Standard input, output and error.
 _STANDARD = (0, 1, 2)
 
 
-def restart_process(kept: Collection[int | None]) -> NoReturn:
+def restart_process(lifeline: int | None, *kept: int | None) -> NoReturn:
     """Start the program of this process again in its place, with the same arguments and environment.
 
     All threads end at once, whatever they compute, and child processes are killed. Ray notices that the
@@ -21,8 +22,10 @@ def restart_process(kept: Collection[int | None]) -> NoReturn:
 
     Parameters
     ----------
-    kept : collection of int or None
-        File descriptors that stay open: those that the supervisor has passed.
+    lifeline : int or None
+        Heartbeat pipe of the supervisor, which stays open.
+    *kept : int or None
+        Further file descriptors that stay open.
     """
     for child in _find_children():
         with suppress(ProcessLookupError, ChildProcessError):
@@ -30,9 +33,10 @@ def restart_process(kept: Collection[int | None]) -> NoReturn:
             os.waitpid(child, 0)
     for descriptor in [int(each.name) for each in Path("/proc/self/fd").iterdir()]:
         # Without this, Ray's connections would stay open.
-        if descriptor not in (*_STANDARD, *kept):
+        if descriptor not in (*_STANDARD, lifeline, *kept):
             with suppress(OSError):
                 os.set_inheritable(descriptor, False)
+    send_heartbeat(lifeline, STARTING)
     os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
 
 

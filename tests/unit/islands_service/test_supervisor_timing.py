@@ -35,6 +35,16 @@ while os.path.exists(sys.argv[1]):
         place = (place + 1_000_000) % 8_000_000
 signal.pause()
 """
+#: Sends a heartbeat, and starts its program again when a file exists.
+AGAIN = """
+import os, signal, sys, time
+lifeline = int(os.environ["ISLANDS_LIFELINE"])
+os.write(lifeline, b".")
+while not os.path.exists(sys.argv[1]):
+    time.sleep(0.005)
+os.write(lifeline, b"s")
+signal.pause()
+"""
 ONE_HEARTBEAT = f"import os; os.write(int(os.environ['ISLANDS_LIFELINE']), b'.'); {SILENT}"
 
 
@@ -125,6 +135,20 @@ def test_stable_role_is_restarted_at_once_and_resets_the_backoff(
     assert role.runs
     role.ended(0.1)
     assert role.waits(0.2)
+
+
+def test_role_that_starts_its_program_again_has_the_time_of_a_start(
+    start_role: StartRole, tmp_path: Path
+) -> None:
+    role = start_role(AGAIN, 5.0, str(tmp_path / "again"))
+    role.wait_for_heartbeat()
+    (tmp_path / "again").touch()
+    eventually(lambda: role.check() or role.role.last_heartbeat is None)
+    assert role.role.has_run
+    role.check(supervisor._STARTUP_TIMEOUT - 0.1)
+    assert "no heartbeat" not in role.log.getvalue()
+    role.check(0.2)
+    assert "api has sent no heartbeat for 120.1 s" in role.log.getvalue()
 
 
 @pytest.mark.parametrize("stopped", [False, True], ids=["silent", "stopped"])

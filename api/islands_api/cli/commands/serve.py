@@ -47,7 +47,9 @@ def serve(
     ] = None,
     ray_address: Annotated[
         str | None,
-        typer.Option("--ray-address", help="HOST:PORT of a cluster; by default a local Ray is started."),
+        typer.Option(
+            "--ray-address", help="HOST:PORT of a cluster; by default a local Ray, when a job needs it."
+        ),
     ] = None,
     coordinators: Annotated[
         int | None,

@@ -24,7 +24,7 @@ other, _ = os.pipe()
 other = os.dup2(other, 100, inheritable=True)
 with open(marker, "w") as file:
     print(child.pid, other, os.getpid(), file=file)
-Timer(0.1, restart_process, ((lifeline, None),)).start()
+Timer(0.1, restart_process, (lifeline, None)).start()
 while True:
     pass
 """
@@ -42,6 +42,6 @@ def test_restart_ends_the_computation_and_keeps_the_process_and_its_lifeline(tmp
     child, other_is_open, is_same_process = ended.stdout.split()
     assert (other_is_open, is_same_process) == ("False", "True")
     assert not alive([int(child)])
-    assert os.read(reading, 5) == b"again"
+    assert os.read(reading, 6) == b"sagain"
     for each in (reading, writing):
         os.close(each)
