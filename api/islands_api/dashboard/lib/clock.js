@@ -1,4 +1,4 @@
-/** Ages of events by the clock of the service, which may differ from the clock of this machine; times left. */
+/** Ages of events by the clock of the service, which may differ from that of this machine, and times left. */
 
 import { el, setText } from "./dom.js";
 import { formatDuration } from "./numbers.js";
