@@ -30,7 +30,7 @@ def fit(base: Path, out: str) -> None:
     succeed(
         *("fit", base / "long.csv", "--input", "u_V", "--output", "y_um", "--rows", "0:5000"),
         *("--validation", base / "sine.csv", "--library", "phi-polynomial", "--max-terms", 6),
-        *("--out", base / out),
+        *("--figures", "all", "--out", base / out),
     )
 
 
