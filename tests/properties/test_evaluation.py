@@ -316,3 +316,14 @@ def test_zero_genes_are_removed_and_constants_are_kept():
     assert nothing.genes == (zero,)
     assert something.genes == (Constant(3.0), Lagged(0))
     assert something.key == ("y(k-1)", "1")
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_threads_do_not_change_the_evaluations(name, monkeypatch):
+    monkeypatch.setattr(evaluation, "_THREAD_SAMPLES", 1)
+    population = [(each, number % 2 == 0) for number, each in enumerate(POOL)]
+    one, three = (
+        Evaluator(record(), SETTINGS[name], threads=threads).evaluate(population)[0] for threads in (1, 3)
+    )
+    assert one == three
+    assert sum(bool(each.outcome) for each in one) > 20

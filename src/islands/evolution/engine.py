@@ -4,6 +4,7 @@ from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from islands.available_cpus import count_cpus
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
 from islands.evolution.evaluation import Evaluator
@@ -59,7 +60,7 @@ class SerialEngine:
 
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Yield every epoch after ``start``."""
-        evaluator = Evaluator(problem.record, problem.settings)
+        evaluator = Evaluator(problem.record, problem.settings, threads=count_cpus())
         sources = make_topology(problem, start).sources
         archipelago = start
         leaving = [select_migrants(island, problem.settings_of(island.index)) for island in start.islands]

@@ -5,6 +5,7 @@ individuals, the pruning decisions and the abandon thresholds, never on earlier 
 """
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import inf
 
@@ -71,6 +72,9 @@ class Limits:
     structures: int = 1 << 27
 
 
+#: Samples that a thread predicts at least: they take more than a millisecond, the start of a thread a tenth.
+_THREAD_SAMPLES = 250_000
+
 #: Approximate sizes of a cached evaluation and of a cached selection of terms, in bytes.
 _EVALUATION_BYTES, _SELECTION_BYTES = 700, 250
 
@@ -128,6 +132,8 @@ class Evaluator:
     root_rule : bool
         Whether structures are infeasible whose linear output terms do not converge at constant input. False
         only to measure the effect of this rule: such structures are rejected after a search in any case.
+    threads : int
+        Largest number of threads that evaluate the individuals of a long record.
     """
 
     def __init__(
@@ -137,7 +143,9 @@ class Evaluator:
         limits: Limits | None = None,
         abandon: bool = True,
         root_rule: bool = True,
+        threads: int = 1,
     ) -> None:
+        self._threads = threads
         self.record, self.settings, self.limits, self.abandon = record, settings, limits or Limits(), abandon
         self.warm_up = settings.maximum_lag
         self._layout = layout(record, self.warm_up, FITNESSES[settings.fitness](settings.shooting))
@@ -306,7 +314,7 @@ class Evaluator:
         limits = np.array(allowed) * self._predicted
         for part, given in self._make_batches(_make_selected(terms)):
             results = kernel.empty_results(*given.terms.shape)
-            kernel.evaluate_individuals(given, limits, self.context, results)
+            self._run_kernel(given, limits, results)
             for numbers, parameters, squares, code in zip(
                 terms[part], *(array.tolist() for array in results), strict=True
             ):
@@ -321,6 +329,25 @@ class Evaluator:
                     )
                 )
         return evaluations
+
+    def _run_kernel(
+        self, given: kernel.SelectedTerms, limits: NDArray[np.float64], results: kernel.PopulationResults
+    ) -> None:
+        """Evaluate individuals; each thread writes other rows of the results."""
+        count, context = len(given.lengths), self.context
+        parts = max(1, min(self._threads, count * self._predicted // _THREAD_SAMPLES))
+
+        def evaluate(part: int) -> None:
+            rows = slice(count * part // parts, count * (part + 1) // parts)
+            some = kernel.SelectedTerms(*(each[rows] for each in given))
+            found = kernel.PopulationResults(results.theta[rows], results.error[rows], results.status[rows])
+            kernel.evaluate_individuals(some, limits, context, found)
+
+        if parts == 1:
+            evaluate(0)
+            return
+        with ThreadPoolExecutor(parts) as threads:
+            list(threads.map(evaluate, range(parts)))
 
     def _make_batches(self, structures: kernel.SelectedTerms) -> Iterator[tuple[slice, kernel.SelectedTerms]]:
         """Yield structures in batches whose inner products the table of pairs has room for, and has."""

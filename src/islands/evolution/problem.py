@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
+from islands.available_cpus import count_cpus
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import make_selection_problem, select_forward, select_pool
 from islands.estimation.parameter_constraints import constraint
@@ -96,6 +97,7 @@ def make_problem(record: Dataset, settings: Settings, steps: Steps | None = None
             exchanged = select_pool(library, selection, settings.max_terms)
     if settings.swap_search:
         pool = [genes[item] for item in exchanged]
-        by_size = swap_search(Evaluator(record, settings), pool, seeds, steps=steps)
+        evaluator = Evaluator(record, settings, threads=count_cpus())
+        by_size = swap_search(evaluator, pool, seeds, steps=steps)
         seeds = tuple(each.genes for rank in zip_longest(*by_size) for each in rank if each is not None)
     return Problem(record, settings, seeds, tuple(genes[item] for item in library))

@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial, reduce
 
+from islands.available_cpus import count_cpus
 from islands.data.averaging import AUTO, count_means
 from islands.data.dataset import Dataset
 from islands.data.split import Split
@@ -346,7 +347,7 @@ def _search_swaps(
 ) -> list[Structure]:
     """Return, for every size, the structure of a swap search with the least error on the validation data."""
     by_size = swap_search(
-        Evaluator(split.estimation, settings),
+        Evaluator(split.estimation, settings, threads=count_cpus()),
         [item.expression for item in pool],
         [tuple(item.expression for item in structure) for structure in starts],
         depth=_SCREENED,

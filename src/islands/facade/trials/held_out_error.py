@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import inf
 
+from islands.available_cpus import count_cpus
 from islands.data.dataset import Dataset, join
 from islands.data.split import Split
 from islands.errors import IslandsError
@@ -119,7 +120,7 @@ def _select(
     yield from structures
     shooting = min(_SHOOTING, max(1, record.samples // 10))
     by_size = swap_search(
-        Evaluator(record, library.make_settings(_SWAP_TERMS, shooting)),
+        Evaluator(record, library.make_settings(_SWAP_TERMS, shooting), threads=count_cpus()),
         [item.expression for item in select_pool(pool, problem, _SWAP_TERMS)],
         [
             tuple(item.expression for item in structure)
