@@ -38,7 +38,7 @@ RATE = ("--preset", "paper-case1", "--islands", "1", "--generations", "150", "--
 #: Seconds during which the processor time of a service at rest is measured.
 REST_SECONDS = 20.0
 #: Seconds after the last job until a service is at rest.
-SETTLING_SECONDS = 15.0
+SETTLING_SECONDS = 30.0
 TICKS = os.sysconf("SC_CLK_TCK")
 
 Row = Callable[["Checkout"], Mapping[str, float]]

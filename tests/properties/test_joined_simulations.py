@@ -50,8 +50,8 @@ def take_part(record: Dataset) -> list[Dataset]:
     return [replace(record[part], start=0.0) for part in PARTS]
 
 
-#: Simulators whose parameters are estimated for every part, which takes time.
-SLOW = ("second-order", "held", "extended")
+#: Simulators whose parameters are estimated for every part, or that are compiled, which takes time.
+SLOW = ("second-order", "held", "extended", "fmu")
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,9 @@ LIBRARY = genes(
 )
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.ci) if name == "long genes" else name for name in VARIANTS]
+)
 def test_kernel_breeds_the_children_of_the_operators_on_trees(name):
     """Each generation has the children of the one before as parents, so that genes get long and repeat."""
     settings, index = VARIANTS[name], make_index(VARIANTS[name])

@@ -65,9 +65,12 @@ def test_failed_job_has_a_typed_problem_and_does_not_block_others(
     "error",
     [
         OSError(errno.ESTALE, "Stale file handle", "/data/blobs/ab"),
-        MemoryError(),
-        ConnectionResetError(),
-        ImportError("/data/lib.so: failed to map segment from shared object", path="/data/lib.so"),
+        pytest.param(MemoryError(), marks=pytest.mark.ci),
+        pytest.param(ConnectionResetError(), marks=pytest.mark.ci),
+        pytest.param(
+            ImportError("/data/lib.so: failed to map segment from shared object", path="/data/lib.so"),
+            marks=pytest.mark.ci,
+        ),
     ],
 )
 def test_job_is_tried_again_after_a_transient_error(
@@ -90,6 +93,7 @@ def test_job_is_tried_again_after_a_transient_error(
     assert "/data" not in notes[0]
 
 
+@pytest.mark.ci
 def test_repeated_transient_errors_fail_the_job_with_their_reason(
     store: Store, job: Job, coordinator: Coordinators, monkeypatch: pytest.MonkeyPatch
 ) -> None:
