@@ -283,19 +283,25 @@ def _refine(
         begun = None if stop() else begin_refinement(model, split.estimation, interval, *limits)
         return None if isinstance(begun, EvaluationOutcome) else begun
 
-    def measure(entry: Refinement[DynamicModel]) -> tuple[float, tuple[str, ...]]:
-        run = free_run(entry.model, split.validation, settings.maximum_lag)
-        return run.mean_squared_error, entry.model.parameter_names
+    def validate(entry: Refinement[DynamicModel]) -> Candidate:
+        (validated,) = _validate([entry.model], interval, split.validation, settings.maximum_lag)
+        return validated
 
+    left: list[Candidate] = []
     with ThreadPoolExecutor() as threads:
-        begun = [each for each in threads.map(begin, models) if each is not None]
-        list(threads.map(lambda each: each.minimisation.advance(_RACE_STEPS, stop), begun))
-        order = dict(zip(begun, threads.map(measure, begun), strict=True))
-        ranked = sorted(begun, key=order.__getitem__)
-        most = max(_FINALISTS, len(begun) // 2)
-        ahead = [*ranked[:most], *(each for each in ranked[most:] if each.minimisation.gain > _GAINING)]
-        list(threads.map(lambda each: each.minimisation.advance(_MAX_STEPS, stop), ahead))
-    return _validate([each.model for each in begun], interval, split.validation, settings.maximum_lag)
+        racing = [each for each in threads.map(begin, models) if each is not None]
+        if len(racing) > _FINALISTS:
+            list(threads.map(lambda each: each.minimisation.advance(_RACE_STEPS, stop), racing))
+            pairs = zip(threads.map(validate, racing), racing, strict=True)
+            ranked = sorted(pairs, key=lambda pair: pair[0].order)
+            most = max(_FINALISTS, len(ranked) // 2)
+            ahead = [entry for _, entry in ranked[:most]]
+            ahead += [entry for _, entry in ranked[most:] if entry.minimisation.gain > _GAINING]
+            left = [candidate for candidate, entry in ranked if entry not in ahead]
+            racing = ahead
+        list(threads.map(lambda each: each.minimisation.advance(_MAX_STEPS, stop), racing))
+        found = [*left, *threads.map(validate, racing)]
+    return sorted(found, key=lambda entry: entry.order)
 
 
 def _validate(
