@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -44,6 +45,16 @@ def replay(name: str) -> list[Moment]:
         bar.now = at - began
         bar.report(*row)
     return found
+
+
+def find_quarters(moments: list[Moment]) -> list[float]:
+    """Return the fractions at the ends of the quarters of a run."""
+    return [moments[len(moments) * quarter // 4 - 1].fraction for quarter in (1, 2, 3, 4)]
+
+
+def find_standstills(moments: list[Moment]) -> list[Moment]:
+    """Return the moments whose time left is that of the next one."""
+    return [one for one, other in pairwise(moments) if one.left is not None and one.left == other.left]
 
 
 class _Bar:
