@@ -360,7 +360,9 @@ class Evaluator:
         batch = max(1, places // 2 // pairs)
         for begin in range(0, len(structures.lengths), batch):
             part = slice(begin, begin + batch)
-            given = kernel.SelectedTerms(structures.terms[part, :largest], structures.lengths[part])
+            # A kernel is compiled again for an array with gaps.
+            terms = np.ascontiguousarray(structures.terms[part, :largest])
+            given = kernel.SelectedTerms(terms, structures.lengths[part])
             if int(self._pairs.taken[0]) + pairs * len(given.lengths) > places * 3 // 4:
                 clear(self._pairs)
             context = self.context

@@ -16,11 +16,12 @@ from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
-from islands.estimation.structure_selection.certificate import certify
+from islands.estimation.structure_selection.certificate import SubsetSearch
 from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.presets import resolve_settings
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.variation import random_individuals
+from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Lagged
 from islands.facade.fit import fit
 from islands.facade.identify import identify
@@ -37,6 +38,7 @@ from islands.kernels.population import (
 )
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
+from islands.program.primitive_functions import row_address
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED
@@ -85,7 +87,7 @@ def _use_all_kernels() -> None:
 
 
 def use_other_kernels() -> None:
-    """Call all kernels but the evaluation of individuals."""
+    """Call all kernels but the evaluation of individuals, and compile the row functions of the primitives."""
     record = _make_record()
     context = _make_context(record)
     complete_pairs(*_ONE_TERM, context.target, context.nodes, context.pairs, context.rows)
@@ -98,7 +100,9 @@ def use_other_kernels() -> None:
     problem = make_selection_problem(model.regressors, record, "none")
     if isinstance(problem, SelectionProblem):
         select_forward(problem, 3)
-        certify(problem, 3, 100)
+        SubsetSearch(problem, 3).certify(100)
+    for primitive in PRIMITIVES.values():
+        row_address(primitive)
     free_run(model, record)
     estimate(model.regressors, record)
     _simulate_two_outputs(record)

@@ -10,6 +10,9 @@ import pytest
 #: Script that compiles the kernels, uses them, and prints which files each step has stored.
 USE = """
 import json
+import numpy as np
+from scipy.signal import lfilter
+from islands.data.dataset import Dataset
 from islands.facade.fit import fit
 from islands.facade.identify import identify
 from islands.facade.warm_up import warm_up
@@ -21,9 +24,13 @@ def stored():
 
 compiled = warm_up(lambda line: None)
 before = stored()
-record = make_record("bouc-wen-piezo", "authors", "estimation")[:1000]
-identify(record, preset="hysteresis", population=20, generations=2, shooting=100)
-fit(record, library="polynomial", max_terms=4).best.simulate(record)
+rng = np.random.default_rng(1)
+u = np.repeat(rng.uniform(-1, 1, 50), 10)
+y = lfilter([0, 0.2], [1, -1.2, 0.4], u + u**2 / 2) + rng.normal(0, 0.005, 500)
+piezo, process = make_record("bouc-wen-piezo", "authors", "estimation")[:1000], Dataset(u, y, 0.01)
+identify(piezo, preset="hysteresis", population=20, generations=2, shooting=100)
+identify(process, population=40, generations=5)
+fit(process).best.simulate(process)
 print(json.dumps([compiled, before, stored()]))
 """
 

@@ -11,6 +11,7 @@ import pytest
 from islands.errors import ModelError
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
+from islands.program import primitive_functions
 from islands.program.primitive_functions import row_address
 
 ROW = ctypes.POINTER(ctypes.c_double)
@@ -81,3 +82,18 @@ def test_functions_are_compiled_once_and_identified_by_object():
     other = primitive("twice", lambda a: a + a + 1.0)
     assert row_address(other) != row_address(entry)
     assert run(other, [1.0])[0] == 3.0
+
+
+def test_row_function_of_a_built_in_primitive_is_loaded_from_the_cache():
+    row_address(PRIMITIVES["sqrt"])
+    again = primitive_functions._compile.__wrapped__(PRIMITIVES["sqrt"].scalar, 1, "sqrt")
+    assert again.cache_hits == 1
+
+
+def test_row_function_of_a_user_is_compiled_in_every_process():
+    def half(a):
+        return a / 2.0
+
+    entry = primitive("half", half)
+    row_address(entry)
+    assert primitive_functions._compile.__wrapped__(entry.scalar, 1, "half").cache_hits == 0
