@@ -1,7 +1,13 @@
 """Parallel map: a function applied to each of several arguments, with the results in order."""
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Protocol, TypeVar
+
+from islands.available_cpus import count_cpus
+
+#: Samples from which a record is long: its kernels then take longer than the Python code around them.
+_LONG = 10_000
 
 A = TypeVar("A")
 F = TypeVar("F", bound=Callable[..., Any])
@@ -16,6 +22,27 @@ class ParallelMap(Protocol):
 
     def __call__(self, function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
         """Apply the function to each argument."""
+
+
+def map_over_record(function: Callable[[A], R], arguments: Iterable[A], samples: int) -> Iterator[R]:
+    """Apply a function that simulates a record to each argument, in threads if the record is long.
+
+    The results come in the order of the arguments. Threads use several cores, since kernels release the GIL.
+
+    Parameters
+    ----------
+    function : callable
+        Its result depends on its argument alone.
+    arguments : iterable
+    samples : int
+        Length of the record.
+    """
+    threads = count_cpus()
+    if samples < _LONG or threads == 1:
+        yield from map(function, arguments)
+        return
+    with ThreadPoolExecutor(threads) as executor:
+        yield from executor.map(function, arguments)
 
 
 def intercepted_map(

@@ -12,7 +12,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem
-from islands.estimation.structure_selection.certificate import certify
+from islands.estimation.structure_selection.certificate import SubsetSearch
 from islands.models.candidate_library import candidates
 
 #: Degree and lags of the libraries.
@@ -60,7 +60,7 @@ def main() -> None:
             assert isinstance(problem, SelectionProblem)
             for nodes in NODES:
                 began = perf_counter()
-                certificates = certify(problem, max(SIZES), nodes)
+                certificates = SubsetSearch(problem, max(SIZES)).certify(nodes)
                 seconds = perf_counter() - began
                 gaps = [
                     100.0 * certificates[size - 1].gap(find_error(problem, certificates[size - 1].structure))

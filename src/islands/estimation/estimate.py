@@ -108,8 +108,8 @@ def _estimate_constrained(
     structure = Model(constrained.regressors, None, record.input_names, record.output_name, record.dt)
     structure = replace(structure, preprocessing=record.preprocessing)
     first = structure.maximum_lag if warm_up is None else warm_up
-    *psi, y = regressor_matrix([*structure.regressors, Lagged(0, 0)], record, first)
-    found = constrained_least_squares(np.array(psi), y, constrained.S, constrained.c, standard_errors)
+    matrix = regressor_matrix([*structure.regressors, Lagged(0, 0)], record, first)
+    found = constrained_least_squares(matrix[:-1], matrix[-1], constrained.S, constrained.c, standard_errors)
     if not found.outcome:
         return found.outcome
     return FittedStructure(

@@ -10,11 +10,13 @@ from functools import partial
 from math import inf, isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, Population
 from islands.evolution.variation import Genes, with_required_genes
 from islands.expressions.tree import Expression
+from islands.kernels.breeding import Individuals
 from islands.progress import Steps
 
 #: Smallest relative reduction of the squared error for which an exchange continues.
@@ -58,10 +60,10 @@ def swap_search(
         Evaluated individuals of every size found, smallest size first and best first.
     """
     search = _SwapSearch(evaluator, pool)
-    search.evaluate(starts, inf)
+    search.evaluate(starts)
     best = with_required_genes((), evaluator.settings)
     exact = _ROUNDING * float(np.mean(evaluator.record.y**2))
-    first = search.evaluate([best], inf) if best else None
+    first = search.evaluate([best]) if best else None
     error = inf if first is None else first.fitness
     steps = steps or Steps()
     skip = partial(steps.skip, f"swap search among {len(pool)} candidates")
@@ -69,7 +71,7 @@ def swap_search(
         if skip():
             break
         steps.report(f"swap search among {len(pool)} candidates: {len(best) + 1} terms", None)
-        found = search.evaluate(((*best, gene) for gene in pool if gene not in best), inf)
+        found = search.extend(best)
         start = _find_best([each for each in (found, search.best(len(best) + 1)) if each])
         if start is None or start.size <= len(best):
             break
@@ -82,7 +84,11 @@ class _SwapSearch:
     """Structures that were evaluated, by size and structure."""
 
     def __init__(self, evaluator: Evaluator, pool: Sequence[Expression]) -> None:
-        self._evaluator, self._pool = evaluator, pool
+        # The numbers of genes are valid for the whole search: its evaluations fit into the caches.
+        evaluator.prepare()
+        self._evaluator, self._index = evaluator, evaluator.gene_index
+        self._pool = self._number(pool)
+        self._required = self._number(with_required_genes((), evaluator.settings))
         self._seen: dict[int, dict[tuple[str, ...], Individual]] = {}
         self._evaluations = 0
 
@@ -91,33 +97,47 @@ class _SwapSearch:
         """Whether the budget of evaluations is used up."""
         return self._evaluations >= MAX_EVALUATIONS
 
-    def evaluate(self, structures: Iterable[Genes], threshold: float) -> Individual | None:
-        """Evaluate structures and return the best one; None if all fail or exceed the threshold."""
-        individuals = [(Individual(genes), False) for genes in structures]
-        thresholds = [threshold] * (self._evaluator.settings.max_terms + 1)
-        evaluated, _ = self._evaluator.evaluate(individuals, thresholds)
-        self._evaluations += len(individuals)
-        found = [each for each in evaluated if isfinite(each.fitness)]
-        for each in found:
-            self._seen.setdefault(each.size, {}).setdefault(each.key, each)
-        return _find_best(found)
+    def evaluate(self, structures: Iterable[Genes]) -> Individual | None:
+        """Evaluate structures and return the best one; None if all fail."""
+        return self._evaluate(self._index.number_genes(list(structures)), inf)
+
+    def extend(self, genes: Genes) -> Individual | None:
+        """Evaluate a structure with each other gene of the pool in addition; return the best one."""
+        known = self._number(genes)
+        others = self._pool[~np.isin(self._pool, known)]
+        extended = np.column_stack([np.tile(known, (len(others), 1)), others])
+        return self._evaluate(Individuals(extended, np.full(len(others), len(known) + 1)), inf)
 
     def exchange(self, start: Individual, skip: Callable[[], bool]) -> Individual:
         """Exchange single genes, each time the best exchange of all, as long as the error falls."""
         best = start
-        required = with_required_genes((), self._evaluator.settings)
         while not (self.is_exhausted or skip()):
-            genes = best.genes
-            free = [place for place, gene in enumerate(genes) if gene not in required]
-            others = [gene for gene in self._pool if gene not in genes]
-            exchanged = self.evaluate(
-                ((*genes[:place], gene, *genes[place + 1 :]) for place in free for gene in others),
-                _ABANDON_FACTOR * best.fitness,
+            genes = self._number(best.genes)
+            free = np.flatnonzero(~np.isin(genes, self._required))
+            others = self._pool[~np.isin(self._pool, genes)]
+            exchanges = np.tile(genes, (len(free) * len(others), 1))
+            exchanges[np.arange(len(exchanges)), np.repeat(free, len(others))] = np.tile(others, len(free))
+            exchanged = self._evaluate(
+                Individuals(exchanges, np.full(len(exchanges), len(genes))), _ABANDON_FACTOR * best.fitness
             )
             if exchanged is None or not exchanged.fitness < (1.0 - _MIN_GAIN) * best.fitness:
                 break
             best = exchanged
         return best
+
+    def _number(self, genes: Iterable[Expression]) -> NDArray[np.int64]:
+        return np.array([self._index.number_gene(gene) for gene in genes], np.int64)
+
+    def _evaluate(self, structures: Individuals, threshold: float) -> Individual | None:
+        """Evaluate structures and return the best one; None if all fail or exceed the threshold."""
+        count = len(structures.lengths)
+        thresholds = [threshold] * (self._evaluator.settings.max_terms + 1)
+        evaluated, _ = self._evaluator.evaluate_genes(structures, np.zeros(count, np.bool_), thresholds)
+        self._evaluations += count
+        found = [each for each in evaluated if isfinite(each.fitness)]
+        for each in found:
+            self._seen.setdefault(each.size, {}).setdefault(each.key, each)
+        return _find_best(found)
 
     def best(self, size: int) -> Individual | None:
         """Return the best structure of a size."""

@@ -14,14 +14,13 @@ from islands.errors import SettingsError, lookup
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.estimators import estimate_with
 from islands.estimation.forward_selection import (
-    SelectionProblem,
     Structure,
     make_selection_problem,
     select_forward,
     select_pool,
 )
 from islands.estimation.parameter_constraints import constraint
-from islands.estimation.structure_selection.certificate import certify, combine_certificates, find_subsets
+from islands.estimation.structure_selection.certificate import SubsetSearch, combine_certificates
 from islands.estimation.structure_selection.deviations import (
     LARGE_OFFSET,
     OPERATING_POINT,
@@ -32,6 +31,7 @@ from islands.estimation.structure_selection.deviations import (
     subtract_offsets,
 )
 from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import Individual, Population
 from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
@@ -50,6 +50,7 @@ from islands.facade.trials.rate_selection import select_rate
 from islands.models.candidate_library import full_set
 from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
+from islands.parallel import map_over_record
 from islands.progress import ProgressCallback, Steps, Stop, StoppedError, ignore_progress, never_stop
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import Assessment, assess
@@ -105,10 +106,10 @@ class LibraryFit:
         All models that were estimated.
     warm_up : int
         Number of samples before the first prediction.
-    selections : tuple of LibrarySelection
-        Selections whose structures were estimated.
+    searches : tuple of SubsetSearch
+        Searches for subsets of the library, one for the signals as recorded and one for their deviations.
     refit : callable
-        Fits the library again, with other subsets in place of those of the selections.
+        Fits the library again, with other subsets in place of those of the searches.
     steps : Steps
         Steps of the fit, with those that were left out.
     """
@@ -117,7 +118,7 @@ class LibraryFit:
     average: int
     estimates: list[ValidatedModel[DynamicModel]]
     warm_up: int
-    selections: tuple["LibrarySelection", ...]
+    searches: tuple[SubsetSearch, ...]
     refit: Callable[[Sequence[Subsets]], "LibraryFit"]
     steps: Steps
 
@@ -133,17 +134,12 @@ class LibraryFit:
         890 searches on 36 records. The library is then fitted again from these subsets.
         """
         settings = self.found.settings
-        tables = [
-            certify(
-                *(each.problem, settings["max_terms"], settings["certificate"]),
-                partial(self.steps.skip, CERTIFICATES),
-            )
-            for each in self.selections
-        ]
+        skip = partial(self.steps.skip, CERTIFICATES)
+        tables = [each.certify(settings["certificate"], skip) for each in self.searches]
         subsets = [tuple(each.structure for each in table) for table in tables]
-        known = [each.subsets[: len(some)] for each, some in zip(self.selections, subsets, strict=True)]
+        known = [each.structures[: len(some)] for each, some in zip(self.searches, subsets, strict=True)]
         fit = self if subsets == known else self._fit_again(subsets)
-        certificates = {each.terms: each for each in reduce(combine_certificates, tables)}
+        certificates = {each.terms: each for each in (reduce(combine_certificates, tables) if tables else ())}
         found = replace(fit.found, search=replace(fit.found.search, certificates=certificates))
         banded = with_bands(found, fit.estimates, settings["constraints"], fit.warm_up, fit.steps)
         return with_average(banded, fit.average)
@@ -157,14 +153,6 @@ class LibraryFit:
                     return fit
             self.steps.skip(_REFIT)
         return self
-
-
-@dataclass(frozen=True, slots=True)
-class LibrarySelection:
-    """LibrarySelection of structures, and the best subsets that exchanges found."""
-
-    problem: SelectionProblem
-    subsets: Subsets
 
 
 def fit_library(
@@ -195,7 +183,7 @@ def fit_library(
         Called between all steps. Once it returns true and structures are known, the best one of every size
         is estimated, and the other steps are left out; the result is marked as stopped and names them.
     subsets : sequence of tuple of Structure
-        Subsets for every selection; by default those that exchanges find.
+        Subsets for every search; by default those that exchanges find.
 
     Raises
     ------
@@ -218,7 +206,7 @@ def fit_library(
     interval = count_means(shooting, samples)
     swaps = rated.make_settings(settings.max_terms, interval)
     exchange = bool(settings.certificate)
-    structures, selections, warm_up = _select(split, rated, swaps, exchange, subsets, steps)
+    structures, searches, warm_up = _select(split, rated, swaps, exchange, subsets, steps)
     models, outcomes = _estimate(structures, split, settings, swaps, warm_up, steps)
     best_of_size: dict[int, Assessment] = {}
     for ranked in rank_models(models):
@@ -251,7 +239,7 @@ def fit_library(
         progress(text, None)  # the fraction never falls
 
     refit = partial(fit_library, record, start, library, settings, seed, report_again, stop)
-    return LibraryFit(result, samples, estimates, warm_up, selections, refit, steps)
+    return LibraryFit(result, samples, estimates, warm_up, searches, refit, steps)
 
 
 def _estimate(
@@ -267,27 +255,39 @@ def _estimate(
     Once a stop is requested, only the last structure of every size that has no model is estimated.
     """
     constraints, interval = swaps.constraints, swaps.shooting
-    outcomes: Counter[str] = Counter()
-    models: list[Assessment] = []
-    last = {len(structure): place for place, (structure, _) in enumerate(structures)}
-    for done, (structure, offsets) in enumerate(structures):
-        size = len(structure)
-        is_needed = done == last[size] and size not in {entry.model.size for entry in models}
-        if not is_needed and steps.skip("estimation of further structures"):
-            continue
-        steps.report(f"estimation of {size} terms", done / len(structures))
-        estimated = estimate_deviations(structure, offsets, split.estimation, constraints, warm_up)
-        if not isinstance(estimated, EvaluationOutcome):
-            estimated = estimate_with(
-                settings.estimator, estimated, split.estimation, constraints, warm_up, interval
+    found: list[Assessment | EvaluationOutcome | None] = [None] * len(structures)
+    by_size: dict[int, list[int]] = {}
+    for place, (structure, _) in enumerate(structures):
+        by_size.setdefault(len(structure), []).append(place)
+
+    def estimate_size(size: int) -> None:
+        for place in by_size[size]:
+            is_needed = place == by_size[size][-1] and not any(
+                isinstance(found[each], Assessment) for each in by_size[size]
             )
-        if isinstance(estimated, EvaluationOutcome):
-            outcomes[estimated.verdict.name.lower()] += 1
-            continue
-        if estimated.model.size > settings.max_terms:
-            continue
-        outcomes["ok"] += 1
-        models.append(assess(estimated.model, split, interval, warm_up, constraints))
+            if not is_needed and steps.skip("estimation of further structures"):
+                continue
+            structure, offsets = structures[place]
+            estimated = estimate_deviations(structure, offsets, split.estimation, constraints, warm_up)
+            if not isinstance(estimated, EvaluationOutcome):
+                estimated = estimate_with(
+                    settings.estimator, estimated, split.estimation, constraints, warm_up, interval
+                )
+            if isinstance(estimated, EvaluationOutcome):
+                found[place] = estimated
+            elif estimated.model.size <= settings.max_terms:
+                found[place] = assess(estimated.model, split, interval, warm_up, constraints)
+
+    sizes = map_over_record(estimate_size, by_size, split.estimation.samples)
+    for done, size in enumerate(by_size):
+        steps.report(f"estimation of {size} terms", done / len(by_size))
+        next(sizes)
+    models = [each for each in found if isinstance(each, Assessment)]
+    outcomes = Counter(
+        "ok" if isinstance(each, Assessment) else each.verdict.name.lower()
+        for each in found
+        if each is not None
+    )
     if not models:
         raise SettingsError(
             f"no model could be estimated: {dict(outcomes)}; take another library or a longer record"
@@ -302,8 +302,8 @@ def _select(
     exchange: bool,
     subsets: Sequence[Subsets],
     steps: Steps,
-) -> tuple[list[tuple[Structure, Offsets]], tuple[LibrarySelection, ...], int]:
-    """Return structures, each with the offsets of its signals, the selections, and the largest lag."""
+) -> tuple[list[tuple[Structure, Offsets]], tuple[SubsetSearch, ...], int]:
+    """Return structures, each with the offsets of its signals, the searches, and the largest lag."""
     # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
     # in deviations from it. The validation data tell which one holds.
     record, constraints = split.estimation, settings.constraints
@@ -311,7 +311,7 @@ def _select(
     if constraint(constraints).allows_offsets:
         tried = [find_offsets(record, limit) for limit in (LARGE_OFFSET, OPERATING_POINT)]
     structures: list[tuple[Structure, Offsets]] = []
-    selections: list[LibrarySelection] = []
+    searches: list[SubsetSearch] = []
     warm_up = 0
     for offsets in dict.fromkeys(tried):
         deviations = Split(*(subtract_offsets(part, offsets) for part in (record, split.validation)))
@@ -325,17 +325,14 @@ def _select(
             raise SettingsError(f"nothing can be fitted with these settings: {problem}")
         starts = list(select_forward(problem, settings.max_terms))
         steps.report(f"best subsets of {len(pool)} candidates", 0.0)
-        best: Subsets = ()
-        if len(selections) < len(subsets):
-            best = subsets[len(selections)]
-        elif exchange:
-            best = find_subsets(problem, settings.max_terms)
-        selections.append(LibrarySelection(problem, best))
-        starts += best
+        if exchange:
+            searches.append(SubsetSearch(problem, settings.max_terms))
+            known = len(searches) <= len(subsets)
+            starts += subsets[len(searches) - 1] if known else searches[-1].structures
         exchanged = select_pool(pool, problem, settings.max_terms)
         chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, steps)]
         structures += [(structure, offsets) for structure in chosen]
-    return list(dict.fromkeys(structures)), tuple(selections), warm_up
+    return list(dict.fromkeys(structures)), tuple(searches), warm_up
 
 
 def _search_swaps(
@@ -353,11 +350,11 @@ def _search_swaps(
         depth=_SCREENED,
         steps=steps,
     )
-    found: list[Structure] = []
-    for individuals in by_size:
+
+    def choose(individuals: Population) -> Sequence[Individual]:
         if steps.skip("choice of the structures on the validation data"):
-            found.append(individuals[0].regressors)
-            continue
-        kept = screen(individuals, split.validation, settings.maximum_lag, most_valid=1)
-        found += [each.regressors for each in kept]
-    return found
+            return individuals[:1]
+        return screen(individuals, split.validation, settings.maximum_lag, most_valid=1)
+
+    chosen = map_over_record(choose, by_size, split.validation.samples)
+    return [each.regressors for individuals in chosen for each in individuals]

@@ -5,6 +5,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from math import isfinite
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from islands.io.models import terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
 from islands.models.narx import Model
 from islands.models.signal_statement import describe_signals
+from islands.parallel import map_over_record
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.ensemble import Ensemble
 from islands.validation.physics import PhysicsChecks
@@ -190,6 +192,8 @@ def write_result(found: SearchResult, folder: Path) -> None:
     models.mkdir(parents=True, exist_ok=True)
     for path in models.glob("[0-9][0-9]*.json"):
         path.unlink()
+    # The checks of a model are made when they are first read.
+    list(map_over_record(attrgetter("physics", "residual_tests"), found.models, found.record.samples))
     for rank, entry in enumerate(found.models, start=1):
         write_model(entry.model, models / f"{rank:02d}.json")
     (folder / "summary.txt").write_text(summary(found), encoding="utf-8")

@@ -1,6 +1,7 @@
 """Regressor matrix and Gram matrix over the rows of a record."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +62,8 @@ def _check_readable(program: Program, record: Dataset, warm_up: int) -> None:
         raise SettingsError(f"the terms read {lag} samples back, the warm-up has {warm_up}")
 
 
+# The rows of recent calls are kept: a selection estimates many models on few records, which never change.
+@lru_cache(maxsize=8)
 def select_rows(record: Dataset, warm_up: int) -> Rows:
     """Return the rows that are used for the estimation: those of every segment after its warm-up.
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,7 +109,7 @@ def multiple_shooting(
         return _simulate_block(model, record, interval, first, bound)
     signals, offset = map_signals(model, _require_one_output(record))
     theta = np.array(model.parameters)
-    bound = divergence_bound(signals.y) if bound is None else bound
+    bound = find_divergence_bound(signals) if bound is None else bound
     cut = layout(signals, first, interval)
     squared_error = np.empty(len(cut.start))
     diverged = np.empty(len(cut.start), np.int64)
@@ -197,7 +198,7 @@ def free_run_error(
     cut = layout(record, warm_up)
     squared_error = np.empty(len(cut.start))
     diverged = np.empty(len(cut.start), np.int64)
-    samples, bound = int(cut.length.sum()), divergence_bound(record.y)
+    samples, bound = int(cut.length.sum()), find_divergence_bound(record)
     limits = cut, bound, allowed * samples, False
     ending = simulate(link(regressors), np.array(theta), *limits, squared_error, diverged, np.empty(0))
     return float(total(squared_error) / samples) if ending == COMPLETE else np.inf
@@ -241,7 +242,7 @@ def free_runs(
             simulate_record.remove_diverged(run, bounds)
         return runs.transpose(0, 2, 1).reshape(len(runs), *signals.y.shape) + offset
     assert isinstance(signals, Dataset)
-    program, cut, bound = link(model.regressors), layout(signals, warm_up), divergence_bound(signals.y)
+    program, cut, bound = link(model.regressors), layout(signals, warm_up), find_divergence_bound(signals)
     squared_error, diverged = np.empty(len(cut.start)), np.empty(len(cut.start), np.int64)
     predicted = np.full((len(thetas), signals.samples), np.nan)
     for theta, run in zip(thetas, predicted, strict=True):
@@ -258,6 +259,13 @@ def _remove_diverged(
     for lane in failed:
         predicted[cut.start[lane] + diverged[lane] : cut.start[lane] + cut.length[lane]] = np.nan
     return failed
+
+
+# The bounds of recent records are kept, as their layouts.
+@lru_cache(maxsize=8)
+def find_divergence_bound(record: Dataset) -> float:
+    """Return the `divergence_bound` of the output of a record."""
+    return divergence_bound(record.y)
 
 
 def divergence_bound(y: NDArray[np.float64]) -> float:

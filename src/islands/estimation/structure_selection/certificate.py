@@ -58,66 +58,29 @@ class Certificate:
         return self.gap(error) <= ROUNDING
 
 
-def certify(
-    problem: SelectionProblem, max_terms: int, nodes: int, skip: Callable[[], bool] = lambda: False
-) -> tuple[Certificate, ...]:
-    """Compute a certificate for every number of terms up to a maximum; the searches run in parallel threads.
+class SubsetSearch:
+    """Search for the best subset of the candidates of a problem, for every number of terms.
 
     Parameters
     ----------
     problem : SelectionProblem
     max_terms : int
-    nodes : int
-        Nodes of the search for each number of terms; fewer are evaluated if the library is large. The result
-        depends on it, and not on the time.
-    skip : callable
-        Called before each number of terms. Once it returns true, the remaining certificates are missing.
 
-    Returns
-    -------
-    tuple of Certificate
-        By number of terms; empty without nodes, or if there are more than `MOST_CANDIDATES`.
+    Attributes
+    ----------
+    structures : tuple of Structure
+        The best structure of every number of terms that exchanges of pairs of candidates find; there is none
+        if there are more than `MOST_CANDIDATES`.
     """
-    subsets = _Subsets(problem, max_terms)
-    if not (nodes and subsets.are_searchable):
-        return ()
-
-    skipped = Event()
-
-    def certify_size(terms: int) -> Certificate | None:
-        if skipped.is_set() or skip():
-            skipped.set()
-            return None
-        return subsets.certify(terms, nodes)
-
-    with ThreadPoolExecutor(count_cpus()) as threads:
-        found = list(threads.map(certify_size, subsets.sizes))
-    return tuple(takewhile(lambda each: each is not None, found))  # type: ignore[arg-type]
-
-
-def find_subsets(problem: SelectionProblem, max_terms: int) -> tuple[Structure, ...]:
-    """Return, for every number of terms, the best structure that exchanges of pairs of candidates find.
-
-    They are the structures of `certify`, unless its search finds a better one. There are none if there are
-    more than `MOST_CANDIDATES`.
-    """
-    subsets = _Subsets(problem, max_terms)
-    if not subsets.are_searchable:
-        return ()
-    return tuple(subsets.compose(subsets.exchange(terms)[1]) for terms in subsets.sizes)
-
-
-class _Subsets:
-    """Inner products of the usable candidates of a problem in the order of the tree of `Tree`."""
 
     def __init__(self, problem: SelectionProblem, max_terms: int) -> None:
         gram, self._energy = problem.gram[:-1, :-1], problem.gram[-1, -1]
         self._problem = problem
+        self.structures: tuple[Structure, ...] = ()
+        #: Error and positions of the best known subset by number of terms; -1 follows the last position.
+        self._exchanged: dict[int, tuple[float, NDArray[np.int64]]] = {}
         usable = np.flatnonzero((np.diag(gram) > 0.0) & np.isfinite(np.diag(gram)))
-        self.are_searchable = bool(
-            len(gram) <= MOST_CANDIDATES and usable.size and 0.0 < self._energy < np.inf
-        )
-        if not self.are_searchable:
+        if not (len(gram) <= MOST_CANDIDATES and usable.size and 0.0 < self._energy < np.inf):
             return
         norms = np.sqrt(np.diag(gram)[usable])
         scaled = gram[np.ix_(usable, usable)] / norms[:, None] / norms
@@ -129,11 +92,44 @@ class _Subsets:
         replaceable = {item for direction in problem.free for item in direction.regressors}
         self._always = sum(item not in replaceable for item in problem.fixed)
         self._selection = froe(problem.gram, max_terms=max_terms)
-        #: Numbers of terms.
-        self.sizes = range(max(1, self._always), max_terms + 1)
+        self._exchanged = {
+            terms: self._exchange(terms) for terms in range(max(1, self._always), max_terms + 1)
+        }
+        self.structures = tuple(self._compose(positions) for _, positions in self._exchanged.values())
 
-    def exchange(self, terms: int) -> tuple[float, NDArray[np.int64]]:
-        """Return the error of the best known subset, and its positions; -1 after the last."""
+    def certify(self, nodes: int, skip: Callable[[], bool] = lambda: False) -> tuple[Certificate, ...]:
+        """Compute a certificate for every number of terms; the searches run in parallel threads.
+
+        Parameters
+        ----------
+        nodes : int
+            Nodes of the search for each number of terms; fewer are evaluated if the library is large. The
+            result depends on it, and not on the time.
+        skip : callable
+            Called before each number of terms. Once it returns true, the remaining certificates are missing.
+
+        Returns
+        -------
+        tuple of Certificate
+            By number of terms; empty without nodes, or if there are more than `MOST_CANDIDATES`. Their
+            structures are those of the exchanges, unless the search finds a better one.
+        """
+        if not nodes:
+            return ()
+        skipped = Event()
+
+        def certify_size(terms: int) -> Certificate | None:
+            if skipped.is_set() or skip():
+                skipped.set()
+                return None
+            return self._certify(terms, nodes)
+
+        with ThreadPoolExecutor(count_cpus()) as threads:
+            found = list(threads.map(certify_size, self._exchanged))
+        return tuple(takewhile(lambda each: each is not None, found))  # type: ignore[arg-type]
+
+    def _exchange(self, terms: int) -> tuple[float, NDArray[np.int64]]:
+        """Return the error of the best known subset, and its positions."""
         size = terms - self._always
         positions = np.full(max(1, size), -1)
         greedy = self._selection.order[:size]
@@ -143,18 +139,19 @@ class _Subsets:
             error = exchange(self._scaled, self._correlation, error, positions[:size])
         return error, positions
 
-    def certify(self, terms: int, nodes: int) -> Certificate:
+    def _certify(self, terms: int, nodes: int) -> Certificate:
         """Search for a better subset than that of the exchanges, and for a bound on the error of all."""
-        error, positions = self.exchange(terms)
+        error, known = self._exchanged[terms]
+        positions = known.copy()
         bound, evaluated, size = error, 0, terms - self._always
         if size:
             bound, _, evaluated = search(
                 self._scaled, self._correlation, self._tree, size, nodes, error, positions
             )
         error = sqrt(bound * self._energy / self._problem.rows)
-        return Certificate(terms, error, evaluated, self.compose(positions))
+        return Certificate(terms, error, evaluated, self._compose(positions))
 
-    def compose(self, positions: NDArray[np.int64]) -> Structure:
+    def _compose(self, positions: NDArray[np.int64]) -> Structure:
         """Return the structure of some positions."""
         return self._problem.compose([int(self._usable[each]) for each in positions if each >= 0])
 

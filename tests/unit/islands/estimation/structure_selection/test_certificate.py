@@ -15,7 +15,7 @@ import islands
 from islands.data.dataset import Dataset
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import make_selection_problem, select_forward
-from islands.estimation.structure_selection.certificate import certify, combine_certificates
+from islands.estimation.structure_selection.certificate import SubsetSearch, combine_certificates
 from islands.expressions.tree import Lagged
 from islands.io.result_folder import result_document
 from islands.io.result_text.summary_text import method_text
@@ -66,7 +66,7 @@ SETTINGS = [
 def test_bound_is_the_least_error_of_all_subsets(name, degree, constraints, terms):
     record, library = measured(), candidates(name, degree, LAGS, 1)
     problem = make_selection_problem(library, record, constraints)
-    for certificate in certify(problem, terms, 10_000)[1:]:
+    for certificate in SubsetSearch(problem, terms).certify(10_000)[1:]:
         expected = least_error(library, record, constraints, certificate.terms)
         assert certificate.bound <= expected * (1.0 + 1e-9)
         if name != "polynomial" or constraints == "none":
@@ -79,16 +79,16 @@ def test_bound_is_the_least_error_of_all_subsets(name, degree, constraints, term
 @given(st.integers(0, 1000), st.integers(1, 6), st.integers(1, 200))
 def test_bound_with_few_nodes_is_below_that_with_many(seed, terms, nodes):
     problem = make_selection_problem(candidates("polynomial", 2, LAGS, 1), measured(seed, 100))
-    few, many = (certify(problem, terms, limit)[-1] for limit in (nodes, 10_000))
+    few, many = (SubsetSearch(problem, terms).certify(limit)[-1] for limit in (nodes, 10_000))
     assert few.bound <= many.bound * (1.0 + 1e-9)
     assert few.nodes <= nodes
-    assert certify(problem, terms, nodes)[-1] == few
+    assert SubsetSearch(problem, terms).certify(nodes)[-1] == few
 
 
 def test_best_subsets_are_never_worse_than_forward_selection():
     record = measured(3)
     problem = make_selection_problem(candidates("polynomial", 3, LAGS, 1), record)
-    for certificate in certify(problem, 6, 50):
+    for certificate in SubsetSearch(problem, 6).certify(50):
         greedy = select_forward(problem, certificate.terms)[-1]
         errors = [root_mean_square(each, record, "none") for each in (certificate.structure, greedy)]
         assert errors[0] <= errors[1] * (1.0 + 1e-9)
@@ -103,7 +103,7 @@ def test_best_subset_is_found_where_forward_selection_fails():
     y = np.append(0.0, u[:-1, 0] + u[:-1, 1])
     problem = make_selection_problem(candidates("polynomial", 1, 1, 3), Dataset(u, y, 0.1))
     assert [item.text for item in select_forward(problem, 1)[-1]] == ["u3(k-1)"]
-    certificate = certify(problem, 2, 100)[-1]
+    certificate = SubsetSearch(problem, 2).certify(100)[-1]
     assert [item.text for item in certificate.structure] == ["u1(k-1)", "u2(k-1)"]
 
 
@@ -112,23 +112,25 @@ def test_duplicate_and_zero_candidates_do_not_matter():
     u = np.column_stack([record.u, record.u, np.zeros(record.samples)])
     one = make_selection_problem(candidates("polynomial", 1, LAGS, 1), record)
     three = make_selection_problem(candidates("polynomial", 1, LAGS, 3), Dataset(u, record.y, 0.1))
-    bounds = [[each.bound for each in certify(problem, 3, 1000)] for problem in (one, three)]
+    bounds = [[each.bound for each in SubsetSearch(problem, 3).certify(1000)] for problem in (one, three)]
     assert bounds[0] == pytest.approx(bounds[1], rel=1e-9)
 
 
 def test_gap_is_the_possible_reduction_of_the_error():
     problem = make_selection_problem(candidates("polynomial", 2, LAGS, 1), measured())
-    certificate = certify(problem, 2, 100)[-1]
+    certificate = SubsetSearch(problem, 2).certify(100)[-1]
     assert certificate.gap(2.0 * certificate.bound) == pytest.approx(0.5)
     assert certificate.gap(0.5 * certificate.bound) == 0.0
     assert not certificate.proves(1.001 * certificate.bound)
-    assert certify(problem, 2, 0) == ()
+    assert SubsetSearch(problem, 2).certify(0) == ()
 
 
 def test_combined_certificates_hold_for_both_libraries():
     record = measured()
     small, large = (
-        certify(make_selection_problem(candidates("polynomial", degree, LAGS, 1), record), 3, 500)
+        SubsetSearch(make_selection_problem(candidates("polynomial", degree, LAGS, 1), record), 3).certify(
+            500
+        )
         for degree in (1, 2)
     )
     for both, one, other in zip(combine_certificates(small, large), small, large, strict=True):
