@@ -105,7 +105,7 @@ def test_measured_memory_of_structures_equals_the_estimate(memory_growth):
     evaluator = Evaluator(record(), setting)
     genes = [parse(text) for lag in range(1, 11) for text in (f"u(k-{lag})", f"y(k-{lag})*u(k-1)")]
     evaluator.evaluate([(Individual((each,)), False) for each in genes])
-    structures = [chosen for size in (2, 3, 5, 6) for chosen in list(combinations(genes, size))[:120]]
+    structures = [chosen for size in (2, 3, 5, 6) for chosen in list(combinations(genes, size))[:180]]
     rng = np.random.default_rng(0)
     population = [(Individual(chosen), bool(rng.integers(2))) for chosen in structures]
     estimated, before = evaluator.memory["structures"][0], memory_growth()

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Population
 from islands.evolution.island import first_generation, step
+from islands.evolution.offspring import Offspring
 from islands.evolution.settings import Settings
 from islands.kernels.breeding import Individuals
 from islands.processes.pool import prepare_process
@@ -121,7 +121,7 @@ class _Timed(Evaluator):
         individuals: Individuals,
         pruned: NDArray[np.bool_],
         thresholds: Sequence[float] | None = None,
-    ) -> tuple[Population, int]:
+    ) -> tuple[Offspring, int]:
         began = cpu()
         evaluated, duplicates = super().evaluate_genes(individuals, pruned, thresholds)
         self.spent += cpu() - began

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Individual, Population
+from islands.evolution.individual import Individual
 from islands.evolution.island import first_generation, step
+from islands.evolution.offspring import Offspring
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
 from islands.expressions.primitives import MUL, SIGN, SUB
@@ -186,7 +187,7 @@ class _RecordingEvaluator(Evaluator):
         individuals: Individuals,
         pruned: NDArray[np.bool_],
         thresholds: Sequence[float] | None = None,
-    ) -> tuple[Population, int]:
+    ) -> tuple[Offspring, int]:
         index = self.gene_index
         rows = zip(*(array.tolist() for array in (*individuals, pruned)), strict=True)
         for numbers, length, decision in rows:

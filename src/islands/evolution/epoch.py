@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Population, unique_structures
+from islands.evolution.individual import Individual, Population, unique_structures
 from islands.evolution.island import Island, StepInfo, first_generation, select_elite, step
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.problem import Problem
@@ -113,7 +113,7 @@ def receive_migrants(
     return replace(island, population=tuple(population), elite=elite)
 
 
-def _fitness(population: Population, evaluator: Evaluator) -> list[float]:
+def _fitness(population: Sequence[Individual], evaluator: Evaluator) -> list[float]:
     """Return the fitness of each individual; abandoned individuals are evaluated completely."""
     fitness = [each.fitness for each in population]
     places = [place for place, each in enumerate(population) if each.outcome.verdict is Status.ABANDONED]

@@ -20,12 +20,13 @@ from islands.evolution.fitness import FITNESSES
 from islands.evolution.gene_index import ZERO, GeneIndex
 from islands.evolution.gene_structure import STRUCTURES
 from islands.evolution.individual import Individual
+from islands.evolution.offspring import Offspring, Parents
 from islands.evolution.settings import Settings
-from islands.expressions.tree import Expression, Lagged
+from islands.evolution.structure_table import UNKNOWN, StructureTable
+from islands.expressions.tree import Lagged
 from islands.kernels import population as kernel
 from islands.kernels.breeding import UNUSED, Individuals
 from islands.kernels.pair_table import PLACE_BYTES, clear, complete_pairs, pair_table
-from islands.models.regressor import Regressor
 from islands.program.regressor_matrix import select_rows
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
@@ -75,47 +76,11 @@ class Limits:
 #: Samples that a thread predicts at least: they take more than a millisecond, the start of a thread a tenth.
 _THREAD_SAMPLES = 250_000
 
-#: Approximate sizes of a cached evaluation and of a cached selection of terms, in bytes.
-_EVALUATION_BYTES, _SELECTION_BYTES = 700, 250
+#: Approximate size of a cached selection of terms, in bytes.
+_SELECTION_BYTES = 300
 
-#: Numbers of the terms of a structure in ascending order, and the decision whether to prune it, as bytes.
+#: Numbers of the terms of an individual in ascending order, and the decision whether to prune it, as bytes.
 _Key = bytes
-
-#: Terms that remain after pruning and constraints, ordered by content.
-_Terms = tuple[int, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Evaluation:
-    """Cached evaluation of the terms that remain after pruning and constraints.
-
-    Attributes
-    ----------
-    numbers, regressors : tuple
-        The terms, ordered by content.
-    theta : tuple of float
-        Parameters of the terms; empty after a failure.
-    fitness : float
-        Mean squared error; a lower bound if the evaluation was abandoned.
-    outcome : EvaluationOutcome
-    """
-
-    numbers: _Terms
-    regressors: tuple[Regressor, ...]
-    theta: tuple[float, ...]
-    fitness: float
-    outcome: EvaluationOutcome
-
-    def is_sufficient(self, allowed: Sequence[float]) -> bool:
-        """Return whether this evaluation answers a request with these thresholds by size."""
-        return self.outcome is not _ABANDONED or self.fitness >= allowed[len(self.numbers)]
-
-    def exceeds(self, allowed: Sequence[float]) -> bool:
-        """Return whether the error exceeds its threshold; after divergence, whether that is finite."""
-        if self.outcome is _ABANDONED:
-            return True
-        simulated = self.outcome is OK or self.outcome is _DIVERGED
-        return simulated and self.fitness > allowed[len(self.numbers)]
 
 
 class Evaluator:
@@ -158,8 +123,8 @@ class Evaluator:
         }
         self._pairs = pair_table(self.limits.pairs)
         # More than half of the pruned individuals have the terms of an earlier one.
-        self._selections: dict[_Key, _Terms] = {}
-        self._evaluations: dict[_Terms, Evaluation] = {}
+        self._selections: dict[_Key, int] = {}
+        self._structures = StructureTable()
         self._root_rule = root_rule
         self._gene_index = self._empty_index()
 
@@ -194,7 +159,7 @@ class Evaluator:
 
     @property
     def _structure_bytes(self) -> int:
-        return _EVALUATION_BYTES * len(self._evaluations) + _SELECTION_BYTES * len(self._selections)
+        return self._structures.bytes + _SELECTION_BYTES * len(self._selections)
 
     @property
     def gene_index(self) -> GeneIndex:
@@ -208,8 +173,8 @@ class Evaluator:
         self._gene_index = self._empty_index()
 
     def _clear_structures(self) -> None:
-        self._selections.clear()
-        self._evaluations.clear()
+        # Offspring still read the old table.
+        self._selections, self._structures = {}, StructureTable()
 
     def evaluate(
         self, population: Sequence[tuple[Individual, bool]], thresholds: Sequence[float] | None = None
@@ -233,43 +198,76 @@ class Evaluator:
         """
         self.prepare()
         individuals = self._gene_index.number_genes([individual.genes for individual, _ in population])
-        return self.evaluate_genes(
-            individuals, np.array([pruned for _, pruned in population], np.bool_), thresholds
-        )
+        pruned = np.array([pruned for _, pruned in population], np.bool_)
+        evaluated, duplicates = self.evaluate_genes(individuals, pruned, thresholds)
+        return tuple(evaluated), duplicates
 
     def evaluate_genes(
         self, individuals: Individuals, pruned: NDArray[np.bool_], thresholds: Sequence[float] | None = None
-    ) -> tuple[tuple[Individual, ...], int]:
+    ) -> tuple[Offspring, int]:
         """Evaluate individuals of the gene index; see `evaluate`."""
         self._check_lags()
-        terms = self._number_terms(individuals.genes)
-        ordered = np.sort(terms, axis=1)
+        terms, structures = self._number_terms(individuals.genes), self._structures
         largest = max(terms.shape[1], len(thresholds or ()))
-        allowed = [inf] * (largest + 1)
+        allowed = np.full(largest + 1, inf)
         if thresholds is not None and self.abandon:
             allowed[: len(thresholds)] = thresholds
-        selections, cache = self._selections, self._evaluations
-        keys = list(map(bytes, np.column_stack([ordered, pruned])))
+        places = self._find_structures(terms, pruned)
+        found = np.unique(places)
+        known, lower = structures.status[found], structures.fitness[found]
+        insufficient = (known == kernel.ABANDONED) & (lower < allowed[structures.lengths[found]])
+        missing = found[(known == UNKNOWN) | insufficient]
+        self._evaluate_structures(missing, allowed)
+        limits = allowed[structures.lengths[places]]
+        known, fitness = structures.status[places], structures.fitness[places]
+        simulated = (known == kernel.OK) | (known == kernel.DIVERGED)
+        abandoned = (known == kernel.ABANDONED) | (simulated & (fitness > limits))
+        genes = self._keep_genes(individuals, terms, places, abandoned)
+        evaluated = Offspring(self._gene_index, structures, self._outcomes, genes, places, abandoned)
+        return evaluated, len(places) - len(missing)
+
+    def _find_structures(self, terms: NDArray[np.int64], pruned: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return the numbers of the structures that pruning and constraints leave of some terms."""
+        ordered, selections = np.sort(terms, axis=1), self._selections
+        keys = list(map(bytes, np.column_stack([ordered, pruned]).astype(np.int32)))
         unknown = {key: place for place, key in enumerate(keys) if key not in selections}
         places = np.array(list(unknown.values()), np.int64)
         selections.update(zip(unknown, self._select_terms(ordered[places], pruned[places]), strict=True))
-        remaining = [selections[key] for key in keys]
-        missing = list(
-            dict.fromkeys(
-                terms for terms in remaining if terms not in cache or not cache[terms].is_sufficient(allowed)
-            )
+        return np.array([selections[key] for key in keys], np.int64)
+
+    def _keep_genes(
+        self,
+        individuals: Individuals,
+        terms: NDArray[np.int64],
+        places: NDArray[np.int64],
+        abandoned: NDArray[np.bool_],
+    ) -> Individuals:
+        """Return the genes whose terms remain; of an individual that fails without terms, all genes."""
+        genes, most = individuals.genes, int(individuals.lengths.max(initial=0))
+        kept = np.zeros(genes.shape, np.bool_)
+        chosen = self._structures.terms[places]
+        for column in range(int(self._structures.lengths[places].max(initial=0))):
+            kept[:, :most] |= terms[:, :most] == chosen[:, column : column + 1]
+        nothing = ~kept.any(axis=1) & ~abandoned
+        kept[nothing] = genes[nothing] != UNUSED
+        lengths = kept.sum(axis=1)
+        found = np.full_like(genes, UNUSED)
+        found[np.arange(genes.shape[1]) < lengths[:, None]] = genes[kept]
+        return Individuals(found, lengths)
+
+    def read(self, individuals: Sequence[Individual]) -> Parents:
+        """Return evaluated individuals as arrays; valid until `prepare` is called."""
+        if isinstance(individuals, Offspring) and individuals.structures is self._structures:
+            return individuals.parents
+        genes = self._gene_index.number_genes([each.genes for each in individuals], self.settings.max_terms)
+        terms = self._number_terms(genes.genes)
+        terms[[not each.regressors for each in individuals]] = ZERO
+        return Parents(
+            genes,
+            np.array(self._structures.number(self._gene_index.sort_by_content(terms)), np.int64),
+            np.array([each.fitness for each in individuals], np.float64),
+            np.array([each.outcome.verdict is Status.ABANDONED for each in individuals], np.bool_),
         )
-        cache.update(zip(missing, self._evaluate_terms(missing, allowed), strict=True))
-        genes = self._gene_index.genes
-        evaluated = tuple(
-            [
-                _make_evaluated(row, numbers, cache[kept], allowed, genes)
-                for row, numbers, kept in zip(
-                    individuals.genes.tolist(), terms.tolist(), remaining, strict=True
-                )
-            ]
-        )
-        return evaluated, len(keys) - len(missing)
 
     def _number_terms(self, genes: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the number of the regressor of each gene; `ZERO` in place of numbers that occur before."""
@@ -299,36 +297,26 @@ class Evaluator:
         """Evaluate abandoned individuals completely."""
         return self.evaluate([(each, False) for each in abandoned])[0]
 
-    def _select_terms(self, ordered: NDArray[np.int64], pruned: NDArray[np.bool_]) -> list[_Terms]:
-        """Return the terms of structures that pruning and constraints leave."""
-        remaining: list[_Terms] = []
+    def _select_terms(self, ordered: NDArray[np.int64], pruned: NDArray[np.bool_]) -> list[int]:
+        """Return the structures that pruning and constraints leave of individuals."""
+        remaining: list[int] = []
         for part, given in self._make_batches(self._gene_index.sort_by_content(ordered)):
             selected = kernel.empty_terms(*given.terms.shape)
             kernel.select_terms(given, pruned[part], self.context, selected)
-            remaining += _list_terms(selected)
+            remaining += self._structures.number(selected)
         return remaining
 
-    def _evaluate_terms(self, terms: Sequence[_Terms], allowed: Sequence[float]) -> list[Evaluation]:
-        """Estimate and simulate models of these terms."""
-        evaluations: list[Evaluation] = []
-        limits = np.array(allowed) * self._predicted
-        for part, given in self._make_batches(_make_selected(terms)):
-            results = kernel.empty_results(*given.terms.shape)
+    def _evaluate_structures(self, numbers: NDArray[np.int64], allowed: NDArray[np.float64]) -> None:
+        """Estimate and simulate the models of some structures."""
+        structures, limits = self._structures, allowed * self._predicted
+        for part, given in self._make_batches(structures.select(numbers)):
+            places, (count, most) = numbers[part], given.terms.shape
+            results = kernel.empty_results(count, most)
             self._run_kernel(given, limits, results)
-            for numbers, parameters, squares, code in zip(
-                terms[part], *(array.tolist() for array in results), strict=True
-            ):
-                outcome, length = self._outcomes[code], len(numbers)
-                evaluations.append(
-                    Evaluation(
-                        numbers,
-                        self._gene_index.regressors(numbers),
-                        tuple(parameters[:length]) if outcome is OK else (),
-                        allowed[length] if outcome is _ABANDONED else squares / self._predicted,
-                        outcome,
-                    )
-                )
-        return evaluations
+            structures.theta[places, :most], structures.status[places] = results.theta, results.status
+            structures.fitness[places] = np.where(
+                results.status == kernel.ABANDONED, allowed[given.lengths], results.error / self._predicted
+            )
 
     def _run_kernel(
         self, given: kernel.SelectedTerms, limits: NDArray[np.float64], results: kernel.PopulationResults
@@ -368,32 +356,3 @@ class Evaluator:
             context = self.context
             complete_pairs(*given, context.target, context.nodes, context.pairs, context.rows)
             yield part, given
-
-
-def _make_selected(structures: Sequence[_Terms]) -> kernel.SelectedTerms:
-    lengths = np.array([len(each) for each in structures], np.int64)
-    terms = np.zeros((len(structures), max(lengths.tolist(), default=0)), np.int64)
-    for row, structure in zip(terms, structures, strict=True):
-        row[: len(structure)] = structure
-    return kernel.SelectedTerms(terms, lengths)
-
-
-def _list_terms(selected: kernel.SelectedTerms) -> list[_Terms]:
-    rows, lengths = (array.tolist() for array in selected)
-    return [tuple(row[:length]) for row, length in zip(rows, lengths, strict=True)]
-
-
-def _make_evaluated(
-    row: list[int],
-    numbers: list[int],
-    evaluation: Evaluation,
-    allowed: Sequence[float],
-    genes: Sequence[Expression],
-) -> Individual:
-    chosen = evaluation.numbers
-    kept = tuple([genes[gene] for gene, number in zip(row, numbers, strict=True) if number in chosen])
-    if evaluation.exceeds(allowed):
-        return Individual(kept, evaluation.regressors, (), inf, _ABANDONED)
-    if not kept:
-        kept = tuple([genes[gene] for gene in row if gene != UNUSED])
-    return Individual(kept, evaluation.regressors, evaluation.theta, evaluation.fitness, evaluation.outcome)

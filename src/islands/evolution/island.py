@@ -3,17 +3,21 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
 
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import Individual, Population, unique_niches, unique_structures
+from islands.evolution.offspring import Offspring, Parents, join, read_fitness
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.selection import run_tournaments
 from islands.evolution.settings import Settings
 from islands.evolution.variation import Genes, breed, random_individuals, repair_genes
 from islands.expressions.tree import Expression
-from islands.kernels.breeding import Individuals
+from islands.kernels.breeding import Individuals, take
 
 #: Quantile of the parents' fitness that defines the abandon threshold.
 _THRESHOLD_QUANTILE = 0.8
@@ -33,8 +37,8 @@ class Island:
     seed : int
     generation : int
         Completed generations; 0 after the evaluation of the first population, -1 before.
-    population : tuple of Individual
-        Evaluated offspring of the last generation.
+    population : sequence of Individual
+        Evaluated offspring of the last generation: a tuple or `Offspring`.
     elite : tuple of Individual
         Best individuals so far, fittest first.
     hall_of_fame : HallOfFame
@@ -45,7 +49,7 @@ class Island:
     index: int
     seed: int
     generation: int
-    population: Population
+    population: Sequence[Individual]
     elite: Population
     hall_of_fame: HallOfFame
     abandon_threshold: float = inf
@@ -100,7 +104,8 @@ def first_generation(
         settings.population - len(given), settings, evaluator.record.inputs, genes, rng
     )
     empty = Island(index, seed, 0, (), (), HallOfFame())
-    return _evaluate_generation(empty, genes.number_genes([*given, *drawn]), evaluator, settings)
+    first = genes.number_genes([*given, *drawn])
+    return _evaluate_generation(empty, first, evaluator, settings, evaluator.read(()))
 
 
 def _count_seeds(settings: Settings) -> int:
@@ -125,21 +130,27 @@ def step(
     select = Stream(island.seed, island.index, following.generation, Purpose.SELECTION)
     rng = Stream(island.seed, island.index, following.generation, Purpose.VARIATION)
     pairs = -(-settings.population // 2)
-    parents = run_tournaments(
-        (*island.elite, *island.population),
+    evaluator.prepare()
+    parents = join(evaluator.read(island.elite), evaluator.read(island.population))
+
+    def evaluate_abandoned(places: NDArray[np.int64]) -> NDArray[np.float64]:
+        evaluated, _ = evaluator.evaluate_genes(take(parents.genes, places), np.zeros(len(places), np.bool_))
+        return evaluated.parents.fitness
+
+    winners = run_tournaments(
+        parents.fitness,
+        parents.abandoned,
         2 * pairs,
         settings.tournament,
         select,
         island.abandon_threshold,
-        evaluator.evaluate_abandoned,
+        evaluate_abandoned,
     )
-    evaluator.prepare()
-    genes = evaluator.gene_index
-    couples = genes.number_genes([parent.genes for parent in parents], settings.max_terms)
+    genes, couples = evaluator.gene_index, take(parents.genes, winners)
     children = breed(couples, settings, evaluator.record.inputs, genes, rng, pool)
     offspring = Individuals(*(array[: settings.population] for array in children))
     copied = None if settings.prune_copies else couples
-    return _evaluate_generation(following, offspring, evaluator, settings, copied)
+    return _evaluate_generation(following, offspring, evaluator, settings, parents, copied)
 
 
 def _evaluate_generation(
@@ -147,6 +158,7 @@ def _evaluate_generation(
     individuals: Individuals,
     evaluator: Evaluator,
     settings: Settings,
+    parents: Parents,
     copied: Individuals | None = None,
 ) -> tuple[Island, StepInfo]:
     """Evaluate the individuals of a generation; copies of parents are not pruned, the others may be."""
@@ -159,21 +171,29 @@ def _evaluate_generation(
     threshold = _abandon_threshold(island, settings)
     thresholds = _thresholds_by_size(island.hall_of_fame, threshold, settings.max_terms)
     population, _ = evaluator.evaluate_genes(individuals, pruned, thresholds)
-    worst = _elite_threshold(island, settings)
-    contenders = (each for each in (*island.elite, *population) if each.fitness <= worst)
-    elite = select_elite(contenders, settings.elites, settings.distinct, settings.niches)
-    hall = with_entries(island.hall_of_fame, population)
-    known = {each.key for each in (*island.elite, *island.population)}
+    first = np.unique(population.places, return_index=True)[1]
+    rows = np.sort(first) if settings.distinct else np.arange(len(population))
+    contenders = population.take(rows[population.fitness[rows] <= _elite_threshold(island, settings)])
+    elite = select_elite((*island.elite, *contenders), settings.elites, settings.distinct, settings.niches)
+    hall = with_entries(island.hall_of_fame, population.take(_find_entries(population, first, island)))
     info = StepInfo(
         island.generation,
         len(population),
-        len(population) - len({each.key for each in population} - known),
-        dict(Counter(each.outcome.verdict.name.lower() for each in population)),
+        len(population) - int((~np.isin(population.places[first], parents.places)).sum()),
+        dict(Counter(each.verdict.name.lower() for each in population.outcomes)),
         {size: entry.fitness for size, entry in hall.best().items()},
     )
     return replace(
         island, population=population, elite=elite, hall_of_fame=hall, abandon_threshold=threshold
     ), info
+
+
+def _find_entries(population: Offspring, rows: NDArray[np.int64], island: Island) -> NDArray[np.int64]:
+    """Return the rows whose fitness is good enough for the hall of fame."""
+    entry, sizes = island.hall_of_fame.entry_thresholds(), population.sizes[rows]
+    worst = np.array([entry.get(size, inf) for size in range(int(sizes.max(initial=0)) + 1)])
+    fitness = population.fitness[rows]
+    return rows[np.isfinite(fitness) & (fitness <= worst[sizes])]
 
 
 def _elite_threshold(island: Island, settings: Settings) -> float:
@@ -187,9 +207,10 @@ def _abandon_threshold(island: Island, settings: Settings) -> float:
     It is a quantile of the parents' fitness, at most the highest known one, and not below the worst of a full
     elite.
     """
-    known = sorted(each.fitness for each in (*island.elite, *island.population) if isfinite(each.fitness))
-    position = int(_THRESHOLD_QUANTILE * (len(island.elite) + len(island.population)))
-    return max(_elite_threshold(island, settings), known[min(position, len(known) - 1)] if known else inf)
+    fitness = np.concatenate([read_fitness(island.elite), read_fitness(island.population)])
+    known = np.sort(fitness[np.isfinite(fitness)])
+    position = min(int(_THRESHOLD_QUANTILE * len(fitness)), len(known) - 1)
+    return max(_elite_threshold(island, settings), float(known[position]) if len(known) else inf)
 
 
 def _thresholds_by_size(hall: HallOfFame, threshold: float, largest: int) -> list[float]:

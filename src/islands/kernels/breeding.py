@@ -59,6 +59,11 @@ def empty_individuals(count: int, most: int) -> Individuals:
     return Individuals(np.full((count, most), UNUSED), np.zeros(count, np.int64))
 
 
+def take(individuals: Individuals, rows: NDArray[np.int64]) -> Individuals:
+    """Return some individuals."""
+    return Individuals(individuals.genes[rows], individuals.lengths[rows])
+
+
 class Variation(NamedTuple):
     """Probabilities, limits and symbols of variation.
 

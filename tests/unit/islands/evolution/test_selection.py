@@ -1,9 +1,9 @@
 """Tournament selection."""
 
 from collections import Counter
-from dataclasses import replace
 from math import inf, isfinite, nan
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,9 +12,6 @@ from islands.evolution.individual import Individual
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.selection import run_tournaments
 from islands.expressions.tree import Lagged
-from islands.simulation.outcome import EvaluationOutcome, Status
-
-ABANDONED = EvaluationOutcome(Status.ABANDONED, "above the threshold")
 
 
 def pool(*fitness):
@@ -25,14 +22,21 @@ def stream(seed=0):
     return Stream(seed, 0, 1, Purpose.SELECTION)
 
 
-def expect_no_evaluation(individuals):
+def expect_no_evaluation(places):
     """Evaluator for a pool without abandoned individuals."""
-    assert not individuals
-    return individuals
+    assert places.size == 0
+    return np.empty(0)
+
+
+def run(fitness, abandoned, *others):
+    """Return the places of the winners."""
+    return run_tournaments(np.array(fitness), np.array(abandoned, np.bool_), *others).tolist()
 
 
 def winners(among, count, contestants, draw):
-    return run_tournaments(among, count, contestants, draw, inf, expect_no_evaluation)
+    fitness = [each.fitness for each in among]
+    found = run(fitness, [False] * len(among), count, contestants, draw, inf, expect_no_evaluation)
+    return [among[place] for place in found]
 
 
 def test_fittest_of_many_contestants_wins():
@@ -94,53 +98,42 @@ def test_failure_never_wins_against_a_finite_fitness(values, seed):
 
 @st.composite
 def pools(draw):
-    """Draw a pool, and the same pool with some individuals above the threshold abandoned.
+    """Draw the fitness of individuals, and which of those above the threshold are abandoned.
 
     Few different values make ties common. Some individuals above the threshold have a known fitness.
     """
     values = draw(st.lists(st.sampled_from([0.5, 1.0, 1.5, 2.0, 3.0, 4.0, inf]), min_size=1, max_size=12))
     threshold = draw(st.sampled_from([0.25, 1.0, 1.75, 2.0, 5.0, inf]))
-    abandoned = [value > threshold and draw(st.booleans()) for value in values]
-    known = pool(*values)
-    return (
-        known,
-        [
-            replace(each, fitness=inf, outcome=ABANDONED) if is_abandoned else each
-            for each, is_abandoned in zip(known, abandoned, strict=True)
-        ],
-        threshold,
-    )
+    return values, [value > threshold and draw(st.booleans()) for value in values], threshold
 
 
 @given(pools(), st.integers(0, 6), st.integers(1, 5), seeds)
 def test_winners_do_not_depend_on_abandoned_individuals(drawn, count, contestants, seed):
-    known, among, threshold = drawn
-    places = {each.genes: place for place, each in enumerate(known)}
+    known, abandoned, threshold = drawn
+    fitness = np.where(abandoned, inf, known)
     evaluated = []
 
-    def evaluate_abandoned(individuals):
-        evaluated.extend(places[each.genes] for each in individuals)
-        return [known[places[each.genes]] for each in individuals]
+    def evaluate_abandoned(places):
+        evaluated.extend(places.tolist())
+        return np.array(known)[places]
 
-    found = run_tournaments(among, count, contestants, stream(seed), threshold, evaluate_abandoned)
-    expected = winners(known, count, contestants, stream(seed))
-    assert [each.genes for each in found] == [each.genes for each in expected]
+    found = run(fitness, abandoned, count, contestants, stream(seed), threshold, evaluate_abandoned)
+    complete = [False] * len(known)
+    assert found == run(known, complete, count, contestants, stream(seed), inf, expect_no_evaluation)
+    assert fitness.tolist() == np.where(abandoned, inf, known).tolist()
 
     # Abandoned contestants are evaluated once, if no contestant has a known fitness within the threshold.
     replayed, needed = stream(seed), set()
     for _ in range(count):
         met = [replayed.randrange(len(known)) for _ in range(contestants)]
-        if all(among[place].fitness > threshold for place in met):
-            needed |= {place for place in met if among[place].outcome is ABANDONED}
+        if all(fitness[place] > threshold for place in met):
+            needed |= {place for place in met if abandoned[place]}
     assert sorted(evaluated) == sorted(needed)
 
 
 def test_contestant_at_the_threshold_beats_abandoned_contestants():
-    among = [*pool(2.0), Individual((Lagged(1),), outcome=ABANDONED)]
-    found = run_tournaments(among, 20, 60, stream(), 2.0, expect_no_evaluation)
-    assert {each.fitness for each in found} == {2.0}
+    assert set(run([2.0, inf], [False, True], 20, 60, stream(), 2.0, expect_no_evaluation)) == {0}
 
 
 def test_known_failure_is_never_evaluated_again():
-    failed = Individual((Lagged(0),), outcome=EvaluationOutcome(Status.SINGULAR, "dependent"))
-    assert run_tournaments([failed], 3, 2, stream(), 1.0, expect_no_evaluation) == [failed] * 3
+    assert run([inf], [False], 3, 2, stream(), 1.0, expect_no_evaluation) == [0] * 3
