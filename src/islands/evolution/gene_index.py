@@ -15,7 +15,7 @@ from islands.kernels.codegen import NodeArrays
 from islands.kernels.gene_table import NO_ROOM, UNKNOWN, empty_table, number_code
 from islands.kernels.parameter_reduction import Groups
 from islands.kernels.population import SelectedTerms
-from islands.models.regressor import Regressor
+from islands.models.regressor import CanonicalForms, Regressor
 from islands.program.term_pool import Term, TermPool
 
 #: Approximate size of a gene in the index, in bytes.
@@ -69,6 +69,9 @@ class GeneIndex:
         self.genes: list[Expression] = []
         # The genes are kept, so that no other object has their identity.
         self._identities: dict[int, int] = {}
+        #: Parts of genes, by symbol and identities of the arguments.
+        self._parts: dict[tuple[int, ...], Expression] = {}
+        self._canonical = CanonicalForms()
         # The groups that every structure must contain come first.
         self._groups = {state: number for number, state in enumerate(constraint.sums)}
         self._group_sums = list(constraint.sums.values())
@@ -218,25 +221,35 @@ class GeneIndex:
         begin, end = len(self.genes), int(self.table.taken[0])
         starts = self.table.start[begin : end + 1].tolist()
         symbols = self.table.symbols[starts[0] : starts[-1]].tolist()
-        symbols.reverse()
-        for number in range(begin, end):
-            gene = self._decode(symbols)
+        for number, gene in enumerate(self._decode(symbols), start=begin):
             self.genes.append(gene)
             self._known[gene] = self._identities[id(gene)] = number
 
-    def _decode(self, symbols: list[int]) -> Expression:
-        """Take the first gene from reversed symbols."""
-        match self._symbolic[symbols.pop()]:
-            case int(samples):
-                return Shift(samples, self._decode(symbols))
-            case (primitive, arity):
-                return Apply(primitive, tuple([self._decode(symbols) for _ in range(arity)]))
-            case leaf:
-                return leaf
+    def _decode(self, symbols: list[int]) -> list[Expression]:
+        """Return the genes of some codes, one after the other; equal parts of genes are one object."""
+        found: list[Expression] = []
+        for symbol in reversed(symbols):
+            symbolic = self._symbolic[symbol]
+            match symbolic:
+                case int() | (_, 1):
+                    below: tuple[Expression, ...] = (found.pop(),)
+                case (_, arity):
+                    below = tuple([found.pop() for _ in range(arity)])
+                case leaf:
+                    found.append(leaf)
+                    continue
+            key = symbol, *map(id, below)
+            part = self._parts.get(key)
+            if part is None:
+                part = Shift(symbolic, *below) if isinstance(symbolic, int) else Apply(symbolic[0], below)
+                self._parts[key] = part
+            found.append(part)
+        found.reverse()
+        return found
 
     def _add_term(self, number: int, gene: Expression) -> None:
         """Compute the regressor of a gene, and the requirements that the gene meets."""
-        regressor = make_regressor(gene)
+        regressor = make_regressor(gene, self._canonical)
         met = [regressor in terms for terms in self._required]
         self.table.meets[number] = [is_linear_output(gene), *met] if self._has_leading else met
         self.table.term[number] = self._add(regressor)

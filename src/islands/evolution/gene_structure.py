@@ -1,6 +1,7 @@
 """Table of gene structures: constraints on the form of genes, and the repair of other genes."""
 
 from collections.abc import Callable, Mapping
+from operator import is_
 from types import MappingProxyType
 
 from islands.expressions.primitives import PRIMITIVES, SIGN, SUB
@@ -28,22 +29,27 @@ def phi(expression: Expression) -> Expression:
     input of the first argument, else of the second, else the first input.
     """
     match expression:
-        case Apply(primitive, (first, second)) if primitive.name in PHI:
+        case Apply(primitive, (first, second) as before) if primitive.name in PHI:
             channel = _get_input(first) or _get_input(second) or 1
-            return Apply(primitive, (_replace_by_lag(channel, first), _replace_by_lag(channel, second)))
-        case Apply(primitive, arguments):
-            return Apply(primitive, tuple(phi(argument) for argument in arguments))
+            arguments = tuple(_replace_by_lag(channel, argument) for argument in before)
+        case Apply(_, before):
+            arguments = tuple(phi(argument) for argument in before)
         case Shift(samples, argument):
-            return Shift(samples, phi(argument))
+            repaired = phi(argument)
+            return expression if repaired is argument else Shift(samples, repaired)
         case _:
             return expression
+    # A valid gene stays the same object, whose number is found at once.
+    unchanged = all(map(is_, arguments, before))
+    return expression if unchanged else Apply(expression.primitive, arguments)
 
 
 def _replace_by_lag(channel: int, argument: Expression) -> Expression:
     """Replace the expression under the back-shifts of an argument by an input."""
     match argument:
         case Shift(samples, inner):
-            return Shift(samples, _replace_by_lag(channel, inner))
+            replaced = _replace_by_lag(channel, inner)
+            return argument if replaced is inner else Shift(samples, replaced)
         case Lagged(found, _) if found == channel:
             return argument
     return Lagged(channel)

@@ -8,7 +8,7 @@ from math import inf, isnan
 
 from islands.errors import ModelError
 from islands.expressions.tree import Expression
-from islands.models.regressor import Regressor, regressor
+from islands.models.regressor import CanonicalForms, Regressor, regressor
 from islands.simulation.outcome import OK, EvaluationOutcome
 
 
@@ -87,9 +87,12 @@ def _erase_lags(text: str) -> str:
     return re.sub(r"\(k-\d+\)", "(k)", text)
 
 
-def make_regressor(gene: Expression) -> Regressor | None:
-    """Return the regressor of a gene; None if it is identically zero or a coefficient overflows."""
+def make_regressor(gene: Expression, known: CanonicalForms | None = None) -> Regressor | None:
+    """Return the regressor of a gene; None if it is identically zero or a coefficient overflows.
+
+    ``known``, updated, has the canonical forms of parts of earlier genes.
+    """
     try:
-        return regressor(gene)[1]
+        return regressor(gene, known)[1]
     except ModelError:
         return None

@@ -69,8 +69,30 @@ class Regressor:
         return 0
 
 
-def regressor(expression: Expression) -> tuple[float, Regressor | None]:
+@dataclass(frozen=True, slots=True)
+class CanonicalForms:
+    """Canonical forms of some expressions, one function for each name of a primitive.
+
+    Attributes
+    ----------
+    parts : dict
+        Factor and core of expressions.
+    regressors : dict
+        Regressors by their core.
+    """
+
+    parts: dict[Expression, tuple[float, Expression]] = field(default_factory=dict)
+    regressors: dict[Expression, Regressor] = field(default_factory=dict)
+
+
+def regressor(expression: Expression, known: CanonicalForms | None = None) -> tuple[float, Regressor | None]:
     """Bring an expression into canonical form.
+
+    Parameters
+    ----------
+    expression : Expression
+    known : CanonicalForms, optional
+        Forms from earlier calls, updated. The genes of a search share most of their parts.
 
     Returns
     -------
@@ -84,16 +106,23 @@ def regressor(expression: Expression) -> tuple[float, Regressor | None]:
     ModelError
         A lag is less than 1 (the regressor would read the present or the future), or a number overflows.
     """
-    factor, core = canonical(expression)
-    for channel, lag in sorted(lags(core)):
-        if lag < 1:
-            raise ModelError(
-                f"a regressor reads only past samples: channel {channel} has lag {lag}, take 1 or more"
-            )
-    return (factor, Regressor(core)) if factor else (0.0, None)
+    factor, core = canonical(expression, known)
+    if not factor:
+        return 0.0, None
+    found = known.regressors.get(core) if known else None
+    if found is None:
+        found = Regressor(core)
+        for channel, lag in sorted(found.lags):
+            if lag < 1:
+                raise ModelError(
+                    f"a regressor reads only past samples: channel {channel} has lag {lag}, take 1 or more"
+                )
+        if known:
+            known.regressors[core] = found
+    return factor, found
 
 
-def canonical(expression: Expression) -> tuple[float, Expression]:
+def canonical(expression: Expression, known: CanonicalForms | None = None) -> tuple[float, Expression]:
     """Return (factor, core) with ``expression = factor * core``; zero is (0, 1) and a number c is (c, 1).
 
     Raises
@@ -101,20 +130,26 @@ def canonical(expression: Expression) -> tuple[float, Expression]:
     ModelError
         The numbers in the expression overflow.
     """
-    factor, core = _canonical(expression)
-    return _check_finite(factor), core
+    if known is None or not isinstance(expression, Apply | Shift):
+        factor, core = _canonical(expression, known)
+        return _check_finite(factor), core
+    found = known.parts.get(expression)
+    if found is None:
+        factor, core = _canonical(expression, known)
+        found = known.parts[expression] = _check_finite(factor), core
+    return found
 
 
-def _canonical(expression: Expression) -> tuple[float, Expression]:
+def _canonical(expression: Expression, known: CanonicalForms | None) -> tuple[float, Expression]:
     match expression:
         case Lagged() | Symbol():
             return 1.0, expression
         case Constant(number):
             return number, _ONE
         case Shift():
-            return canonical(remove_shifts(expression))
+            return canonical(remove_shifts(expression), known)
         case Apply(primitive, arguments):
-            parts = [canonical(argument) for argument in arguments]
+            parts = [canonical(argument, known) for argument in arguments]
             if primitive == MUL:
                 return _product(parts)
             if primitive in (ADD, SUB):

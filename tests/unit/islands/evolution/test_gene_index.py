@@ -4,6 +4,7 @@ import numpy as np
 
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.gene_index import ZERO, GeneIndex
+from islands.evolution.gene_structure import phi
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.expressions.tree import Constant, Lagged
@@ -30,6 +31,18 @@ def test_equal_genes_have_one_number_and_one_object():
     assert len(set(numbers)) == len(TEXTS)
     assert [index.number_gene(parse(text)) for text in TEXTS] == numbers
     assert [index.genes[number] for number in numbers] == genes
+
+
+def test_equal_parts_of_genes_are_one_object():
+    index = GeneIndex(constraint("none"), (Lagged(0, 0), Lagged(0, 1)), structure=phi)
+    texts = "phi1(q2(u(k-1)), u(k-1))*y(k-1)", "tanh(phi1(q2(u(k-1)), u(k-1)))", "q2(u(k-1))"
+    product, function, lag = (index.genes[index.number_gene(parse(text))] for text in texts)
+    assert product.arguments[0] is function.arguments[0]
+    assert product.arguments[0].arguments[0] is lag
+    # The repair of a valid gene finds the gene itself.
+    assert phi(product) is product
+    assert index.repair([product]) == [index.number_gene(product)]
+    assert phi(parse("tanh(phi1(y(k-1), u(k-1)))")) == parse("tanh(phi1(u(k-1), u(k-1)))")
 
 
 def test_numbers_of_genes_remain_when_the_table_grows():

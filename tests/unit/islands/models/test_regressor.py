@@ -3,13 +3,16 @@
 import pytest
 
 from islands.errors import ModelError
+from islands.evolution.rng import Purpose, Stream
+from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import MUL, PRIMITIVES
 from islands.expressions.printing import plain
 from islands.expressions.tree import Apply, Constant, Lagged
 from islands.expressions.user_primitive import primitive
 from islands.models.clusters import steady_state
-from islands.models.regressor import canonical, regressor
+from islands.models.regressor import CanonicalForms, canonical, regressor
+from support.variation import random_gene
 
 
 def canonical_text(text):
@@ -148,3 +151,21 @@ def test_weights_that_cancel_up_to_rounding_are_zero():
     made = regressor(parse("0.1*y(k-1) + 0.2*y(k-2) + (-0.3)*y(k-3)"))[1]
     assert made is not None
     assert steady_state(made)[0] == 0.0
+
+
+def test_known_forms_do_not_change_a_regressor():
+    setting = Settings(
+        structure="free", primitives=("mul", "add", "sub", "sign", "abs", "tanh", "phi2"), initial_height=5
+    )
+    draw, forms = Stream(5, 0, 0, Purpose.INITIAL), CanonicalForms()
+    genes = [random_gene(setting, 2, draw) for _ in range(400)]
+    for each in (*genes, *genes[:20]):
+        assert repr(regressor(each, forms)) == repr(regressor(each))
+    # The test is meaningful only if parts and regressors are found again.
+    assert len(forms.regressors) < len(genes)
+    assert regressor(genes[0], forms)[1] is regressor(genes[0], forms)[1]
+    for _ in range(2):
+        with pytest.raises(ModelError, match="overflow"):
+            regressor(parse("1e300*u(k-1)*1e300"), forms)
+        with pytest.raises(ModelError, match="past samples"):
+            regressor(Apply(MUL, (Lagged(0, 1), Lagged(1, 0))), forms)
