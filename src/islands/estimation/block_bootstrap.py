@@ -17,7 +17,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from islands.data.coupled_record import AnyRecord
-from islands.estimation.damped_least_squares import compute_jacobian, find_directions, inner_products
+from islands.estimation.damped_least_squares import find_directions, inner_products
 from islands.estimation.parameter_constraints import constrain_model
 from islands.estimation.shooting_residual import make_residual
 from islands.models.coupled_narx import AnyModel
@@ -70,7 +70,7 @@ def draw_parameters(
     error = residual(theta)
     if error is None or not np.isfinite(error).all():
         return repeated
-    normal, gradient = _block_sums(compute_jacobian(residual, theta, error.size, directions), error)
+    normal, gradient = _block_sums(residual.differentiate(theta, directions), error)
     # The parameters are a minimum up to the tolerance of the refinement: replicates scatter about them.
     gradient -= np.add.reduce(gradient) / len(gradient)
     for index in range(draws):

@@ -31,9 +31,13 @@ class Residual(Protocol):
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return simulation minus measurement, shape (samples,); None after a divergence."""
 
-    def evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
-        """Return the residual of each of several parameter vectors, shape (vectors, terms)."""
-        return [self(theta) for theta in thetas]
+    def differentiate(
+        self, theta: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the derivatives along directions, shape (free, samples), at parameters without divergence.
+
+        A direction along which the simulation diverges has zeros.
+        """
 
 
 class Minimisation:
@@ -118,10 +122,19 @@ def find_directions(
     return found if isinstance(found, EvaluationOutcome) else unit[:, None] * found[1]
 
 
-def compute_jacobian(
-    residual: Residual, theta: NDArray[np.float64], samples: int, directions: NDArray[np.float64]
+def approximate_jacobian(
+    evaluate: Callable[[NDArray[np.float64]], list[NDArray[np.float64] | None]],
+    theta: NDArray[np.float64],
+    samples: int,
+    directions: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return the derivatives of a residual along directions, by central differences.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Returns the residual of each of several parameter vectors, shape (vectors, terms); None after a
+        divergence.
 
     Returns
     -------
@@ -130,7 +143,7 @@ def compute_jacobian(
     """
     jacobian: NDArray[np.float64] = np.zeros((directions.shape[1], samples))
     moved = [theta + sign * _DIFFERENCE_STEP * step for step in directions.T for sign in (1.0, -1.0)]
-    found = residual.evaluate(np.array(moved)) if moved else ()
+    found = evaluate(np.array(moved)) if moved else []
     for row, forward, backward in zip(jacobian, found[::2], found[1::2], strict=True):
         if forward is not None and backward is not None:
             row[:] = (forward - backward) / (2.0 * _DIFFERENCE_STEP)
@@ -144,7 +157,7 @@ def normal_equations(
     directions: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return J'J and J'r for steps along the directions; a direction that diverges contributes zeros."""
-    return inner_products(compute_jacobian(residual, theta, error.size, directions), error, 0, error.size)
+    return inner_products(residual.differentiate(theta, directions), error, 0, error.size)
 
 
 def inner_products(

@@ -17,7 +17,6 @@ from islands.errors import RecordError
 from islands.estimation.covariance import sandwich_of_jacobian
 from islands.estimation.damped_least_squares import (
     Minimisation,
-    compute_jacobian,
     find_directions,
     mean_square,
 )
@@ -76,7 +75,7 @@ class Refinement(Generic[M]):
     def model_with_errors(self) -> M:
         """Model with the parameters so far and their standard errors, which take as long as two steps."""
         found, directions = self.minimisation, self._directions
-        jacobian = compute_jacobian(self._residual, found.theta, found.error.size, directions)
+        jacobian = self._residual.differentiate(found.theta, directions)
         covariance = sandwich_of_jacobian(jacobian, found.error, self._residual.intervals)
         squares = np.einsum("ti,ij,tj->t", directions, covariance, directions)
         errors = np.sqrt(np.maximum(squares, 0.0)).tolist()

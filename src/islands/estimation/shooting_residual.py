@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.data.dataset import Dataset
-from islands.estimation.damped_least_squares import Residual
+from islands.estimation.damped_least_squares import Residual, approximate_jacobian
 from islands.kernels.simulate import DIVERGED, Layout, simulate
 from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
@@ -13,6 +13,7 @@ from islands.program.term_pool import link
 from islands.simulation.blocks import make_simulator
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound
+from islands.simulation.sensitivities import make_sensitivities
 
 
 class ShootingResidual(Residual):
@@ -38,6 +39,7 @@ class ShootingResidual(Residual):
         self._predicted = np.zeros(record.samples, bool)
         for start, length in zip(self._cut.start, self._cut.length, strict=True):
             self._predicted[start : start + length] = True
+        self._sensitivities = make_sensitivities(model.regressors, record, first, interval)
         #: Number of samples of every interval, in the order of time.
         self.intervals = self._cut.length[np.argsort(self._cut.start)]
 
@@ -53,6 +55,19 @@ class ShootingResidual(Residual):
             return None
         # The memory of other samples is not initialised: differences of it may overflow.
         return predicted[self._predicted] - self._y[self._predicted]
+
+    def differentiate(
+        self, theta: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the derivatives along directions, shape (free, samples).
+
+        They are exact, but for central differences if a primitive of the user has no known derivative.
+        """
+        if self._sensitivities is not None:
+            return self._sensitivities(theta, directions)
+        return approximate_jacobian(
+            lambda moved: [self(each) for each in moved], theta, int(self._predicted.sum()), directions
+        )
 
 
 class BlockResidual(Residual):
@@ -91,9 +106,15 @@ class BlockResidual(Residual):
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return prediction minus measurement over all predicted samples, or None after a divergence."""
-        return self.evaluate(theta[None])[0]
+        return self._evaluate(theta[None])[0]
 
-    def evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
+    def differentiate(
+        self, theta: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the derivatives along directions by central differences, shape (free, samples)."""
+        return approximate_jacobian(self._evaluate, theta, self._y.size, directions)
+
+    def _evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
         """Return the residual of each of several parameter vectors, which are simulated together."""
         runs = self._simulate(thetas)[:, : len(self._y), self._predicted]
         return [

@@ -121,7 +121,7 @@ def open_block(workspace, layout, block, lane, diverged, count):
 
 
 @kernel(forceinline=True, _nrt=False, constants=("count",))
-def _place_operands(program, workspace, layout, sample, count):
+def place_operands(program, workspace, layout, sample, count):
     """Compute the address and the stride of every operand for a chunk whose first row is at ``sample``."""
     # Fields are read from their tuples once: each access costs as much as a row.
     arena, places, strides = workspace.arena, workspace.places, workspace.strides
@@ -149,7 +149,7 @@ def run_chunk(program, theta, workspace, layout, block, chunk, active, squared_e
     code, addresses, factors, degree = program.code, program.addresses, program.factors, program.degree
     length, lane = layout.length, chunk.lane
     sample = layout.block_offset[block] + (layout.warm_up + chunk.begin) * layout.row_stride
-    _place_operands(program, workspace, layout, sample, count)
+    place_operands(program, workspace, layout, sample, count)
     measured = address(layout.signals, sample)
     prediction = address(arena, workspace.predictions)
     for step in range(chunk.begin, chunk.begin + chunk.steps):
@@ -157,7 +157,7 @@ def run_chunk(program, theta, workspace, layout, block, chunk, active, squared_e
             active -= 1
             squared_error[lane + active] = arena[squares + active]
         for index in range(code.shape[0]):
-            first, second = _get_place(places, code[index, 2]), _get_place(places, code[index, 3])
+            first, second = get_place(places, code[index, 2]), get_place(places, code[index, 3])
             execute(code[index, 0], targets[index], first, second, addresses[index], count, 1)
         # The terms are added in their order.
         y = broadcast(0.0, count)
@@ -178,7 +178,7 @@ def run_chunk(program, theta, workspace, layout, block, chunk, active, squared_e
 
 
 @kernel(forceinline=True, _nrt=False)
-def _get_place(places, operand):
+def get_place(places, operand):
     """Return the address of an operand of an instruction."""
     # An unsigned index is not checked for being negative: the loop over the instructions is the hottest one.
     return places[np.uint64(operand)]

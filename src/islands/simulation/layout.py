@@ -17,7 +17,9 @@ _OVERHEAD_LANES = 24
 
 # The layouts of recent calls are kept: a search simulates many models on few records, which never change.
 @lru_cache(maxsize=8)
-def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout:
+def layout(
+    record: Dataset, warm_up: int, interval: int | None = None, widths: tuple[int, ...] | None = None
+) -> Layout:
     """Lay out a record for a simulation.
 
     Parameters
@@ -28,6 +30,8 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
     interval : int or None
         Length of a shooting interval in samples: 1 is one-step-ahead, None is the free run over each whole
         segment. The last interval of a segment may be shorter.
+    widths : tuple of int, optional
+        Possible numbers of lanes per row, among which the number of intervals decides; `WIDTHS` by default.
 
     Raises
     ------
@@ -43,7 +47,7 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
     signals = np.ascontiguousarray(np.vstack([record.y, record.u.T]))
     known = record.y[~np.isnan(record.y)]
     largest = float(np.abs(known).max()) if known.size else 0.0
-    width = min(WIDTHS, key=lambda lanes: -(-len(start) // lanes) * (lanes + _OVERHEAD_LANES))
+    width = min(widths or WIDTHS, key=lambda lanes: -(-len(start) // lanes) * (lanes + _OVERHEAD_LANES))
     cuts = np.arange(0, len(start), width)
     if interval == 1:
         # One-step-ahead prediction needs no gathering: adjacent lanes are adjacent samples of one segment.
