@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from islands.estimation.constrained_least_squares import null_space
 from islands.estimation.constraints.conditions import Constrained
+from islands.kernels.gram import gram_of_residual
 from islands.kernels.summation import dot
 from islands.simulation.outcome import EvaluationOutcome
 
@@ -164,15 +165,10 @@ def inner_products(
     jacobian: NDArray[np.float64], error: NDArray[np.float64], first: int, last: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return J'J and J'r over the samples ``first`` to ``last - 1``; J is given transposed."""
-    free, samples = jacobian.shape
-    normal: NDArray[np.float64] = np.empty((free, free))
-    gradient: NDArray[np.float64] = np.empty(free)
-    flat, rows = jacobian.reshape(-1), last - first
-    for i in range(free):
-        gradient[i] = dot(flat, i * samples + first, error, first, rows)
-        for j in range(i + 1):
-            normal[i, j] = normal[j, i] = dot(flat, i * samples + first, flat, j * samples + first, rows)
-    return normal, gradient
+    free = len(jacobian)
+    products: NDArray[np.float64] = np.empty((free + 1, free + 1))
+    gram_of_residual(jacobian, error, first, last, products)
+    return products[:free, :free], products[:free, free]
 
 
 def mean_square(error: NDArray[np.float64]) -> float:

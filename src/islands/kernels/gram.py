@@ -79,6 +79,33 @@ def gram(
         _read_tiles(running, blocks, begin, end, terms, out)
 
 
+@kernel
+def gram_of_residual(
+    jacobian,  # float64 [term, row]
+    residual,  # float64 [row]
+    first,
+    last,
+    out,  # out, float64 [term + 1, term + 1]; the residual is the last term
+):
+    """Compute the inner products of all pairs of given columns over the rows ``first`` to ``last - 1``."""
+    terms = jacobian.shape[0]
+    blocks = -(-(terms + 1) // 4)
+    tiles = blocks * (blocks + 1) // 2
+    chunk = padded_size(4 * blocks * CHUNK)
+    chunk[:] = 0.0
+    running = padded_size(16 * VECTOR * tiles)
+    running[:] = 0.0
+    for begin in range(first, last, CHUNK):
+        rows = min(CHUNK, last - begin)
+        if rows < CHUNK:
+            chunk[:] = 0.0
+        for term in range(terms):
+            chunk[term * CHUNK : term * CHUNK + rows] = jacobian[term, begin : begin + rows]
+        chunk[terms * CHUNK : terms * CHUNK + rows] = residual[begin : begin + rows]
+        _add_tiles(chunk, blocks, 0, tiles, running)
+    _read_tiles(running, blocks, 0, tiles, terms + 1, out)
+
+
 @kernel(_nrt=False)
 def _add_pairs(chunk, pairs, running):
     """Add the products of a chunk of rows to the running sums of every pair, four pairs at a time."""

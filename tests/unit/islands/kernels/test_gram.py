@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
-from islands.kernels.gram import gram, inner_products
+from islands.kernels.gram import gram, gram_of_residual, inner_products
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK, dot
 from islands.models.regressor import regressor
@@ -138,3 +138,13 @@ def test_all_pairs_are_computed_if_several_passes_are_needed():
 
 def test_empty_list_of_pairs_gives_no_inner_products():
     assert products_of(TERMS, record((5,)), np.empty((0, 2), np.int64)).size == 0
+
+
+@pytest.mark.parametrize("terms", [0, 3, 4, 7])
+@pytest.mark.parametrize(("first", "last"), [(0, 2 * CHUNK), (5, CHUNK + 40), (17, 18)])
+def test_gram_of_a_residual_equals_the_inner_products_of_its_rows(terms, first, last):
+    rows = np.random.default_rng(terms).normal(size=(terms + 1, 2 * CHUNK))
+    found = np.full((terms + 1, terms + 1), np.nan)
+    gram_of_residual(rows[:-1], rows[-1], first, last, found)
+    expected = [[dot(one, first, other, first, last - first) for other in rows] for one in rows]
+    assert np.array_equal(found, expected)
