@@ -71,9 +71,11 @@ class Refinement(Generic[M]):
         found: M = self._model.with_parameters(self.minimisation.theta.tolist(), None)  # type: ignore[assignment]
         return found
 
-    @property
-    def model_with_errors(self) -> M:
-        """Model with the parameters so far and their standard errors, which take as long as two steps."""
+    def estimate_errors(self) -> M:
+        """Return the model with the parameters so far and with their standard errors.
+
+        They take as long as two steps.
+        """
         found, directions = self.minimisation, self._directions
         jacobian = self._residual.differentiate(found.theta, directions)
         covariance = sandwich_of_jacobian(jacobian, found.error, self._residual.intervals)
@@ -137,7 +139,7 @@ def refine(
     found = begun.minimisation
     before = mean_square(found.error)
     found.advance(max_steps, stop)
-    refined = begun.model_with_errors if standard_errors else begun.model
+    refined = begun.estimate_errors() if standard_errors else begun.model
     return RefinedModel(refined, before, mean_square(found.error), found.steps)
 
 
