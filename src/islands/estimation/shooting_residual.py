@@ -12,7 +12,7 @@ from islands.models.narx import Model
 from islands.program.term_pool import link
 from islands.simulation.blocks import make_simulator
 from islands.simulation.layout import layout
-from islands.simulation.predictors import divergence_bound
+from islands.simulation.predictors import divergence_bound, find_divergence_bound
 from islands.simulation.sensitivities import make_sensitivities
 
 
@@ -35,7 +35,7 @@ class ShootingResidual(Residual):
         first = model.maximum_lag if warm_up is None else warm_up
         self._program = link(model.regressors)
         self._cut: Layout = layout(record, first, interval)
-        self._y, self._bound = record.y, divergence_bound(record.y)
+        self._y, self._bound = record.y, find_divergence_bound(record)
         self._predicted = np.zeros(record.samples, bool)
         for start, length in zip(self._cut.start, self._cut.length, strict=True):
             self._predicted[start : start + length] = True

@@ -47,6 +47,7 @@ class TermPool:
         self.deepest: dict[int, int] = {}
         #: Arrays of nodes and terms; unused elements at the end are reserve.
         self.nodes = _allocate_nodes(256, 256)
+        self._operand_index = np.full(256, -1, np.int64)
 
     def __len__(self) -> int:
         return len(self._terms)
@@ -73,6 +74,13 @@ class TermPool:
     def terms(self, terms: Sequence[Term]) -> NDArray[np.int64]:
         """Return the indices of several terms."""
         return np.array([self.term(term) for term in terms], np.int64)
+
+    def generate(self, terms: NDArray[np.int64]) -> Program:
+        """Generate the program of some terms, given by their indices."""
+        if self._operand_index.size != self.nodes.operation.size:
+            self._operand_index = np.full(self.nodes.operation.size, -1, np.int64)
+        program: Program = codegen.generate_program(self.nodes, terms, self._operand_index)
+        return program
 
     def _node(self, expression: Expression) -> int:
         known = self._known.get(expression)
@@ -193,11 +201,7 @@ def link(terms: Sequence[Term], parameters: Sequence[str] = ()) -> Program:
     allows this, a simulation does not. ``parameters`` are the names of parameters in the expressions.
     """
     shared = None if parameters else _RECENT.find(terms)
-    if shared is None:
-        pool = TermPool(parameters)
-        indices = pool.terms(terms)
-    else:
-        pool, indices = _RECENT.pool, shared
-    nodes = pool.nodes
-    program: Program = codegen.generate_program(nodes, indices, np.full(nodes.operation.size, -1, np.int64))
-    return program
+    if shared is not None:
+        return _RECENT.pool.generate(shared)
+    pool = TermPool(parameters)
+    return pool.generate(pool.terms(terms))
