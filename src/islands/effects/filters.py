@@ -4,9 +4,9 @@ from functools import lru_cache
 from math import exp, factorial
 
 import numpy as np
-import scipy
 
 from islands.effects.interface.effect import Signal
+from islands.kernels.linear_filter import low_pass_cubic
 
 #: Coefficients of s^0 to s^3 of the cubic Lagrange polynomials, one row for each neighbour at -1, 0, 1, 2.
 _LAGRANGE = np.array(
@@ -32,12 +32,8 @@ def low_pass(signal: Signal, tau: float, dt: float) -> Signal:
     error makes a lag of half a sample look like another effect.
     """
     step = dt / tau
-    weights = _compute_weights(step)
-    start = signal[0]
-    seen = np.concatenate([[0.0], signal - start, [signal[-1] - start]])
-    moved = np.convolve(seen, weights[::-1], mode="valid")
-    followed = scipy.signal.lfilter([1.0], [1.0, -exp(-step)], moved)
-    return np.concatenate([[start], followed + start])
+    filtered: Signal = low_pass_cubic(signal, _compute_weights(step), exp(-step))
+    return filtered
 
 
 @lru_cache(maxsize=256)

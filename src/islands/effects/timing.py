@@ -1,13 +1,13 @@
 """Effects on time: delay, clock skew, rate limit, lag and resonance of the sensor."""
 
 import numpy as np
-import scipy
 
 from islands.effects.filters import interpolate_at, low_pass
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
 from islands.effects.interface.input_spectrum import find_single_frequency
 from islands.effects.interface.map_equation import MapEquation
+from islands.kernels.linear_filter import filter_linearly
 from islands.kernels.memory_operators import limit_rate
 
 
@@ -169,8 +169,7 @@ def _resonance_form(y: Signal, values: Signal, context: SimulationContext) -> Si
     scale = k * k + 2 * zeta * w * k + w * w
     b = w * w / scale
     a1, a2 = 2 * (w * w - k * k) / scale, (k * k - 2 * zeta * w * k + w * w) / scale
-    followed, _ = scipy.signal.lfilter([b, 2 * b, b], [1.0, a1, a2], y - y[0], zi=[0.0, 0.0])
-    out: Signal = followed + y[0]
+    out: Signal = filter_linearly([b, 2 * b, b], [1.0, a1, a2], y - y[0]) + y[0]
     return out
 
 

@@ -1,17 +1,17 @@
 """Linear model of any order, and its estimation."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-import scipy
 
 from islands.data.dataset import Dataset
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Site
 from islands.effects.interface.force import add_output_forces
 from islands.errors import RecordError
+from islands.kernels.linear_filter import filter_linearly
 from islands.simulators.interface import Forces, Simulator
 
 #: Iterations of the method of Steiglitz and McBride.
@@ -39,6 +39,11 @@ class LinearSimulator(Simulator):
         Input delay in samples.
     unit : str
         Unit of the output.
+    parameters : tuple of Parameter
+        Coefficients, level, and state of the filter at the first sample.
+    state_at_rest : ndarray, shape (order,)
+        State of the filter at rest at an input of one; zero without such an equilibrium. It is that of the
+        nominal coefficients, so that it remains finite while a pole passes through one.
     """
 
     numerator: Signal
@@ -47,13 +52,17 @@ class LinearSimulator(Simulator):
     reference_input: float
     delay: int
     unit: str
+    parameters: tuple[Parameter, ...] = field(init=False)
+    state_at_rest: Signal = field(init=False)
     name: ClassVar[str] = "linear"
     sites: ClassVar[frozenset[Site]] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
     built_in_effects: ClassVar[frozenset[str]] = frozenset(("offset",))
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Coefficients, level, and state of the filter at the first sample."""
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", self._list_parameters())
+        object.__setattr__(self, "state_at_rest", self._find_state_at_rest())
+
+    def _list_parameters(self) -> tuple[Parameter, ...]:
         order = self.denominator.size
         gain = _SCALE * float(np.max(np.abs(self.numerator))) or _SCALE
         return (
@@ -78,17 +87,12 @@ class LinearSimulator(Simulator):
         level, state = values[2 * order + 1], values[2 * order + 2 :]
         # The input is constant before the first sample; the state is a deviation from that equilibrium.
         state = state + (x[0] - self.reference_input) * self.state_at_rest
-        filtered, _ = scipy.signal.lfilter(
-            numerator, np.concatenate([[1.0], -denominator]), delayed - self.reference_input, zi=state
+        filtered = filter_linearly(
+            numerator, np.concatenate([[1.0], -denominator]), delayed - self.reference_input, state
         )
         return level + filtered + add_output_forces(x, context, forces)
 
-    @property
-    def state_at_rest(self) -> Signal:
-        """State of the filter at rest at an input of one, shape (order,); zero without such an equilibrium.
-
-        It is that of the nominal coefficients, so that it remains finite while a pole passes through one.
-        """
+    def _find_state_at_rest(self) -> Signal:
         remainder = 1.0 - float(self.denominator.sum())
         gain = float(self.numerator.sum()) / remainder if remainder > 0.0 else 0.0
         state: Signal = np.cumsum((self.numerator[1:] + gain * self.denominator)[::-1])[::-1]
@@ -121,7 +125,7 @@ def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
         numerator, denominator, level = _least_squares(delayed, y, order, prefilter)
         if order and np.max(np.abs(np.roots(np.concatenate([[1.0], -denominator])))) >= 1.0:
             break
-        simulated = level + scipy.signal.lfilter(numerator, np.concatenate([[1.0], -denominator]), delayed)
+        simulated = level + filter_linearly(numerator, np.concatenate([[1.0], -denominator]), delayed)
         mean_square = float(np.mean((y - simulated)[order + delay :] ** 2))
         if mean_square < smallest:
             found, smallest = (numerator, denominator, level), mean_square
@@ -132,9 +136,9 @@ def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
 
 def _least_squares(u: Signal, y: Signal, order: int, prefilter: Signal) -> tuple[Signal, Signal, float]:
     """Fit the coefficients and the level to prefiltered signals."""
-    filtered_u = scipy.signal.lfilter([1.0], prefilter, u)
-    filtered_y = scipy.signal.lfilter([1.0], prefilter, y - y[0])
-    constant = scipy.signal.lfilter([1.0], prefilter, np.ones(y.size))
+    filtered_u = filter_linearly([1.0], prefilter, u)
+    filtered_y = filter_linearly([1.0], prefilter, y - y[0])
+    constant = filter_linearly([1.0], prefilter, np.ones(y.size))
     rows = y.size - order
     columns = [filtered_u[order - lag : order - lag + rows] for lag in range(order + 1)]
     columns += [filtered_y[order - lag : order - lag + rows] for lag in range(1, order + 1)]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from islands.data.segments import find_bounds, map_segments
 from islands.effects.interface.effect import Signal
+from islands.kernels.linear_filter import filter_linearly
 
 #: Maximum order of the autoregression.
 MAX_ORDER = 16
@@ -87,7 +88,7 @@ class NoiseModel:
 
     def colour(self, innovations: Signal) -> Signal:
         """Filter innovations with the noise model, which starts at rest; the inverse of `whiten`."""
-        filtered = scipy.signal.lfilter([1.0], self._polynomial, innovations)
+        filtered = filter_linearly([1.0], self._polynomial, innovations)
         return take_fractional_difference(filtered, -self.difference_order)
 
     def limit_poles(self, time_constant: float) -> "NoiseModel":

@@ -262,7 +262,7 @@ def compute_form_chance(form: Effect, effects: Sequence[Effect], fit: Calibratio
     context = fit.simulation.context
     count = sum(len(effect.parameters(context)) for effect in effects)
     further = max(len(form.parameters(context)) - count, 1)
-    return float(scipy.stats.chi2.ppf(CHANCE_QUANTILE, further))
+    return 2.0 * float(scipy.special.gammaincinv(further / 2.0, CHANCE_QUANTILE))
 
 
 def _compute_score(screened: ScreenedEffect, named: Effect, without: CalibrationResult) -> float:

@@ -12,6 +12,7 @@ from islands.diagnosis.inference.noise_surrogates import (
     list_noise_models,
 )
 from islands.effects.interface.effect import Signal
+from islands.kernels.linear_filter import filter_linearly
 from islands.kernels.memory_operators import play_from
 
 #: Lags of the features, in samples.
@@ -198,7 +199,7 @@ def _make_columns(signal: Signal, rate: Signal, rate_scale: float, widths: Seque
     return [
         *(signal, rate, np.tanh(rate / rate_scale)),
         *(np.concatenate([np.full(lag, signal[0]), signal])[: signal.size] for lag in LAGS),
-        *(scipy.signal.lfilter([1.0 - a], [1.0, -a], signal - signal[0]) for a in decays),
+        *(filter_linearly([1.0 - a], [1.0, -a], signal - signal[0]) for a in decays),
         *(play_from(signal, width) for width in widths),
     ]
 
