@@ -58,6 +58,7 @@ class ExtendedSimulator:
     parts: "tuple[ExtendedSimulator, ...]" = field(init=False)
     _places: tuple[NDArray[np.int64], ...] = field(init=False)
     _slices: tuple[slice, ...] = field(init=False)
+    _by_site: Mapping[Site, tuple[tuple[Effect, slice], ...]] = field(init=False)
     _before_output: NDArray[np.bool_] = field(init=False)
     _cache: dict[bytes, Signal] = field(init=False, default_factory=dict)
 
@@ -98,6 +99,7 @@ class ExtendedSimulator:
             ("parts", tuple(parts)),
             ("_places", tuple(np.array(each, dtype=np.int64) for each in places)),
             ("_slices", tuple(slices)),
+            ("_by_site", _group_by_site(self.effects, slices[1:])),
             ("_before_output", np.array(before_output, dtype=bool)),
         ):
             object.__setattr__(self, name, value)
@@ -262,10 +264,9 @@ class ExtendedSimulator:
         """Return the outputs of several points after the output maps; NaN if they diverge."""
         mapped = np.stack(outputs)
         with np.errstate(over="ignore", invalid="ignore"):
-            for effect, part in zip(self.effects, self._slices[1:], strict=True):
-                if effect.site == Site.OUTPUT:
-                    for row, values in enumerate(points):
-                        mapped[row] = apply_map(effect, mapped[row], values[part], self.context)
+            for effect, part in self._by_site[Site.OUTPUT]:
+                for row, values in enumerate(points):
+                    mapped[row] = apply_map(effect, mapped[row], values[part], self.context)
             mapped[~(np.abs(mapped).max(axis=1) < _DIVERGENCE_FACTOR * self.context.output_peak)] = np.nan
         return mapped
 
@@ -278,30 +279,22 @@ class ExtendedSimulator:
         near: int | None = None,
     ) -> SimulationRun:
         """Return the run, without output maps. Runs with equal input maps share their input in ``inputs``."""
-        forces = list(further)
-        maps = [
-            (effect, values[part])
-            for effect, part in zip(self.effects, self._slices[1:], strict=True)
-            if effect.site == Site.INPUT
-        ]
+        maps = [(effect, values[part]) for effect, part in self._by_site[Site.INPUT]]
         key = b"".join(own.tobytes() for _, own in maps)
         if key not in inputs:
             inputs[key] = map_input(maps, self.context, self.simulator.is_continuous_time)
         x, characteristic = inputs[key]
         parameters = dict(effect_parameters)
+        for _, part in self._by_site[Site.CORE]:
+            names = [parameter.name for parameter in self.parameters[part]]
+            parameters |= zip(names, values[part].tolist(), strict=True)
         simulator_values = values[self.simulator_slice].copy()
-        for effect, part in zip(self.effects, self._slices[1:], strict=True):
-            match effect.site:
-                case Site.CORE:
-                    parameters |= {
-                        parameter.name: float(value)
-                        for parameter, value in zip(self.parameters[part], values[part], strict=True)
-                    }
-                case Site.PARAMETER:
-                    simulator_values[self._get_parameter_index(effect)] *= 1.0 + values[part][0]
-                case Site.FORCE:
-                    assert isinstance(effect.form, ForceLaw)
-                    forces.append((effect.form, values[part]))
+        for effect, part in self._by_site[Site.PARAMETER]:
+            simulator_values[self._get_parameter_index(effect)] *= 1.0 + values[part][0]
+        forces = list(further)
+        for effect, part in self._by_site[Site.FORCE]:
+            assert isinstance(effect.form, ForceLaw)
+            forces.append((effect.form, values[part]))
         return SimulationRun(
             simulator_values, x, parameters, forces, near=near, characteristic=characteristic
         )
@@ -309,3 +302,11 @@ class ExtendedSimulator:
     def _get_parameter_index(self, effect: Effect) -> int:
         _, _, name = effect.name.partition(":")
         return [parameter.name for parameter in self.simulator.parameters].index(name)
+
+
+def _group_by_site(
+    effects: Sequence[Effect], slices: Sequence[slice]
+) -> Mapping[Site, tuple[tuple[Effect, slice], ...]]:
+    """Return the effects at each site with the slices of their values, in the order in which they act."""
+    placed = list(zip(effects, slices, strict=True))
+    return {site: tuple((effect, part) for effect, part in placed if effect.site == site) for site in Site}

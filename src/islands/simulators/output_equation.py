@@ -1,7 +1,7 @@
 """Equation of the output around a simulation that has no equations, to which terms can be added."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -34,15 +34,17 @@ class OutputEquation(SimulatorWrapper, BatchSimulator):
         System without states. Its parameters follow those of the simulation.
     sizes : mapping
         Largest absolute value of ``y_sim`` in a nominal simulation.
+    parameters : tuple of Parameter
+        Parameters of the simulation, then those of the equation.
     """
 
     system: OdeSystem
     sizes: Mapping[str, float]
+    parameters: tuple[Parameter, ...] = field(init=False)
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the simulation, then those of the equation."""
-        return (*self.simulator.parameters, *map(make_parameter, self.system.parameters))
+    def __post_init__(self) -> None:
+        parameters = (*self.simulator.parameters, *map(make_parameter, self.system.parameters))
+        object.__setattr__(self, "parameters", parameters)
 
     def with_values(self, values: Signal) -> "OutputEquation":
         """Return the equation with other nominal values of its parameters, the last of ``values``."""
@@ -54,6 +56,8 @@ class OutputEquation(SimulatorWrapper, BatchSimulator):
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
     ) -> Signal:
         """Simulate several runs; those that differ only in the equation share a run of the simulation."""
+        if not self.system.parameters:
+            return self.simulator.simulate_batch(runs, context, every)
         count = len(self.simulator.parameters)
         distinct: dict[tuple[object, ...], SimulationRun] = {}
         keys = []
@@ -64,8 +68,6 @@ class OutputEquation(SimulatorWrapper, BatchSimulator):
             keys.append(key)
         outputs = self.simulator.simulate_batch(list(distinct.values()), context)
         simulated = dict(zip(distinct, outputs, strict=True))
-        if not self.system.parameters:
-            return np.stack([simulated[key] for key in keys])[:, ::every]
         names = [each.name for each in self.system.parameters]
         signals: dict[tuple[int, int], dict[str, Signal]] = {}
         found = []
