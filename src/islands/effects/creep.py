@@ -14,15 +14,21 @@ from islands.effects.interface.map_equation import MapEquation
 _MAX_EARLIER_STEP = 10.0
 
 
-def _earlier_step(y: Signal, tau: float, context: SimulationContext) -> Signal | float:
-    """Return the creep after a step before the first sample, as large as the largest output.
+def _creep(y: Signal, taus: Sequence[float], context: SimulationContext) -> Signal:
+    """Return the sum of the creeps with several time constants.
 
-    Without a step within the estimation part, creep comes from an earlier one, whose size is unknown.
+    Without a step within the estimation part, creep comes from one before the first sample, whose size is
+    unknown: as large as the largest output.
     """
     fitted = round((context.fit_end_time - context.start_time) / context.dt)
-    if fitted <= 0 or not is_resting(y[:fitted]):
-        return 0.0
-    return context.output_peak * -np.expm1(-context.dt * np.arange(y.size) / tau)
+    is_earlier = fitted > 0 and is_resting(y[:fitted])
+    total = np.zeros(y.size)
+    for tau in taus:
+        earlier = (
+            context.output_peak * -np.expm1(-context.dt * np.arange(y.size) / tau) if is_earlier else 0.0
+        )
+        total += low_pass(y, tau, context.dt) - y[0] + earlier
+    return total
 
 
 def _write_creep(taus: Sequence[str], context: SimulationContext) -> MapEquation:
@@ -41,8 +47,7 @@ def _limit_kappa(context: SimulationContext, lower: float, upper: float) -> tupl
 
 
 def _exponential_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    tau = float(np.exp(values[1]))
-    return y + values[0] * (low_pass(y, tau, context.dt) - y[0] + _earlier_step(y, tau, context))
+    return y + values[0] * _creep(y, [float(np.exp(values[1]))], context)
 
 
 def _exponential_creep_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
@@ -78,9 +83,7 @@ TAUS = (0.3, 1.0, 3.0, 10.0, 30.0)
 
 
 def _logarithmic_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return y + values[0] * sum(
-        low_pass(y, tau, context.dt) - y[0] + _earlier_step(y, tau, context) for tau in TAUS
-    )
+    return y + values[0] * _creep(y, TAUS, context)
 
 
 def _logarithmic_creep_parameters(context: SimulationContext) -> tuple[Parameter, ...]:

@@ -1,5 +1,6 @@
 """Disturbances: coupling of another channel, a periodic disturbance."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -53,8 +54,15 @@ CROSS_COUPLING = Effect(
 
 
 def _periodic_disturbance_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    angle = 2 * np.pi * values[2] * context.time
-    return y + values[0] * np.cos(angle) + values[1] * np.sin(angle)
+    cosine, sine = _make_waves(float(values[2]), context.start_time, context.dt, y.size)
+    return y + values[0] * cosine + values[1] * sine
+
+
+@lru_cache(maxsize=4)
+def _make_waves(frequency: float, start: float, dt: float, samples: int) -> tuple[Signal, Signal]:
+    """Return the cosine and the sine of a frequency over time; most derivatives have it in common."""
+    angle = 2 * np.pi * frequency * (start + dt * np.arange(samples, dtype=np.float64))
+    return np.cos(angle), np.sin(angle)
 
 
 def _periodic_disturbance_parameters(context: SimulationContext) -> tuple[Parameter, ...]:

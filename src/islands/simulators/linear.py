@@ -1,6 +1,6 @@
 """Linear model of any order, and its estimation."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -9,10 +9,10 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Site
-from islands.effects.interface.force import add_output_forces
+from islands.effects.interface.force import sum_output_forces
 from islands.errors import RecordError
 from islands.kernels.linear_filter import filter_linearly
-from islands.simulators.interface import Forces, Simulator
+from islands.simulators.interface import Forces, SimulationRun, Simulator
 
 #: Iterations of the method of Steiglitz and McBride.
 _ITERATIONS = 12
@@ -77,20 +77,37 @@ class LinearSimulator(Simulator):
         values: Signal,
         x: Signal,
         context: SimulationContext,
-        _effect_parameters: Mapping[str, float],
+        effect_parameters: Mapping[str, float],
         forces: Forces,
     ) -> Signal:
         """Simulate the output; see `Simulator.simulate`."""
+        output: Signal = self.simulate_batch([SimulationRun(values, x, effect_parameters, forces)], context)[
+            0
+        ]
+        return output
+
+    def simulate_batch(
+        self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
+    ) -> Signal:
+        """Simulate several runs; those with the same input share its delay, and equal forces."""
         order = self.denominator.size
-        numerator, denominator = values[: order + 1], values[order + 1 : 2 * order + 1]
-        delayed = np.concatenate([np.full(self.delay, x[0]), x[: x.size - self.delay]])
-        level, state = values[2 * order + 1], values[2 * order + 2 :]
-        # The input is constant before the first sample; the state is a deviation from that equilibrium.
-        state = state + (x[0] - self.reference_input) * self.state_at_rest
-        filtered = filter_linearly(
-            numerator, np.concatenate([[1.0], -denominator]), delayed - self.reference_input, state
-        )
-        return level + filtered + add_output_forces(x, context, forces)
+        inputs = {run.input_key: run.apply_characteristic(run.x) for run in runs}
+        deviations = {key: self._delay(x) - self.reference_input for key, x in inputs.items()}
+        found = np.empty((len(runs), runs[0].x.size))
+        for row, run in zip(found, runs, strict=True):
+            numerator, denominator = run.values[: order + 1], run.values[order + 1 : 2 * order + 1]
+            level, state = run.values[2 * order + 1], run.values[2 * order + 2 :]
+            # The input is constant before the first sample; the state is a deviation from that equilibrium.
+            state = state + (inputs[run.input_key][0] - self.reference_input) * self.state_at_rest
+            poles = np.concatenate([[1.0], -denominator])
+            row[:] = level + filter_linearly(numerator, poles, deviations[run.input_key], state)
+        if runs[0].forces:
+            coordinates = [inputs[run.input_key] for run in runs]
+            found += sum_output_forces(coordinates, context, [run.forces for run in runs])
+        return found[:, ::every]
+
+    def _delay(self, x: Signal) -> Signal:
+        return np.concatenate([np.full(self.delay, x[0]), x[: x.size - self.delay]])
 
     def _find_state_at_rest(self) -> Signal:
         remainder = 1.0 - float(self.denominator.sum())
