@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
-import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, StrMethodFormatter
@@ -31,6 +30,7 @@ from islands.figures.style import (
     label,
 )
 from islands.figures.windows import last_loops, representative_window
+from islands.inspection.excitation import estimate_spectrum
 
 #: Colour of the simulation before extension.
 BEFORE = "#e69f00"
@@ -261,7 +261,7 @@ def _draw_spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
     bounds = [(begin, end) for begin, end in record.bounds if end - begin >= window] or record.bounds
     for _, colour, residual in _residuals(diagnosis):
         parts = [fill_gaps(residual)[slice(*each)] for each in bounds]
-        found = [scipy.signal.welch(part, 1.0 / record.dt, nperseg=window) for part in parts]
+        found = [estimate_spectrum(part, record.dt, window, centres_parts=True) for part in parts]
         frequency = found[0][0]
         density = np.average(
             [each for _, each in found], axis=0, weights=[end - begin for begin, end in bounds]

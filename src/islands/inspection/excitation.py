@@ -47,16 +47,29 @@ def measure_excitation(channel: Channel, record: Dataset) -> tuple[Fact, ...]:
 
 
 def estimate_spectrum(
-    values: NDArray[np.float64], dt: float
+    values: NDArray[np.float64], dt: float, length: int = _PERIODOGRAM, centres_parts: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return frequencies in hertz and the power density of a signal without its mean (Welch 1967).
 
-    Parts with a Hann window overlap by half. `scipy.signal.welch` computes the same, but its import takes a
-    second, and the service inspects each file in a new process.
+    Parts with a Hann window overlap by half. `scipy.signal.welch` computes the same, but its import takes
+    half a second.
+
+    Parameters
+    ----------
+    values : ndarray, shape (samples,)
+    dt : float
+        Sampling time in seconds.
+    length : int
+        Largest length of a part in samples.
+    centres_parts : bool
+        Whether each part is taken without its own mean, and not without that of the signal.
     """
-    length = min(len(values), _PERIODOGRAM)
+    length = min(len(values), length)
     window = np.hanning(length + 1)[:-1]
-    parts = np.lib.stride_tricks.sliding_window_view(values - values.mean(), length)[:: length - length // 2]
+    centred = values if centres_parts else values - values.mean()
+    parts = np.lib.stride_tricks.sliding_window_view(centred, length)[:: length - length // 2]
+    if centres_parts:
+        parts = parts - parts.mean(axis=1, keepdims=True)
     power: NDArray[np.float64] = (
         np.mean(np.abs(np.fft.rfft(window * parts)) ** 2, axis=0) * dt / np.sum(window**2)
     )

@@ -24,10 +24,14 @@ def test_band_contains_the_sines_of_an_input():
 
 
 @pytest.mark.parametrize("samples", [2, 20, 201, 4096, 4097, 20_000])
-def test_spectrum_is_that_of_scipy(samples):
+@pytest.mark.parametrize("length", [16, 101, 4096])
+@pytest.mark.parametrize("centres_parts", [False, True])
+def test_spectrum_is_that_of_scipy(samples, length, centres_parts):
     values = 3.0 + white(samples, 1)
-    frequency, power = estimate_spectrum(values, 0.01)
-    expected = scipy.signal.welch(values - values.mean(), 100.0, nperseg=min(samples, 4096), detrend=False)
+    frequency, power = estimate_spectrum(values, 0.01, length, centres_parts)
+    centred = values if centres_parts else values - values.mean()
+    detrend = "constant" if centres_parts else False
+    expected = scipy.signal.welch(centred, 100.0, nperseg=min(samples, length), detrend=detrend)
     np.testing.assert_array_equal(frequency, expected[0])
     np.testing.assert_allclose(power, expected[1], atol=1e-13 * expected[1].max())
 
