@@ -1,4 +1,4 @@
-"""Filters that several effects use: first-order low-pass and fractional delay."""
+"""First-order low-pass that several effects use."""
 
 from functools import lru_cache
 from math import exp, factorial
@@ -55,24 +55,3 @@ def _moments(step: float) -> Signal:
     for n in range(1, 4):
         moments.append(1.0 - n / step * moments[-1])
     return np.array(moments)
-
-
-#: Offsets of the neighbours that an interpolation uses. With four neighbours, the error for a signal of ten
-#: samples per period is as large as that of a delay of a hundredth of a sample.
-_NEIGHBOURS = (-2, -1, 0, 1, 2, 3)
-
-
-def interpolate_at(signal: Signal, at: Signal) -> Signal:
-    """Interpolate at positions in samples, through six neighbours (Lagrange); the end values are held."""
-    last = signal.size - 1
-    at = np.clip(at, 0.0, last)
-    first = np.minimum(at.astype(np.int64), max(last - 1, 0))
-    f = at - first
-    interpolated = np.zeros_like(at)
-    for here in _NEIGHBOURS:
-        weight = signal[np.clip(first + here, 0, last)]
-        for other in _NEIGHBOURS:
-            if other != here:
-                weight = weight * ((f - other) / (here - other))
-        interpolated += weight
-    return interpolated

@@ -1,6 +1,7 @@
 """Effects that change with time: a step of the gain, ageing."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -33,7 +34,14 @@ def instant_bounds(context: SimulationContext) -> tuple[float, float]:
 
 def smooth_step(context: SimulationContext, instant: float) -> Signal:
     """Return a step from 0 to 1 at an instant, smoothed over a few samples so that it has a derivative."""
-    out: Signal = scipy.special.expit((context.time - instant) / (2 * context.dt))
+    return _make_step(instant, context.start_time, context.dt, context.u.size)
+
+
+@lru_cache(maxsize=4)
+def _make_step(instant: float, start: float, dt: float, samples: int) -> Signal:
+    """Return a smooth step over time; most derivatives have it in common."""
+    time = start + dt * np.arange(samples, dtype=np.float64)
+    out: Signal = scipy.special.expit((time - instant) / (2 * dt))
     return out
 
 

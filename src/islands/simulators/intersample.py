@@ -52,7 +52,12 @@ class ResampledSimulator(SimulatorWrapper, BatchSimulator):
         finer = []
         for run in runs:
             u, between = signals[id(run.x)]
-            finer.append(replace(run, x=u, intersample_values=between))
+            finer.append(
+                SimulationRun(
+                    *(run.values, u, run.effect_parameters, run.forces, between, run.near),
+                    run.characteristic,
+                )
+            )
         resampled = replace(
             context,
             u=finer[0].x,
@@ -86,8 +91,9 @@ def resample_input(x: Signal, intersample: InterSample, oversampling: int) -> tu
             held = np.repeat(x, oversampling)
             return held, np.stack([held, held])
         case InterSample.FOH:
-            at = np.arange(2 * oversampling * x.size + 1) / (2 * oversampling)
-            fine = np.interp(at, np.arange(x.size), x)
+            parts = _divide(x.size, 2 * oversampling)
+            rises = np.append(np.diff(x), 0.0)
+            fine = np.append((rises[:, None] * parts + x[:, None]).reshape(-1), x[-1])
         case InterSample.BAND_LIMITED:
             # Both ends are extended by reflection: with zeros beyond the ends, the filter would ring.
             weights = design_low_pass(2 * oversampling)
@@ -95,6 +101,13 @@ def resample_input(x: Signal, intersample: InterSample, oversampling: int) -> tu
             near = sliding_window_view(longer, 2 * REACH + 1)
             fine = (np.ascontiguousarray(near) @ weights).reshape(-1)[: 2 * oversampling * x.size + 1]
     return fine[:-1:2].copy(), np.stack([fine[1::2], fine[2::2]])
+
+
+@lru_cache(maxsize=4)
+def _divide(samples: int, factor: int) -> NDArray[np.float64]:
+    """Return the places of ``factor`` values after each sample, in samples from it."""
+    at = np.arange(samples * factor) / factor
+    return at.reshape(samples, factor) - np.arange(samples)[:, None]
 
 
 @lru_cache(maxsize=8)

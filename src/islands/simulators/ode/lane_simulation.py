@@ -100,7 +100,8 @@ def pack_signals(
     found, indices = list_signals(expressions, dt, lanes)
     is_shared = (indices == indices[0]).all(axis=0)
     own, places = np.unique(indices[:, ~is_shared], return_inverse=True)
-    places = np.pad(places.reshape(len(lanes), -1), ((0, LANES - len(lanes)), (0, 0)), "edge")
+    # The last lanes repeat the last one that is given.
+    places = places.reshape(len(lanes), -1)[np.minimum(np.arange(LANES), len(lanes) - 1)]
     signals = LaneSignals(
         stack_signals([found[index] for index in indices[0, is_shared]], samples),
         chain_signals([found[index] for index in own], samples),

@@ -27,7 +27,9 @@ class SampledSignal:
     @classmethod
     def join(cls, start: Signal, middle: Signal, end: Signal) -> "SampledSignal":
         """Make a signal of its values at the three moments, each of shape (samples,)."""
-        return cls(np.column_stack([start, middle, end]))
+        moments = np.empty((start.size, 3))
+        moments[:, 0], moments[:, 1], moments[:, 2] = start, middle, end
+        return cls(moments)
 
     @property
     def start(self) -> Signal:

@@ -124,3 +124,14 @@ def test_a_band_limited_input_is_reconstructed_between_its_samples(oversampling:
     assert between[1][within] == pytest.approx(signal(at + 1 / oversampling)[within], abs=0.02)
     linear = resample_input(signal(np.arange(600.0)), InterSample.FOH, 2)[0]
     assert np.max(np.abs(linear - signal(np.arange(1200) / 2))) > 0.3
+
+
+@pytest.mark.parametrize("oversampling", [1, 3, 8])
+def test_a_linear_input_is_interpolated_as_by_numpy(oversampling):
+    x = np.random.default_rng(2).normal(size=50)
+    start, between = resample_input(x, InterSample.FOH, oversampling)
+    at = np.arange(50 * oversampling) / oversampling
+    middles = np.arange(1, 100 * oversampling, 2) / (2 * oversampling)
+    ends = np.arange(2, 100 * oversampling + 1, 2) / (2 * oversampling)
+    for found, places in ((start, at), (between[0], middles), (between[1], ends)):
+        np.testing.assert_array_equal(found, np.interp(places, np.arange(50), x))

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from islands.data.segments import is_resting
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.channels import channel
-from islands.effects.filters import interpolate_at, low_pass
+from islands.effects.filters import low_pass
 from islands.effects.interface.effect import Effect, SimulationContext, Site
 from islands.effects.interface.map_equation import OPERATORS
 from islands.effects.time_variation import GAIN_EFFECTS, gain_over_time
 from islands.effects.timing import RESONANCE
 from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
+from islands.kernels.lagrange import interpolate_at
 from islands.kernels.memory_operators import lag_unevenly, limit_rate, play_from, slider
 
 Array = NDArray[np.float64]
