@@ -3,21 +3,15 @@
 from matplotlib.figure import Figure
 
 from islands.diagnosis.discovery.effect_shape import EffectShape
-from islands.diagnosis.inference.finding import Finding
+from islands.diagnosis.inference.finding import list_free_forms
 from islands.diagnosis.result import Diagnosis
-from islands.effects.catalogue import CATALOGUE
 from islands.figures.style import FRAME, MEASURED, SIMULATED, blank, finish, house_style, label
-
-
-def list_free_forms(diagnosis: Diagnosis) -> list[Finding]:
-    """Return the findings of a diagnosis that are free forms."""
-    return [each for each in diagnosis.effects if each.name in CATALOGUE and CATALOGUE[each.name].is_free]
 
 
 @house_style()
 def draw_free_forms(diagnosis: Diagnosis) -> Figure:
     """Draw the coefficients of each free form with their 95 % intervals, one panel for each form."""
-    forms = list_free_forms(diagnosis)
+    forms = list_free_forms(diagnosis.effects)
     figure = blank(0.4 + 2.4 * len(forms), "Free forms: values with 95 % intervals")
     panels = figure.subplots(len(forms), 1, squeeze=False)[:, 0]
     for axes, form in zip(panels, forms, strict=True):

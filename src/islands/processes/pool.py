@@ -30,7 +30,7 @@ _PRELOADED = [
     "__main__",
     "islands.diagnosis.procedure",
     "islands.simulators.specification.factory",
-    "scipy.signal",
+    "islands.figures.diagnosis",
 ]
 
 A = TypeVar("A")

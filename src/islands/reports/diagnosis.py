@@ -1,5 +1,7 @@
 """HTML report of a diagnosis: sentences, numbers and figures."""
 
+from functools import partial
+
 from islands.diagnosis.detectability import NOTHING, SelfTest
 from islands.diagnosis.documents.result_text import (
     describe_finding,
@@ -9,15 +11,17 @@ from islands.diagnosis.documents.result_text import (
     summarise_self_test,
 )
 from islands.diagnosis.findings import ResidualFormula
+from islands.diagnosis.inference.finding import list_free_forms
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.surrogates import STRENGTHS
-from islands.figures.diagnosis import DIAGNOSIS_FIGURES
-from islands.figures.form_values import draw_effect_shape, draw_free_forms, list_free_forms
+from islands.parallel import ParallelMap
 from islands.reports.rendering import TEMPLATES, inline_figure
 
 #: Captions of the figures, in the order of the report.
 _CAPTIONS = {
     "over-time": "Measured, simulated and extended output, and the residuals",
+    "shape": "Shape of the effect, and of a free curve in its place",
+    "free-forms": "Shape of the missing effect",
     "loops": "Output over input, and the residual over the input",
     "residual": "Structure of the residual before and after",
     "ladder": "Gain of each effect alone",
@@ -48,8 +52,34 @@ def _mistaken(tested: SelfTest) -> list[tuple[str, str, int]]:
     ]
 
 
+def _list_figures(found: Diagnosis) -> list[str]:
+    """Return the names of the figures that a diagnosis has, in the order of the report."""
+    has = {
+        "shape": found.shape is not None,
+        "free-forms": bool(list_free_forms(found.effects)),
+        "ladder": bool(found.candidates),
+    }
+    return [name for name in _CAPTIONS if has.get(name, True)]
+
+
+def _draw(found: Diagnosis, name: str) -> str:
+    """Draw a figure; return the address of the embedded image."""
+    # matplotlib takes half a second to import, and other processes may draw.
+    from islands.figures.diagnosis import DIAGNOSIS_FIGURES  # noqa: PLC0415
+    from islands.figures.form_values import draw_effect_shape, draw_free_forms  # noqa: PLC0415
+
+    if name == "shape" and found.shape is not None:
+        return inline_figure(draw_effect_shape(found.shape))
+    draw = draw_free_forms if name == "free-forms" else DIAGNOSIS_FIGURES[name]
+    return inline_figure(draw(found))
+
+
 def diagnosis_report(
-    name: str, found: Diagnosis, tested: SelfTest | None = None, proposal: ResidualFormula | None = None
+    name: str,
+    found: Diagnosis,
+    tested: SelfTest | None = None,
+    proposal: ResidualFormula | None = None,
+    parallel_map: ParallelMap = map,
 ) -> bytes:
     """Write the report of a diagnosis.
 
@@ -61,17 +91,12 @@ def diagnosis_report(
         Detection limits and false-alarm rate on the record.
     proposal : ResidualFormula, optional
         Formula for the unexplained residual.
+    parallel_map : ParallelMap
+        Draws the figures. The report does not depend on it.
     """
-    figures = [
-        (_CAPTIONS[each], inline_figure(draw(found)))
-        for each, draw in DIAGNOSIS_FIGURES.items()
-        if found.candidates or each != "ladder"
-    ]
-    if list_free_forms(found):
-        figures.insert(1, ("Shape of the missing effect", inline_figure(draw_free_forms(found))))
-    if found.shape is not None:
-        caption = "Shape of the effect, and of a free curve in its place"
-        figures.insert(1, (caption, inline_figure(draw_effect_shape(found.shape))))
+    names = _list_figures(found)
+    drawn = parallel_map(partial(_draw, found), names)
+    figures = [(_CAPTIONS[each], figure) for each, figure in zip(names, drawn, strict=True)]
     text = TEMPLATES.get_template("diagnosis.html").render(
         name=name,
         found=found,

@@ -2,11 +2,12 @@
 
 import base64
 from io import BytesIO
+from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-from matplotlib.figure import Figure
 
-from islands.figures.style import save
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Environment of the HTML templates.
 TEMPLATES = Environment(
@@ -17,8 +18,10 @@ TEMPLATES = Environment(
 )
 
 
-def inline_figure(figure: Figure) -> str:
+def inline_figure(figure: "Figure") -> str:
     """Return a figure as the address of an embedded image."""
+    from islands.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
+
     stream = BytesIO()
     save(figure, stream)
     return inline_svg(stream.getvalue())

@@ -128,7 +128,9 @@ def diagnose(
                 limits = _run_self_test(diagnosis, simulator, tolerances, seed, workers, steps)
             show(REPORT_FILE, BEFORE_REPORT)
             found = DiagnosisResult.from_diagnosis(diagnosis, formula, limits, wall)
-            found.save(out, ", ".join(path.name for path in records), steps)
+            # Further processes of the same fork server, which has loaded matplotlib. A signal has ended it.
+            with process_pool(workers if before is None else 1, start_after=0.0) as parallel:
+                found.save(out, ", ".join(path.name for path in records), steps, parallel)
             if steps.left_out:
                 write_fits(out, fits)
     for paragraph in found.summary.splitlines():

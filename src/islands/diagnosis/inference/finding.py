@@ -21,6 +21,7 @@ from islands.diagnosis.inference.screening import ScreenedEffect, bic_penalty
 from islands.diagnosis.inference.strategies import SearchOutcome
 from islands.diagnosis.inference.verdict import Verdict, choose_reference_fit, explained_fraction
 from islands.diagnosis.run import DiagnosisRun
+from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, Signal
 
 #: Effects whose scores are within this margin of the named one cannot be distinguished from it.
@@ -78,6 +79,11 @@ class Finding:
     score: float
     explained_fraction: float | None
     is_claimed: bool = True
+
+
+def list_free_forms(findings: Sequence[Finding]) -> list[Finding]:
+    """Return the findings that are free forms."""
+    return [each for each in findings if each.name in CATALOGUE and CATALOGUE[each.name].is_free]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

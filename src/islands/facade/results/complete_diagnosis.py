@@ -16,6 +16,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.errors import ModelError, lookup
 from islands.facade.results.notebook_html import render_sentences
 from islands.facade.results.saved_simulation import SavedSimulation
+from islands.parallel import ParallelMap
 from islands.progress import Steps
 from islands.simulation.predictors import Simulation
 from islands.simulators.specification.table import EXTENDED_FILE, LocalExtendedSpec
@@ -76,14 +77,19 @@ class DiagnosisResult(Diagnosis):
         """Text of ``extended.json``, the extended simulation; None if no effect was added."""
         return None if self.gain is None else extended_json(self.best, self.record)
 
-    def write_report(self, name: str) -> bytes:
+    def write_report(self, name: str, parallel_map: ParallelMap = map) -> bytes:
         """Return ``report.html``, with the name of the record: sentences, numbers and figures."""
-        # matplotlib takes half a second to import.
-        from islands.reports.diagnosis import diagnosis_report  # noqa: PLC0415
+        from islands.reports.diagnosis import diagnosis_report  # noqa: PLC0415 - many results have no report
 
-        return diagnosis_report(name, self, self.tested, self.formula)
+        return diagnosis_report(name, self, self.tested, self.formula, parallel_map)
 
-    def save(self, folder: str | Path, name: str = "record", steps: Steps | None = None) -> Path:
+    def save(
+        self,
+        folder: str | Path,
+        name: str = "record",
+        steps: Steps | None = None,
+        parallel_map: ParallelMap = map,
+    ) -> Path:
         """Write ``report.html``, ``extended.json`` if an effect was added, and, last, ``discrepancy.json``.
 
         Parameters
@@ -95,13 +101,15 @@ class DiagnosisResult(Diagnosis):
         steps : Steps, optional
             The report is an optional step, which a stop request leaves out. The document names all steps
             that were left out.
+        parallel_map : ParallelMap
+            Draws the figures of the report, which does not depend on it.
         """
         folder, steps = Path(folder), steps or Steps()
         folder.mkdir(parents=True, exist_ok=True)
         for file in (EXTENDED_FILE, DIAGNOSIS_FILE, REPORT_FILE):
             (folder / file).unlink(missing_ok=True)
         if not steps.skip(REPORT_FILE):
-            (folder / REPORT_FILE).write_bytes(self.write_report(name))
+            (folder / REPORT_FILE).write_bytes(self.write_report(name, parallel_map))
         if (extended := self.extended_document) is not None:
             (folder / EXTENDED_FILE).write_text(extended, encoding="utf-8")
         complete = replace(self, left_out=(*self.left_out, *steps.left_out))

@@ -1,7 +1,9 @@
 """Sentences of the diagnosis report."""
 
 import re
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,6 +48,20 @@ def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis
         assert ["explain the record as well" in text for text in texts] == [False, True, False]
         assert ["instead of the terms" in text for text in texts] == [True, False, False]
         assert [", with jump:" in text for text in texts] == [False, True, False]
+
+
+@pytest.mark.ci
+def test_figures_are_drawn_by_the_map_and_stand_in_the_order_of_the_report(diagnosis: Diagnosis) -> None:
+    drawn: list[str] = []
+
+    def draw_backwards(function: Callable[[Any], Any], names: Iterable[Any], /) -> Iterator[Any]:
+        drawn.extend(names)
+        figures = {name: function(name) for name in reversed(drawn)}
+        return iter([figures[name] for name in drawn])
+
+    report = diagnosis_report("record", diagnosis, parallel_map=draw_backwards)
+    assert drawn == ["over-time", "loops", "residual", "ladder"]
+    assert report == diagnosis_report("record", diagnosis)
 
 
 @pytest.mark.ci
