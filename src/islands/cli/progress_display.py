@@ -115,9 +115,15 @@ def progress(title: str, least: float = MIN_FRACTION) -> Iterator[Display]:
 
 def compile_kernels() -> None:
     """Compile the kernels if they are not in the cache, with a progress bar, and prepare for a long run."""
-    # Imported here because it loads most of the core: other commands must start fast.
-    from islands.facade.warm_up import warm_up  # noqa: PLC0415
+    # Imported here because other commands must start fast.
+    from islands.kernels.jit_cache import are_stored  # noqa: PLC0415
     from islands.processes.settings import freeze_garbage_collector  # noqa: PLC0415
+
+    if are_stored():
+        freeze_garbage_collector()
+        return
+    # It loads most of the core.
+    from islands.facade.warm_up import warm_up  # noqa: PLC0415
 
     with ExitStack() as stack:
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,12 +10,14 @@ from islands.data.dataset import Dataset
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
-from islands.evolution.engine import Engine
-from islands.evolution.search_state import SearchState
-from islands.facade.engine_choice import Ray
-from islands.facade.identify import SearchCallback, identify
 from islands.progress import ProgressCallback, Stop, ignore_progress, never_stop
 from islands.simulation.predictors import free_run
+
+if TYPE_CHECKING:
+    from islands.evolution.engine import Engine
+    from islands.evolution.search_state import SearchState
+    from islands.facade.engine_choice import Ray
+    from islands.facade.identify import SearchCallback
 
 #: Name of this step of a diagnosis.
 FORMULA = "a formula for the unexplained residual"
@@ -56,11 +58,11 @@ SIMULATED = "simulated"
 def explain_residual(
     found: Diagnosis,
     seed: int = 0,
-    engine: Engine | Ray | str | None = None,
+    engine: "Engine | Ray | str | None" = None,
     progress: ProgressCallback = ignore_progress,
-    on_epoch: SearchCallback | None = None,
+    on_epoch: "SearchCallback | None" = None,
     stop: Stop = never_stop,
-    start: SearchState | None = None,
+    start: "SearchState | None" = None,
 ) -> ResidualFormula | None:
     """Search for a formula of the residual of the best simulation of a diagnosis.
 
@@ -85,6 +87,9 @@ def explain_residual(
     is_known = ~np.isnan(residual)
     if np.sqrt(np.mean(residual[is_known] ** 2)) <= ROUNDING * record.output_range:
         return None
+    # Most diagnoses search for no formula.
+    from islands.facade.identify import identify  # noqa: PLC0415
+
     dataset = Dataset(
         u=np.column_stack([record.u[:, 0], found.best.output]),
         y=residual,

@@ -127,6 +127,12 @@ def cache_folder() -> Path | None:
     return folder
 
 
+def are_stored() -> bool:
+    """Return whether all kernels are in the cache."""
+    folder = cache_folder()
+    return folder is not None and (folder / STAMP).exists()
+
+
 def ready(compile_all: Callable[[], None], tell: Callable[[str], None]) -> bool:
     """Ensure that all kernels are compiled, by one process if several start at the same time.
 
@@ -151,7 +157,7 @@ def ready(compile_all: Callable[[], None], tell: Callable[[str], None]) -> bool:
         )
         compile_all()
         return True
-    if (folder / STAMP).exists():
+    if are_stored():
         return False
     with _lock(folder / "compiling.lock", lambda: tell("waiting for another process to compile the kernels")):
         if (folder / STAMP).exists():
