@@ -51,7 +51,7 @@ def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis
 
 
 @pytest.mark.ci
-def test_figures_are_drawn_by_the_map_and_stand_in_the_order_of_the_report(diagnosis: Diagnosis) -> None:
+def test_figures_are_drawn_by_the_map_and_keep_the_order_of_the_report(diagnosis: Diagnosis) -> None:
     drawn: list[str] = []
 
     def draw_backwards(function: Callable[[Any], Any], names: Iterable[Any], /) -> Iterator[Any]:
