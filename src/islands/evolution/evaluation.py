@@ -178,7 +178,7 @@ class Evaluator:
 
     def evaluate(
         self, population: Sequence[tuple[Individual, bool]], thresholds: Sequence[float] | None = None
-    ) -> tuple[tuple[Individual, ...], int]:
+    ) -> tuple[Offspring, int]:
         """Evaluate individuals, each with the decision whether to prune it.
 
         Parameters
@@ -191,7 +191,7 @@ class Evaluator:
 
         Returns
         -------
-        individuals : tuple of Individual
+        individuals : Offspring
             The evaluated individuals in the same order, without the genes that were removed.
         duplicates : int
             Number of individuals whose terms, after pruning, occur earlier in the population or in the cache.
@@ -199,8 +199,7 @@ class Evaluator:
         self.prepare()
         individuals = self._gene_index.number_genes([individual.genes for individual, _ in population])
         pruned = np.array([pruned for _, pruned in population], np.bool_)
-        evaluated, duplicates = self.evaluate_genes(individuals, pruned, thresholds)
-        return tuple(evaluated), duplicates
+        return self.evaluate_genes(individuals, pruned, thresholds)
 
     def evaluate_genes(
         self, individuals: Individuals, pruned: NDArray[np.bool_], thresholds: Sequence[float] | None = None
@@ -293,7 +292,7 @@ class Evaluator:
         if self._structure_bytes > self.limits.structures:
             self._clear_structures()
 
-    def evaluate_abandoned(self, abandoned: Sequence[Individual]) -> tuple[Individual, ...]:
+    def evaluate_abandoned(self, abandoned: Sequence[Individual]) -> Offspring:
         """Evaluate abandoned individuals completely."""
         return self.evaluate([(each, False) for each in abandoned])[0]
 

@@ -7,7 +7,7 @@ continues with the next size. Its structures seed the evolution, which is not bo
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
-from math import inf, isfinite
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,7 +134,7 @@ class _SwapSearch:
         thresholds = [threshold] * (self._evaluator.settings.max_terms + 1)
         evaluated, _ = self._evaluator.evaluate_genes(structures, np.zeros(count, np.bool_), thresholds)
         self._evaluations += count
-        found = [each for each in evaluated if isfinite(each.fitness)]
+        found = evaluated.take(np.flatnonzero(np.isfinite(evaluated.fitness)))
         for each in found:
             self._seen.setdefault(each.size, {}).setdefault(each.key, each)
         return _find_best(found)
