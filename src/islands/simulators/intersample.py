@@ -48,7 +48,8 @@ class ResampledSimulator(SimulatorWrapper, BatchSimulator):
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
     ) -> Signal:
         """Simulate several runs; see `Simulator.simulate_batch`."""
-        signals = {id(run.x): self._resample(run.x) for run in runs}
+        inputs = {id(run.x): run.x for run in runs}
+        signals = {key: self._resample(x) for key, x in inputs.items()}
         finer = []
         for run in runs:
             u, between = signals[id(run.x)]

@@ -144,7 +144,7 @@ def _minimise(
     """
     point = yield from problem.evaluate(start, with_jacobian=is_batch)
     damping, is_rejected = FIRST_DAMPING, False
-    for _ in range(max_iterations if start.size and np.isfinite(point.cost) else 0):
+    for remaining in reversed(range(max_iterations if start.size and np.isfinite(point.cost) else 0)):
         if float(point.residual @ point.residual) <= min_squares:
             break
         point = yield from problem.linearise(point)
@@ -156,7 +156,7 @@ def _minimise(
             trials = yield from problem.evaluate_all(steps)
         else:
             # The derivatives at the next point are simulated in the same call, unless it is the last one.
-            with_jacobian = is_batch and bool(predicted[0] > min_decrease)
+            with_jacobian = is_batch and remaining > 0 and bool(predicted[0] > min_decrease)
             trials = [(yield from problem.evaluate(steps[0], with_jacobian))]
             if not trials[0].cost < point.cost:
                 trials += yield from _try_further(problem, steps[1:], point.cost, is_batch)

@@ -240,6 +240,7 @@ class OdeSimulator(BatchSimulator):
         common = make_time(context.start_time, samples, context.dt) if Symbol(TIME) in program.signals else {}
         common |= sample_channels(context, self.channels, samples, is_held=not self.is_continuous_time)
         common = {name: signal.refine(steps) for name, signal in common.items()}
+        refined: dict[int, SampledSignal] = {}
         made: dict[tuple[int, int], SampledSignal] = {}
         names = [each.name for each in self.parameters]
         fixed = {each.name: each.value for each in self.system.parameters}
@@ -249,8 +250,10 @@ class OdeSimulator(BatchSimulator):
             gain = gain_over_time(effects, context)
             signals = dict(common)
             if run.input_key not in made:
-                refined = refine_input(run.x, self._get_between(run, context), steps)
-                made[run.input_key] = SampledSignal(run.apply_characteristic(refined.moments))
+                if id(run.x) not in refined:
+                    refined[id(run.x)] = refine_input(run.x, self._get_between(run, context), steps)
+                moments = refined[id(run.x)].moments
+                made[run.input_key] = SampledSignal(run.apply_characteristic(moments))
             driving = made[run.input_key]
             if not isinstance(gain, float):
                 if self.system.gain:
