@@ -72,6 +72,22 @@ def test_simulations_in_groups_give_the_same_fit(
     assert grouped.values.tobytes() == one_by_one.values.tobytes()
 
 
+def test_the_point_of_the_last_step_has_no_derivatives(
+    oscillator: tuple[ExtendedSimulator, Target], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulation, target = oscillator
+    simulate, sizes = ExtendedSimulator.simulate_batch, list[int]()
+
+    def count(simulation: ExtendedSimulator, points: Any, near: Any = None) -> Any:
+        sizes.append(len(points))
+        return simulate(simulation, points, near)
+
+    monkeypatch.setattr(levenberg_marquardt, "MIN_BATCHED_SAMPLES", 1)
+    monkeypatch.setattr(ExtendedSimulator, "simulate_batch", count)
+    calibrate(simulation, target, 1.01 * simulation.nominal, max_iterations=1)
+    assert sizes == [1 + simulation.nominal.size, 1]
+
+
 def test_short_record_has_one_fit_of_states_for_a_point_and_its_derivatives(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
