@@ -1,7 +1,6 @@
 """Parallel map: a function applied to each of several arguments, with the results in order."""
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Protocol, TypeVar
 
 from islands.available_cpus import count_cpus
@@ -37,6 +36,8 @@ def map_over_record(function: Callable[[A], R], arguments: Iterable[A], samples:
     samples : int
         Length of the record.
     """
+    from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - every command imports this module
+
     threads = count_cpus()
     if samples < _LONG or threads == 1:
         yield from map(function, arguments)

@@ -108,6 +108,8 @@ class LibraryFit:
         Number of samples before the first prediction.
     searches : tuple of SubsetSearch
         Searches for subsets of the library, one for the signals as recorded and one for their deviations.
+    subsets : tuple of tuple of Structure
+        Subsets of each search from which the fit started.
     refit : callable
         Fits the library again, with other subsets in place of those of the searches.
     steps : Steps
@@ -119,6 +121,7 @@ class LibraryFit:
     estimates: list[ValidatedModel[DynamicModel]]
     warm_up: int
     searches: tuple[SubsetSearch, ...]
+    subsets: tuple[Subsets, ...]
     refit: Callable[[Sequence[Subsets]], "LibraryFit"]
     steps: Steps
 
@@ -137,7 +140,7 @@ class LibraryFit:
         skip = partial(self.steps.skip, CERTIFICATES)
         tables = [each.certify(settings["certificate"], skip) for each in self.searches]
         subsets = [tuple(each.structure for each in table) for table in tables]
-        known = [each.structures[: len(some)] for each, some in zip(self.searches, subsets, strict=True)]
+        known = [each[: len(some)] for each, some in zip(self.subsets, subsets, strict=True)]
         fit = self if subsets == known else self._fit_again(subsets)
         certificates = {each.terms: each for each in (reduce(combine_certificates, tables) if tables else ())}
         found = replace(fit.found, search=replace(fit.found.search, certificates=certificates))
@@ -206,7 +209,7 @@ def fit_library(
     interval = count_means(shooting, samples)
     swaps = rated.make_settings(settings.max_terms, interval)
     exchange = bool(settings.certificate)
-    structures, searches, warm_up = _select(split, rated, swaps, exchange, subsets, steps)
+    structures, searches, started, warm_up = _select(split, rated, swaps, exchange, subsets, steps)
     models, outcomes = _estimate(structures, split, settings, swaps, warm_up, steps)
     best_of_size: dict[int, Assessment] = {}
     for ranked in rank_models(models):
@@ -239,7 +242,7 @@ def fit_library(
         progress(text, None)  # the fraction never falls
 
     refit = partial(fit_library, record, start, library, settings, seed, report_again, stop)
-    return LibraryFit(result, samples, estimates, warm_up, searches, refit, steps)
+    return LibraryFit(result, samples, estimates, warm_up, searches, started, refit, steps)
 
 
 def _estimate(
@@ -302,8 +305,8 @@ def _select(
     exchange: bool,
     subsets: Sequence[Subsets],
     steps: Steps,
-) -> tuple[list[tuple[Structure, Offsets]], tuple[SubsetSearch, ...], int]:
-    """Return structures, each with the offsets of its signals, the searches, and the largest lag."""
+) -> tuple[list[tuple[Structure, Offsets]], tuple[SubsetSearch, ...], tuple[Subsets, ...], int]:
+    """Return structures with the offsets of their signals, searches, their subsets, and the largest lag."""
     # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
     # in deviations from it. The validation data tell which one holds.
     record, constraints = split.estimation, settings.constraints
@@ -312,6 +315,7 @@ def _select(
         tried = [find_offsets(record, limit) for limit in (LARGE_OFFSET, OPERATING_POINT)]
     structures: list[tuple[Structure, Offsets]] = []
     searches: list[SubsetSearch] = []
+    started: list[Subsets] = []
     warm_up = 0
     for offsets in dict.fromkeys(tried):
         deviations = Split(*(subtract_offsets(part, offsets) for part in (record, split.validation)))
@@ -327,12 +331,13 @@ def _select(
         steps.report(f"best subsets of {len(pool)} candidates", 0.0)
         if exchange:
             searches.append(SubsetSearch(problem, settings.max_terms))
-            known = len(searches) <= len(subsets)
-            starts += subsets[len(searches) - 1] if known else searches[-1].structures
+            is_given = len(searches) <= len(subsets)
+            started.append(subsets[len(searches) - 1] if is_given else searches[-1].structures)
+            starts += started[-1]
         exchanged = select_pool(pool, problem, settings.max_terms)
         chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, steps)]
         structures += [(structure, offsets) for structure in chosen]
-    return list(dict.fromkeys(structures)), tuple(searches), warm_up
+    return list(dict.fromkeys(structures)), tuple(searches), tuple(started), warm_up
 
 
 def _search_swaps(

@@ -34,7 +34,7 @@ def searched(monkeypatch):
         model = make_model(terms, dataset.input_names, dataset.output_name)
         return SimpleNamespace(models=[SimpleNamespace(model=model)])
 
-    monkeypatch.setattr(module, "identify", search)
+    monkeypatch.setattr("islands.facade.identify.identify", search)
 
 
 def test_a_formula_has_the_names_of_the_record():

@@ -22,6 +22,6 @@ def test_a_better_subset_of_the_certificates_is_fitted():
     ((subsets, again),) = found
     certified = [each.structure for each in complete.search.certificates.values()]
     assert [list(each) for each in subsets] == [certified]
-    assert certified != list(fit.selections[0].subsets)
+    assert certified != list(fit.subsets[0])
     assert [each.model for each in complete.models] == [each.model for each in again.found.models]
     assert replace(again, refit=None).complete().search.certificates == complete.search.certificates
