@@ -24,10 +24,10 @@ from islands.inspection.stamp_regularity import NO_BREAKS, TimeStamps, describe_
 from islands.io.records.column_names import find_column, split_structures
 from islands.io.records.preview import ColumnPreview, Preview, preview_table
 from islands.io.records.reader import open_record
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, KEEP, ReadingOptions
 from islands.io.records.sampling.time_step import time_scale
 from islands.io.records.table import Columns, Table
-from islands.io.records.table_reading import read_table
+from islands.io.records.table_reading import exclude_gross_errors, read_table
 from islands.io.records.validation import MIN_SAMPLES, check_choice
 
 #: Columns that are read to choose inputs and output, at most.
@@ -164,6 +164,9 @@ class _FileInspection:
         choice = choose_columns(usable, given, output)
         if inputs and choice.inputs:
             choice = replace(choice, inputs=inputs)
+        errors, excluded = self._find_gross_errors(read, choice)
+        if self.reading.outliers != KEEP:
+            values |= errors
         stamps, sampling = self._describe_sampling(read, size)
         warnings = [warning for warning in self.found.warnings if warning != sampling.problem]
         record, facts = None, RecordFacts(())
@@ -172,7 +175,7 @@ class _FileInspection:
             is_repaired = self.reading.gaps is not None or self.reading.resample is not None
             record = repaired if is_repaired else self._cut(values, choice, sampling.dt or 1.0, stamps)
             facts = measure_facts(record) if record is not None else facts
-            warnings.append(problem)
+            warnings += [problem, *excluded]
         if sampling.dt is None and facts.facts:
             warnings.append(_NO_SAMPLING_TIME)
         return RecordInspection(
@@ -196,6 +199,27 @@ class _FileInspection:
             if name in chosen or (name in first and (output is None or not inputs)):
                 read[name] = self.table.read((name,), self.rows)
         return read
+
+    def _find_gross_errors(
+        self, read: Mapping[str, Columns], choice: ColumnChoice
+    ) -> tuple[Mapping[str, NDArray[np.float64]], Sequence[str]]:
+        """Return the chosen columns without their gross errors, and warnings about them."""
+        if not choice.output:
+            return {}, ()
+        names = [find_column(name, self.table.names) for name in choice.inputs]
+        columns = replace(
+            read[choice.output], numbers={name: read[name].numbers[name] for name in (*names, choice.output)}
+        )
+        try:
+            found, excluded = exclude_gross_errors(
+                columns, names, choice.output, replace(self.reading, outliers=EXCLUDE)
+            )
+        except RecordError:
+            return {}, ()  # the reading of the record reports it
+        treatment = "are left out; --outliers keep uses them"
+        if self.reading.outliers == KEEP:
+            treatment = "are used; --outliers exclude leaves them out"
+        return found.numbers, [f"{errors} {treatment}" for errors in excluded]
 
     @staticmethod
     def _most_common_length(values: Mapping[str, NDArray[np.float64]]) -> int:

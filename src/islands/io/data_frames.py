@@ -18,6 +18,7 @@ from islands.errors import RecordError, SettingsError
 from islands.io.memory_columns import MemoryColumns, read_columns_in_memory
 from islands.io.records.column_names import find_column, looks_like_time, seconds_per_unit
 from islands.io.records.formats.columnar import ColumnarFile
+from islands.io.records.reading_options import EXCLUDE, ReadingOptions
 from islands.io.records.table_reading import read_table
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def as_record(
     *,
     inputs: str | Sequence[str] = (),
     output: str | None = None,
+    outliers: str = EXCLUDE,
     missing_output: bool = False,
     resting_inputs: bool = False,
 ) -> Dataset:
@@ -63,6 +65,8 @@ def as_record(
         sample early.
     output : str
         Name of the output column.
+    outliers : str
+        ``exclude`` treats gross errors of the output as missing values, ``keep`` uses them.
     missing_output : bool
         Accept missing values of the output and constant columns, for a simulation.
     resting_inputs : bool
@@ -88,7 +92,11 @@ def as_record(
             )
         return data
     if y is None and isinstance(data, list | tuple) and data and _is_recording(data[0]):
-        accepted = {"missing_output": missing_output, "resting_inputs": resting_inputs}
+        accepted: dict[str, Any] = {
+            "outliers": outliers,
+            "missing_output": missing_output,
+            "resting_inputs": resting_inputs,
+        }
         made = (_read_one(each, dt, inputs, output, accepted) for each in data)
         return join(tuple(made))
     columns = read_columns_in_memory(data)
@@ -108,7 +116,10 @@ def as_record(
             f"no output is given: take one of the columns {', '.join(table.names)} as output=..."
         )
     record = read_table(
-        table, _TITLE, inputs, output, dt, missing_output=missing_output, resting_inputs=resting_inputs
+        *(table, _TITLE, inputs, output, dt),
+        missing_output=missing_output,
+        options=ReadingOptions(outliers=outliers),
+        resting_inputs=resting_inputs,
     )
     names = [*record.input_names, output]
     units = [
@@ -136,7 +147,7 @@ def _read_one(
     dt: float | None,
     inputs: str | Sequence[str],
     output: str | None,
-    accepted: Mapping[str, bool],
+    accepted: Mapping[str, Any],
 ) -> Dataset:
     if isinstance(data, Dataset):
         return data

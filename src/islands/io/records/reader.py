@@ -17,7 +17,7 @@ from islands.io.records.formats.packed import PACKED, open_packed
 from islands.io.records.formats.parquet import read_parquet
 from islands.io.records.formats.tdms import read_tdms
 from islands.io.records.formats.text.table import read_delimited
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, ReadingOptions
 from islands.io.records.table import Table
 from islands.io.records.table_reading import read_table
 
@@ -59,6 +59,7 @@ def read_record(
     timezone: str | None = None,
     resample: float | None = None,
     gaps: str | None = None,
+    outliers: str = EXCLUDE,
     resting_inputs: bool = False,
 ) -> Dataset:
     """Read inputs and an output from a file and check them.
@@ -115,6 +116,9 @@ def read_record(
     gaps : str, optional
         For gaps in the time and missing values: ``split`` makes each part a segment, ``interpolate`` fills
         them linearly.
+    outliers : str
+        ``exclude`` treats gross errors of the output as missing values: isolated spikes, codes of missing
+        values such as -9999, and parts in which a sensor is stuck. ``keep`` uses them.
     resting_inputs : bool
         Accept constant inputs, as of a creep test. A diagnosis can use such a record, an identification
         cannot.
@@ -123,7 +127,7 @@ def read_record(
     -------
     Dataset
         float64 with the columns' names and units; ``start`` is the time of the first sample; ``reading``
-        states what ``resample`` and ``gaps`` have done.
+        states what ``resample``, ``gaps`` and ``outliers`` have done.
 
     Raises
     ------
@@ -132,7 +136,9 @@ def read_record(
     SettingsError
         An option is invalid.
     """
-    options = ReadingOptions(tuple(names), header, time, sheet, decimal, dates, timezone, resample, gaps)
+    options = ReadingOptions(
+        tuple(names), header, time, sheet, decimal, dates, timezone, resample, gaps, outliers
+    )
     return read_dataset(path, inputs, output, dt, rows, missing_output, options, resting_inputs)
 
 

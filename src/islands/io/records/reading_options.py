@@ -17,6 +17,9 @@ DATE_ORDERS = ("day-first", "month-first")
 #: Values of ``gaps``.
 GAPS = ("split", "interpolate")
 
+#: Values of ``outliers``.
+EXCLUDE, KEEP = "exclude", "keep"
+
 
 def _option(help_text: str, default: Any = None) -> Any:
     return field(default=default, metadata={"help": help_text})
@@ -47,6 +50,8 @@ class ReadingOptions:
         Sampling time in seconds to which the record is resampled.
     gaps : str, optional
         ``split`` makes a segment of each part between gaps, ``interpolate`` fills them.
+    outliers : str
+        ``exclude`` treats gross errors of the output as missing values, ``keep`` uses them.
 
     Raises
     ------
@@ -63,6 +68,10 @@ class ReadingOptions:
     timezone: str | None = _option("Time zone of time stamps without offset, as Europe/Berlin.")
     resample: float | None = _option("Resample to this sampling time in seconds.")
     gaps: str | None = _option("Gaps and missing values: split into segments, or interpolate.")
+    outliers: str = _option(
+        "Gross errors of the output (isolated spikes, codes such as -9999, a stuck sensor): exclude or keep.",
+        EXCLUDE,
+    )
 
     def __post_init__(self) -> None:
         names = tuple(name.strip() for name in self.names)
@@ -72,6 +81,7 @@ class ReadingOptions:
         _check_choice("decimal", self.decimal, DECIMAL_MARKS)
         _check_choice("dates", self.dates, DATE_ORDERS)
         _check_choice("gaps", self.gaps, GAPS)
+        _check_choice("outliers", self.outliers, (EXCLUDE, KEEP))
         if self.resample is not None and not (isfinite(self.resample) and self.resample > 0):
             raise SettingsError(f"--resample is a number of seconds above 0, got {self.resample}")
         _check_timezone(self.timezone)

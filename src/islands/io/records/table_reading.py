@@ -1,19 +1,23 @@
 """Inputs and an output of an open table, with checks for all that would make an identification fail."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from islands.data.channel_names import AT_ONCE, parse_unit
 from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_inputs
+from islands.errors import RecordError
+from islands.inspection.gross_errors import find_gross_errors, find_input_codes
 from islands.io.records.column_names import find_column, split_structures, time_column
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.reading_options import DEFAULT_READING, KEEP, ReadingOptions
 from islands.io.records.sampling.recording import Recording, UniformRecording
 from islands.io.records.sampling.repair import make_uniform
 from islands.io.records.sampling.time_step import find_sampling, make_recording
-from islands.io.records.table import Table
+from islands.io.records.table import Columns, Table
 from islands.io.records.validation import (
+    and_others,
     check_choice,
     check_length,
     check_repaired,
@@ -64,6 +68,7 @@ def read_table(
     columns = table.read(tuple(dict.fromkeys((*chosen, *([clock] if clock else [])))), rows)
     # A simulation needs no more samples than the lags of its model, which it checks.
     check_length(columns, *([2] if missing_output else []))
+    columns, excluded = exclude_gross_errors(columns, sources, output, options)
     required = [name for name in columns.numbers if not (missing_output and name == output)]
     if options.gaps is None:
         for name in columns.numbers:
@@ -77,8 +82,48 @@ def read_table(
         found = _repair(recording, chosen, required, options, file)
     for name in () if missing_output else (*(() if resting_inputs else sources), *outputs):
         check_varies(columns, name)
-    record = _make_record(found, sources, output, structures, file)
+    record = _make_record(
+        replace(found, steps=(*(f"{each} are left out" for each in excluded), *found.steps)),
+        sources,
+        output,
+        structures,
+        file,
+    )
     return advance_inputs(record, _find_advanced(inputs, sources))
+
+
+def exclude_gross_errors(
+    columns: Columns, inputs: Sequence[str], output: str | None, options: ReadingOptions
+) -> tuple[Columns, tuple[str, ...]]:
+    """Return the columns with missing values in place of gross errors, and what the errors are.
+
+    Raises
+    ------
+    RecordError
+        An input has codes of missing values, and the options do not say what becomes of the gaps.
+    """
+    if options.outliers == KEEP or output is None:
+        return columns, ()
+    numbers, excluded = dict(columns.numbers), []
+    for name in dict.fromkeys(inputs):
+        for code, samples in find_input_codes(numbers[name]).items():
+            if options.gaps is None:
+                raise RecordError(
+                    f"{columns.rows.place(int(samples[0]), name)}{and_others(samples.size)} {code:.12g}, a "
+                    "code of missing values: give --gaps split to leave the rows out or --gaps interpolate "
+                    "to fill them (library: gaps=), or --outliers keep (outliers=) if it is a value"
+                )
+            numbers[name] = np.where(numbers[name] == code, np.nan, numbers[name])
+            excluded.append(
+                f"gross errors of {name}: {samples.size} times {code:.12g}, a code of missing values"
+            )
+    errors = find_gross_errors(numbers[output], np.column_stack([numbers[name] for name in inputs]))
+    if errors.samples.size:
+        y = numbers[output].copy()
+        y[errors.samples] = np.nan
+        numbers[output] = y
+        excluded.append(f"gross errors of {output}: {errors.describe(columns.rows.row)}")
+    return replace(columns, numbers=numbers), tuple(excluded)
 
 
 def _repair(

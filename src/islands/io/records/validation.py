@@ -139,13 +139,16 @@ def check_values(columns: Columns, name: str, missing: bool = False) -> None:
             f"{rows.place(sample, name)} and all below, to {rows.row(-1)}, are empty or NaN: the channels "
             "have unequal lengths; complete the column or select the rows that are complete"
         )
-    count = int(absent.sum())
-    others = f" and {count - 1} more of its cells" if count > 1 else ""
     raise RecordError(
-        f"{rows.place(sample, name)}{others} {'are' if count > 1 else 'is'} empty or NaN: give --gaps "
+        f"{rows.place(sample, name)}{and_others(int(absent.sum()))} empty or NaN: give --gaps "
         "interpolate to fill it or "
         "--gaps split to leave the row out (library: gaps=), or select rows without it"
     )
+
+
+def and_others(cells: int) -> str:
+    """Return the end of the subject of a sentence about several cells, of which the first is named."""
+    return f" and {cells - 1} more of its cells are" if cells > 1 else " is"
 
 
 def check_repaired(values: NDArray[np.float64], name: str, file: str, missing: bool) -> None:

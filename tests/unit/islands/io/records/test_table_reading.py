@@ -1,0 +1,89 @@
+"""Gross errors of an output are missing values, and what was left out is stated."""
+
+import numpy as np
+import pandas
+import pytest
+from scipy.signal import lfilter
+
+import islands
+from islands.io.records import read_record
+from islands.io.records.reading_options import ReadingOptions
+from support.bad_records import refusal
+
+TIMES = 0.5 * np.arange(1200)
+U = np.repeat(np.random.default_rng(7).uniform(0, 10, 120), 10)
+Y = lfilter([0, 0.2], [1, -0.9], U) + np.random.default_rng(8).normal(0, 0.02, 1200)
+PLACES = [150, 151, 700]
+
+
+def with_values(values, column=Y):
+    changed = column.copy()
+    changed[PLACES] = values
+    return changed
+
+
+def write(path, u=U, y=Y):
+    rows = [f"{t:g},{a:.9g},{b:.9g}" for t, a, b in zip(TIMES, u, y, strict=True)]
+    path.write_text("\n".join(["t_s,u,y", *rows]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("values", "errors"),
+    [
+        ((-50, -50, 60), "3 isolated spikes (line 152, line 153, line 702)"),
+        (-9999, "3 times -9999, a code of missing values (line 152, line 153, line 702)"),
+    ],
+)
+def test_gross_errors_of_the_output_are_missing_values(tmp_path, values, errors):
+    file = write(tmp_path / "r.csv", y=with_values(values))
+    record = read_record(file, ["u"], "y")
+    assert np.flatnonzero(np.isnan(record.y)).tolist() == PLACES
+    assert record.reading == (f"gross errors of y: {errors} are left out",)
+    kept = read_record(file, ["u"], "y", outliers="keep")
+    assert np.isfinite(kept.y).all()
+    assert kept.reading == ()
+    frame = pandas.DataFrame({"u": U, "y": with_values(values)}, index=TIMES)
+    assert np.isnan(islands.as_record(frame, inputs="u", output="y").y[PLACES]).all()
+    assert not np.isnan(islands.as_record(frame, inputs="u", output="y", outliers="keep").y).any()
+
+
+def test_a_sound_record_has_no_statement(tmp_path):
+    record = read_record(write(tmp_path / "r.csv"), ["u"], "y")
+    assert record.reading == ()
+    assert np.isfinite(record.y).all()
+
+
+def test_a_code_in_an_input_is_refused_without_gaps(tmp_path):
+    rows = write(tmp_path / "r.csv", u=with_values(-9999, U)).read_text().splitlines()
+    message = refusal(tmp_path, rows, inputs=("u",), output="y")
+    assert message.startswith(
+        "bad.csv, line 152, column u and 2 more of its cells are -9999, a code of missing"
+    )
+    assert "--gaps split" in message
+    assert "--outliers keep" in message
+    record = read_record(tmp_path / "bad.csv", ["u"], "y", gaps="split")
+    assert record.segments == (150, 548, 499)
+    assert record.reading[0] == "gross errors of u: 3 times -9999, a code of missing values are left out"
+    assert read_record(tmp_path / "bad.csv", ["u"], "y", outliers="keep").u.min() == -9999
+
+
+def test_an_inspection_measures_facts_without_gross_errors_and_warns(tmp_path):
+    file = write(tmp_path / "r.csv", y=with_values((-50, -50, 60)))
+    found = islands.inspect_record(file, ["u"], "y")
+    assert found.find("dead-time").value == 1
+    assert "3 isolated spikes (line 152, line 153, line 702) are left out" in found.warnings[0]
+    assert "--outliers keep" in found.warnings[0]
+    kept = islands.inspect_record(file, ["u"], "y", reading=ReadingOptions(outliers="keep"))
+    assert "are used; --outliers exclude leaves them out" in kept.warnings[0]
+    assert "--outliers keep" in kept.command
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("values", [(-50, -50, 60), (-9999, -9999, -9999)])
+def test_the_law_is_found_in_a_record_with_gross_errors(tmp_path, values):
+    result = islands.fit(read_record(write(tmp_path / "r.csv", y=with_values(values)), ["u"], "y"))
+    assert [item.text for item in result.best.model.regressors] == ["y(k-1)", "u1(k-1)"]
+    assert result.best.model.parameters == pytest.approx((0.9, 0.2), abs=0.002)
+    assert result.best.metrics["validation"]["free_run"].rmse < 0.0215
+    assert "3 isolated spikes" in str(result) or "3 times -9999" in str(result)
