@@ -44,8 +44,9 @@ _Columns = list[NDArray[np.float64]]
 def find_direct_inputs(record: Dataset) -> tuple[int, ...]:
     """Return the indices of the inputs to which the output responds within the sample, from 0.
 
-    Several inputs are tested in the order of their gains, each together with those found before, so that an
-    input is not taken for another one that is correlated with it.
+    The input with the largest gain is found first, then that with the largest gain together with those found
+    before: an input is not taken for another one that is correlated with it, and its response may depend on
+    the others.
 
     Parameters
     ----------
@@ -57,11 +58,13 @@ def find_direct_inputs(record: Dataset) -> tuple[int, ...]:
         return ()
     signals = [_standardise(signal) for signal in (record.y, *record.u.T)]
     varying = [place for place in range(record.inputs) if np.ptp(record.u[:, place]) > 0.0]
-    gains = {place: _compute_gain(signals, rows, place, ()) for place in varying}
     found: list[int] = []
-    for place in sorted(varying, key=lambda place: -gains[place]):
-        if gains[place] > 0.0 and (not found or _compute_gain(signals, rows, place, found) > 0.0):
-            found.append(place)
+    while others := [place for place in varying if place not in found]:
+        gains = {place: _compute_gain(signals, rows, place, found) for place in others}
+        best = max(others, key=lambda place: gains[place])
+        if not gains[best] > 0.0:
+            break
+        found.append(best)
     return tuple(sorted(found))
 
 
@@ -96,8 +99,9 @@ def _compute_gain(
         if other != place:
             past += [signal[rows - 1], *_lag_increments(signal, rows, _OTHER_LAGS)]
         if other in given:
-            past += _multiply_increment(signal, rows, y[rows - 1])
+            past += [*_multiply_increment(signal, rows, y[rows - 1]), tested[rows - 1] * signal[rows]]
     present = _multiply_increment(tested, rows, y[rows - 1])
+    present += [(tested[rows] - tested[rows - 1]) * signals[1 + other][rows] for other in given]
     columns = np.array([*past, *present]).T
     if rows.size < _ROWS_PER_COLUMN * _FOLDS * columns.shape[1]:
         return 0.0
