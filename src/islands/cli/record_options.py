@@ -16,6 +16,9 @@ _PREFIX = "reading_"
 #: Types of options that are not an optional text.
 _TYPES: dict[str, Any] = {"resample": float | None}
 
+#: Options of several words, with commas between them.
+_LISTS = frozenset({"names", "missing"})
+
 
 def _make_option(option: Field[Any]) -> Parameter:
     if option.name == "header":
@@ -41,6 +44,6 @@ def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
 def _collect(values: dict[str, Any]) -> ReadingOptions:
     changes = {name.removeprefix(_PREFIX): value for name, value in values.items() if value is not None}
     changes["header"] = not changes["header"]
-    if "names" in changes:
-        changes["names"] = tuple(changes["names"].split(","))
+    for name in _LISTS.intersection(changes):
+        changes[name] = tuple(changes[name].split(","))
     return ReadingOptions(**changes)

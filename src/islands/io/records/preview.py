@@ -9,7 +9,7 @@ import numpy as np
 
 from islands.data.channel_names import parse_unit
 from islands.errors import RecordError
-from islands.io.records.column_names import split_structures, time_column
+from islands.io.records.column_names import find_column, split_structures, time_column
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.sampling.time_step import find_sampling
@@ -104,10 +104,13 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
         _error_message(check_length, columns[main]) if main else "",
         sampling_problem,
         *table.remarks(tuple(columns)),
+        *dict.fromkeys(note for column in columns.values() for note in column.notes),
     )
     return Preview(
         columns=tuple(
-            _preview_column(name, parse_unit(name.removeprefix(structure)), columns.get(name), problems[name])
+            _preview_column(
+                name, _find_unit(name, structure, columns.get(name)), columns.get(name), problems[name]
+            )
             for name, structure in split_structures(table.names).items()
             if name
         ),
@@ -179,7 +182,8 @@ def _preview_sampling(
     time = None
     structure = split_structures(table.names)[main] if main else ""
     try:
-        time = given or time_column(table.names, file, structure=structure, clocks=table.clocks)
+        named = None if given is None else find_column(given, table.names)
+        time = named or time_column(table.names, file, structure=structure, clocks=table.clocks)
         source = time or main
         if source is not None and source in problems:
             return time, None, problems[source]
@@ -203,6 +207,10 @@ def _find_problem(column: Columns, name: str, is_time: bool) -> str:
     return _error_message(check_values, column, name) or (
         "" if is_time else _error_message(check_varies, column, name)
     )
+
+
+def _find_unit(name: str, structure: str, column: Columns | None) -> str:
+    return parse_unit(name.removeprefix(structure)) or ("" if column is None else column.units.get(name, ""))
 
 
 def _preview_column(name: str, unit: str, column: Columns | None, problem: str) -> ColumnPreview:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
+from islands.io.records.content import find_suffix
 from islands.io.records.formats.excel import read_workbook
 from islands.io.records.formats.hdf5 import read_hdf5
 from islands.io.records.formats.mat.file import read_matlab
@@ -16,7 +17,7 @@ from islands.io.records.formats.npz import read_archive
 from islands.io.records.formats.packed import PACKED, open_packed
 from islands.io.records.formats.parquet import read_parquet
 from islands.io.records.formats.tdms import read_tdms
-from islands.io.records.formats.text.table import read_delimited
+from islands.io.records.formats.text.table import DelimitedText, read_delimited
 from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, ReadingOptions
 from islands.io.records.table import Table
 from islands.io.records.table_reading import read_table
@@ -58,6 +59,7 @@ def read_record(
     dates: str | None = None,
     timezone: str | None = None,
     resample: float | None = None,
+    missing: Sequence[str] = (),
     gaps: str | None = None,
     outliers: str = EXCLUDE,
     resting_inputs: bool = False,
@@ -113,6 +115,9 @@ def read_record(
     resample : float, optional
         Sampling time in seconds of a new uniform grid, by linear interpolation; before a coarser grid a
         low-pass filter removes frequencies above half of the new rate.
+    missing : sequence of str, optional
+        Words and numbers in cells that mean a missing value (``"Failed"``, ``"-9999"``), in addition to those
+        that are known: ``OL``, ``#DIV/0!``, ``Bad Input``, ``No Data``, ``?`` and others.
     gaps : str, optional
         For gaps in the time and missing values: ``split`` makes each part a segment, ``interpolate`` fills
         them linearly.
@@ -137,7 +142,17 @@ def read_record(
         An option is invalid.
     """
     options = ReadingOptions(
-        tuple(names), header, time, sheet, decimal, dates, timezone, resample, gaps, outliers
+        names=tuple(names),
+        header=header,
+        time=time,
+        sheet=sheet,
+        decimal=decimal,
+        dates=dates,
+        timezone=timezone,
+        resample=resample,
+        missing=(missing,) if isinstance(missing, str) else tuple(missing),
+        gaps=gaps,
+        outliers=outliers,
     )
     return read_dataset(path, inputs, output, dt, rows, missing_output, options, resting_inputs)
 
@@ -182,12 +197,14 @@ def fingerprint(path: str | Path) -> str:
 
 
 def open_record(path: str | Path, options: ReadingOptions = DEFAULT_READING) -> Table:
-    """Open a file with the reader for its suffix.
+    """Open a file with the reader for its content, or for its suffix.
+
+    Text is read as a table whatever the name of the file.
 
     Raises
     ------
     RecordError
-        The file does not exist, cannot be read, or its suffix is not in `READERS`.
+        The file does not exist, cannot be read, or has no format of `READERS`.
     """
     file = _check_readable(path)
     if file.suffix.lower() in PACKED:
@@ -196,13 +213,13 @@ def open_record(path: str | Path, options: ReadingOptions = DEFAULT_READING) -> 
 
 
 def _open_file(file: Path, options: ReadingOptions) -> Table:
-    reader = READERS.get(file.suffix.lower())
-    if reader is None:
-        raise RecordError(
-            f"{file.name}: files ending in '{file.suffix}' are not supported, only {', '.join(READERS)}, "
-            "also compressed as .gz or .zip: export the record to one of these"
-        )
-    return reader(file, options)
+    texts = [suffix for suffix, reader in READERS.items() if reader is read_delimited]
+    suffix = find_suffix(file, READERS, texts, options)
+    table = READERS[suffix](file, options)
+    own = file.suffix.lower()
+    if isinstance(table, DelimitedText) and suffix != own and own in {*READERS, ".xls"}:
+        table = replace(table, notes=(f"{file.name} is text and is read as a table of text", *table.notes))
+    return table
 
 
 def _check_readable(path: str | Path) -> Path:

@@ -48,6 +48,9 @@ class ReadingOptions:
         Time zone of time stamps without an offset, such as ``Europe/Berlin``.
     resample : float, optional
         Sampling time in seconds to which the record is resampled.
+    missing : tuple of str
+        Words and numbers in cells that mean a missing value, in addition to the words that are known, such as
+        ``OL`` and ``#DIV/0!``.
     gaps : str, optional
         ``split`` makes a segment of each part between gaps, ``interpolate`` fills them.
     outliers : str
@@ -67,6 +70,9 @@ class ReadingOptions:
     dates: str | None = _option("Order in dates such as 3/4/2026: day-first or month-first.")
     timezone: str | None = _option("Time zone of time stamps without offset, as Europe/Berlin.")
     resample: float | None = _option("Resample to this sampling time in seconds.")
+    missing: tuple[str, ...] = _option(
+        "Words and numbers that mean a missing value, as Failed,-9999; OL, #DIV/0! and others are known.", ()
+    )
     gaps: str | None = _option("Gaps and missing values: split into segments, or interpolate.")
     outliers: str = _option(
         "Gross errors of the output (isolated spikes, codes such as -9999, a stuck sensor): exclude or keep.",
@@ -78,6 +84,10 @@ class ReadingOptions:
         if not all(names) or len(set(names)) < len(names):
             raise SettingsError(f"--names {','.join(names)}: give every column another name")
         object.__setattr__(self, "names", names)
+        words = tuple(word.strip() for word in self.missing)
+        if not all(words):
+            raise SettingsError("--missing: a word is empty; empty cells are missing values without it")
+        object.__setattr__(self, "missing", words)
         _check_choice("decimal", self.decimal, DECIMAL_MARKS)
         _check_choice("dates", self.dates, DATE_ORDERS)
         _check_choice("gaps", self.gaps, GAPS)

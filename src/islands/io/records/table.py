@@ -1,7 +1,8 @@
 """Interface of a record reader: the columns of an opened file and their numbers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -54,12 +55,55 @@ class Columns:
         Index of the first selected sample in the file, from 0.
     clocks : frozenset of str
         Columns of time stamps: their numbers are seconds after the first selected sample.
+    starts : tuple of int
+        Samples that follow a repeated header of the file.
+    notes : tuple of str
+        What was assumed about cells and rows, such as missing values and a footer.
+    units : mapping of str to str
+        Units in cells, of columns whose names do not state them.
     """
 
     rows: RowRange
     numbers: Mapping[str, NDArray[np.float64]]
     first: int
     clocks: frozenset[str] = frozenset()
+    starts: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def split(self, time: str | None) -> tuple["Columns", ...]:
+        """Return the recordings: the samples between repeated headers.
+
+        A header after which the time continues with the usual step, as in a listing of pages, does not begin
+        a recording.
+
+        Parameters
+        ----------
+        time : str or None
+            The time column; without one, every header begins a recording.
+        """
+        starts = self.starts if time is None else self._find_jumps(self.numbers[time])
+        if not starts:
+            return (self,)
+        ends = pairwise((0, *starts, len(self.rows)))
+        return tuple(self._cut(slice(begin, end)) for begin, end in ends)
+
+    def _find_jumps(self, stamps: NDArray[np.float64]) -> tuple[int, ...]:
+        """Return the starts at which the time does not continue with the usual step."""
+        if not self.starts:
+            return ()
+        steps = np.diff(stamps)
+        usual = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
+        return tuple(at for at in self.starts if not abs(steps[at - 1] - usual) < 0.5 * usual)
+
+    def _cut(self, kept: slice) -> "Columns":
+        return replace(
+            self,
+            rows=RowRange(self.rows.file, self.rows.counted, self.rows.numbers[kept]),
+            numbers={name: column[kept] for name, column in self.numbers.items()},
+            first=self.first + kept.start,
+            starts=(),
+        )
 
 
 class Table(Protocol):

@@ -13,7 +13,7 @@ from islands.inspection.gross_errors import find_gross_errors, find_input_codes
 from islands.io.records.column_names import find_column, split_structures, time_column
 from islands.io.records.reading_options import DEFAULT_READING, KEEP, ReadingOptions
 from islands.io.records.sampling.recording import Recording, UniformRecording
-from islands.io.records.sampling.repair import make_uniform
+from islands.io.records.sampling.repair import join_recordings, make_uniform
 from islands.io.records.sampling.time_step import find_sampling, make_recording
 from islands.io.records.table import Columns, Table
 from islands.io.records.validation import (
@@ -61,10 +61,11 @@ def read_table(
     output = None if output is None else find_column(output, table.names)
     outputs = () if output is None else (output,)
     chosen = (*sources, *outputs)
-    check_choice(table.names, sources, output, file, options.time, table.others)
+    time = None if options.time is None else find_column(options.time, table.names)
+    check_choice(table.names, sources, output, file, time, table.others)
     structures = split_structures(table.names)
     structure = structures[chosen[-1]]
-    clock = options.time or time_column(table.names, file, chosen, structure, table.clocks)
+    clock = time or time_column(table.names, file, chosen, structure, table.clocks)
     columns = table.read(tuple(dict.fromkeys((*chosen, *([clock] if clock else [])))), rows)
     # A simulation needs no more samples than the lags of its model, which it checks.
     check_length(columns, *([2] if missing_output else []))
@@ -73,23 +74,38 @@ def read_table(
     if options.gaps is None:
         for name in columns.numbers:
             check_values(columns, name, missing=name == output)
-    values = np.column_stack([columns.numbers[name] for name in chosen])
+    is_given = time is not None
+    parts = [part for part in columns.split(clock) if len(part.rows) > 1]
+    blocks = [np.column_stack([part.numbers[name] for name in chosen]) for part in parts]
+    steps = [
+        *columns.notes,
+        *_describe_parts(parts),
+        *(f"{errors} are left out" for errors in excluded),
+    ]
     if options.gaps is None and options.resample is None:
-        step, start = find_sampling(table, columns, clock, dt, structure, options.time is not None)
-        found = UniformRecording(values, step, step * columns.first if start is None else start, (), ())
+        step, start = find_sampling(table, columns, clock, dt, structure, is_given)
+        start = step * columns.first if start is None else start
+        segments = tuple(map(len, blocks)) if len(blocks) > 1 else ()
+        found = UniformRecording(np.concatenate(blocks), step, start, segments, tuple(steps))
     else:
-        recording = make_recording(table, columns, values, clock, dt, structure, options.time is not None)
-        found = _repair(recording, chosen, required, options, file)
+        recordings = [
+            make_recording(table, part, values, clock, dt, structure, is_given)
+            for part, values in zip(parts, blocks, strict=True)
+        ]
+        found = _repair(recordings, chosen, required, options, file)
+        found = replace(found, steps=(*steps, *found.steps))
     for name in () if missing_output else (*(() if resting_inputs else sources), *outputs):
         check_varies(columns, name)
-    record = _make_record(
-        replace(found, steps=(*(f"{each} are left out" for each in excluded), *found.steps)),
-        sources,
-        output,
-        structures,
-        file,
-    )
+    record = _make_record(found, sources, output, structures, columns.units, file)
     return advance_inputs(record, _find_advanced(inputs, sources))
+
+
+def _describe_parts(parts: Sequence[Columns]) -> list[str]:
+    if len(parts) < 2:
+        return []
+    return [
+        f"split at repeated headers into {len(parts)} segments, the second begins in {parts[1].rows.row(0)}"
+    ]
 
 
 def exclude_gross_errors(
@@ -127,7 +143,7 @@ def exclude_gross_errors(
 
 
 def _repair(
-    recording: Recording,
+    recordings: Sequence[Recording],
     chosen: Sequence[str],
     required: Sequence[str],
     options: ReadingOptions,
@@ -135,7 +151,9 @@ def _repair(
 ) -> UniformRecording:
     """Make the sampling uniform, and check the columns; those that are not required may lack values."""
     places = [place for place, name in enumerate(chosen) if name in required]
-    found = make_uniform(recording, places, options.gaps, options.resample)
+    found = join_recordings(
+        [make_uniform(recording, places, options.gaps, options.resample) for recording in recordings], file
+    )
     for name, column in zip(chosen, found.values.T, strict=True):
         check_repaired(column, name, file, missing=name not in required)
     return found
@@ -151,17 +169,22 @@ def _make_record(
     sources: Sequence[str],
     output: str | None,
     structures: Mapping[str, str],
+    units: Mapping[str, str],
     file: str,
 ) -> Dataset:
     """Return the record of input columns and an output column, the last one if it is given."""
+
+    def find_unit(name: str) -> str:
+        return parse_unit(name.removeprefix(structures[name])) or units.get(name, "")
+
     return Dataset(
         u=found.values[:, : len(sources)],
         y=np.full(len(found.values), np.nan) if output is None else found.values[:, -1],
         dt=found.dt,
         input_names=tuple(sources),
         output_name=output or "y",
-        input_units=tuple(parse_unit(source.removeprefix(structures[source])) for source in sources),
-        output_unit="" if output is None else parse_unit(output.removeprefix(structures[output])),
+        input_units=tuple(map(find_unit, sources)),
+        output_unit="" if output is None else find_unit(output),
         segments=found.segments,
         recordings=(file,) * max(1, len(found.segments)),
         start=found.start,

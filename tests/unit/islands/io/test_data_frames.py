@@ -108,7 +108,12 @@ UNUSABLE = [
     (FRAME, CHOICE, "no time column"),
     (FRAME.set_index(MOMENTS), {**CHOICE, "dt": 0.1}, "0.04 s by column time and 0.1 s"),
     (FRAME.set_index(GAP), CHOICE, "the record, sample 200, column time follows a gap"),
-    (FRAME.assign(u_V=FRAME["u_V"].astype(str)), {**CHOICE, "dt": 1.0}, "u_V holds .* where real numbers"),
+    (FRAME.assign(u_V="mild"), {**CHOICE, "dt": 1.0}, "u_V holds .* where real numbers"),
+    (
+        FRAME.assign(u_V=FRAME["u_V"].astype(str).where(FRAME.index != 7, "mild")),
+        {**CHOICE, "dt": 1.0},
+        "sample 7, column u_V: 'mild' is not a number",
+    ),
     (FRAME.assign(u_V=1.0), {**CHOICE, "dt": 1.0}, "column u_V is constant"),
     (
         FRAME.assign(u_V=FRAME["u_V"].where(FRAME.index != 7)),

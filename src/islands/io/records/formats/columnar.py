@@ -7,8 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.channel_names import is_unit
 from islands.errors import RecordError
 from islands.io.records.column_names import split_structures
+from islands.io.records.formats.text.missing_words import parse_words
+from islands.io.records.formats.text.number_parsing import parse_numbers, remove_numbers
+from islands.io.records.formats.text.quantities import find_unit
+from islands.io.records.formats.text.states import find_states
+from islands.io.records.formats.text.table_start import is_value
 from islands.io.records.table import Columns, RowRange, select
 from islands.io.records.validation import check_equal_length
 
@@ -36,6 +42,9 @@ class ColumnarFile:
         Arrays that may be single numbers. Those with a name in `SAMPLING` state the sampling.
     clocks, others
         See `islands.io.records.table.Table`.
+    missing : tuple of str
+        Words and numbers that mean a missing value, as in
+        `islands.io.records.reading_options.ReadingOptions`.
     """
 
     file: str
@@ -44,6 +53,7 @@ class ColumnarFile:
     scalars: Sequence[str] = ()
     clocks: Mapping[str, str] = field(default_factory=dict)
     others: str = ""
+    missing: tuple[str, ...] = ()
 
     def stated(self, structure: str) -> Mapping[str, float]:
         """Return the sampling times stated in the file; see `islands.io.records.table.Table`."""
@@ -62,7 +72,8 @@ class ColumnarFile:
 
     def read(self, names: Sequence[str], rows: slice | None) -> Columns:
         """Convert the named arrays over the selected rows; see `islands.io.records.table.Table`."""
-        channels = {name: _to_channel(self.load(name), name, self.file) for name in names}
+        found = {name: self._to_channel(self.load(name), name) for name in names}
+        channels = {name: channel for name, (channel, _, _) in found.items()}
         check_equal_length({name: len(channel) for name, channel in channels.items()}, self.file)
         chosen = select(rows, len(channels[names[0]]), self.file)
         return Columns(
@@ -70,7 +81,21 @@ class ColumnarFile:
             {name: channel[chosen.start : chosen.stop] for name, channel in channels.items()},
             chosen.start,
             frozenset(name for name in names if name in self.clocks),
+            notes=tuple(note for _, notes, _ in found.values() for note in notes),
+            units={name: unit for name, (_, _, unit) in found.items() if unit},
         )
+
+    def _to_channel(self, array: NDArray[Any], name: str) -> tuple[NDArray[np.float64], tuple[str, ...], str]:
+        """Convert an array, in which texts may be numbers; return what was assumed and the unit."""
+        missing = parse_words(self.missing)
+        rows = RowRange(self.file, "sample", range(array.size))
+        texts = _list_texts(array)
+        if texts is not None and (any(map(is_value, texts)) or find_states(texts)):
+            unit = find_unit(texts, missing.texts)
+            parsed = parse_numbers({name: texts}, rows, missing=missing, units={name: unit} if unit else {})
+            return parsed.numbers[name], parsed.notes, unit if is_unit(unit) else ""
+        channel = _to_channel(array, name, self.file)
+        return *remove_numbers(channel, name, missing.numbers, rows), ""
 
     def remarks(self, names: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002
         """Return which table of the file is read; nothing is inferred from arrays."""
@@ -87,9 +112,23 @@ def _check_positive(array: NDArray[Any], name: str, file: str) -> float:
     return value
 
 
+def _list_texts(array: NDArray[Any]) -> list[str] | None:
+    """Return an array of texts, numbers and None as cells; None for another array."""
+    if array.dtype.kind not in "OUT" or array.ndim != 1:
+        return None
+    values = array.tolist()
+    if not any(isinstance(value, str) for value in values):
+        return None
+    known = (str, float, int, type(None))
+    if not all(isinstance(value, known) for value in values):
+        return None
+    return ["" if value is None else str(value) for value in values]
+
+
 def _to_channel(array: NDArray[Any], name: str, file: str) -> NDArray[np.float64]:
     if array.dtype.kind not in "fiub":
-        raise RecordError(f"{file}: column {name} holds {array.dtype} where real numbers are expected")
+        kind = "string" if array.dtype.kind == "O" and _list_texts(array) is not None else array.dtype
+        raise RecordError(f"{file}: column {name} holds {kind} where real numbers are expected")
     if not (array.ndim == 1 or (array.ndim == 2 and 1 in array.shape)):
         raise RecordError(
             f"{file}: column {name} has the shape {array.shape}, a channel has (samples,): save one "

@@ -63,14 +63,20 @@ def read_workbook(path: Path, options: ReadingOptions = DEFAULT_READING) -> Deli
         raise RecordError(f"{file} is not a workbook of the format XLSX: save it again as XLSX or as CSV")
     try:
         check_archive(path)
-        book = load_workbook(path, read_only=True, data_only=True, keep_links=False)
+        # The library refuses a path with another suffix.
+        stream = path.open("rb")
         try:
+            book = load_workbook(stream, read_only=True, data_only=True, keep_links=False)
             names = [sheet.title for sheet in book.worksheets]
             check_column_count(names, file)
             chosen = _choose_sheets(names, options.sheet, file)
-            name, lines = _find_table(((name, book[name]) for name in chosen), file)
+            name, lines = _find_table(((name, book[name]) for name in chosen), file, options)
+            if not lines and options.sheet is not None:
+                found = ((other, _list_lines(book[other], file)) for other in names if other != options.sheet)
+                tables = [other for other, rows in found if has_samples(rows, options)]
+                raise _make_sheet_error(file, options.sheet, tables)
         finally:
-            book.close()
+            stream.close()
     except (*_DAMAGED, InvalidFileException) as error:
         raise RecordError(f"{file} is damaged or not a workbook ({error}): save it again") from error
     if not lines:
@@ -97,13 +103,19 @@ def _choose_sheets(names: Sequence[str], sheet: str | None, file: str) -> Sequen
     return [sheet]
 
 
-def _find_table(sheets: Iterator[tuple[str, Any]], file: str) -> tuple[str, list[str]]:
+def _make_sheet_error(file: str, sheet: str, tables: Sequence[str]) -> RecordError:
+    found = f"sheets with one are {', '.join(tables)}" if tables else "no other sheet has one"
+    return RecordError(f"the sheet {sheet} of {file} has no table of numbers; {found}")
+
+
+def _find_table(
+    sheets: Iterator[tuple[str, Any]], file: str, options: ReadingOptions
+) -> tuple[str, list[str]]:
     """Return the name and the lines of the first sheet with a table; the lines are empty if none has one."""
     name = ""
     for name, sheet in sheets:
-        sheet.reset_dimensions()  # the stated size may be wrong
         lines = _list_lines(sheet, file)
-        if has_samples(lines):
+        if has_samples(lines, options):
             return name, lines
     return name, []
 
@@ -113,6 +125,7 @@ def _list_lines(sheet: Any, file: str) -> list[str]:
 
     Cells and rows that a file leaves out are counted too: one cell can be in any row and column.
     """
+    sheet.reset_dimensions()  # the stated size may be wrong
     lines = []
     width = characters = 0
     rows: list[list[str]] = []

@@ -28,6 +28,8 @@ def choose_group(tables: Mapping[str, bool], group: str | None, file: str) -> tu
         raise RecordError(
             f"{file} has no group {group}; its groups are {_list(names)}{suggest(group, names)}"
         )
+    if group is not None and not tables[group] and tables[names[0]]:
+        raise RecordError(f"the group {group} of {file} has no table; groups with one are {_list(names)}")
     if not names:
         raise RecordError(f"{file} contains no channels: export the record again")
     chosen = names[0] if group is None else group

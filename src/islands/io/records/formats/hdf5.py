@@ -60,7 +60,7 @@ def read_hdf5(path: Path, options: ReadingOptions = DEFAULT_READING) -> Columnar
         ]
     except DAMAGED as error:
         raise RecordError(f"{path.name} is damaged or truncated ({error}): save it again") from error
-    return replace(make_columns(variables, path.name), others=others)
+    return replace(make_columns(variables, path.name, options.missing), others=others)
 
 
 def _iterate_tables(

@@ -51,7 +51,9 @@ def read_mdf(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarF
             name = _name_channel(channel)
             if place != master and name not in loads:
                 loads[name] = partial(_read_channel, file, path, number, place, name)
-        table = ColumnarFile(path.name, tuple(loads), lambda name: loads[name](), (), {}, others)
+        table = ColumnarFile(
+            path.name, tuple(loads), lambda name: loads[name](), (), {}, others, options.missing
+        )
         weakref.finalize(table, stack.pop_all().close)
     return table
 

@@ -52,7 +52,9 @@ def read_archive(path: Path, options: ReadingOptions = DEFAULT_READING) -> Colum
     packed = [member for member in archive.filelist if member.compress_type != zipfile.ZIP_STORED]
     check_unpacked(sum(member.file_size for member in packed), path.name)
     names = tuple(member.removesuffix(".npy") for member in archive.namelist())
-    table = ColumnarFile(path.name, names, partial(_load_array, archive, path), names)
+    table = ColumnarFile(
+        path.name, names, partial(_load_array, archive, path), names, missing=options.missing
+    )
     # Opening an archive reads its whole directory, so that it is opened once for all columns.
     weakref.finalize(table, archive.close)
     return table

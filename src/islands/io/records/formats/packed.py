@@ -60,10 +60,6 @@ def _unpack(path: Path, folder: Path, known: Collection[str]) -> Path:
     try:
         if path.suffix.lower() == ".gz":
             target = folder / path.stem
-            if target.suffix.lower() not in known:
-                raise RecordError(
-                    f"{path.name}: the name before .gz must end in one of {', '.join(known)}: rename the file"
-                )
             with gzip.open(path) as source:
                 _copy(source, target, path.name)
             return target
@@ -99,6 +95,7 @@ def _choose_member(archive: zipfile.ZipFile, file: str, known: Collection[str]) 
         and not PurePosixPath(member.filename).name.startswith(".")
     ]
     records = [member for member in members if PurePosixPath(member.filename).suffix.lower() in known]
+    records = members if len(members) == 1 else records  # its content decides
     if len(records) == 1:
         return records[0]
     listed = ", ".join(member.filename for member in (records or members)[:10]) or "no files"

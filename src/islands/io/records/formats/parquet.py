@@ -49,7 +49,8 @@ def read_parquet(path: Path, options: ReadingOptions = DEFAULT_READING) -> Colum
         parquet = stack.enter_context(ParquetFile(path, memory_map=False, pre_buffer=False))
         check_column_count(range(parquet.metadata.num_columns), file)
         names, rows = tuple(parquet.schema_arrow.names), parquet.metadata.num_rows
-        table = ColumnarFile(file, names, partial(_read_column, parquet, file, rows))
+        load = partial(_read_column, parquet, file, rows)
+        table = ColumnarFile(file, names, load, missing=options.missing)
         weakref.finalize(table, stack.pop_all().close)
     return table
 
@@ -68,7 +69,7 @@ def _translated_errors(file: str) -> Iterator[None]:
         raise RecordError(f"{file} is damaged or not a Parquet file ({error}): write it again") from error
 
 
-def _read_column(parquet: Any, file: str, rows: int, name: str) -> NDArray[np.float64]:
+def _read_column(parquet: Any, file: str, rows: int, name: str) -> NDArray[Any]:
     import pyarrow  # noqa: PLC0415
 
     check_samples(rows, name, file)
@@ -87,14 +88,16 @@ def _read_column(parquet: Any, file: str, rows: int, name: str) -> NDArray[np.fl
         return _to_numbers(pyarrow.chunked_array(chunks, kind), name, file)
 
 
-def _to_numbers(column: Any, name: str, file: str) -> NDArray[np.float64]:
-    """Convert an Arrow column to float64; nulls become NaN."""
+def _to_numbers(column: Any, name: str, file: str) -> NDArray[Any]:
+    """Convert an Arrow column to float64, with NaN for nulls; a column of texts to an array of texts."""
     from pyarrow import compute, float64, types  # noqa: PLC0415
 
     kind = column.type
     if types.is_temporal(kind):
         return _to_elapsed(column, name)
     numeric = (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_null)
+    if types.is_string(kind) or types.is_large_string(kind):
+        return np.array(column.to_pylist(), dtype=object)
     if not any(test(kind) for test in numeric):
         raise RecordError(f"{file}: column {name} holds {kind} where real numbers are expected")
     numbers: NDArray[np.float64] = compute.cast(column, float64(), safe=False).to_numpy()

@@ -54,7 +54,9 @@ def read_tdms(path: Path, options: ReadingOptions = DEFAULT_READING) -> Columnar
         if len(steps) == 1 and _STEP not in loads:
             loads[_STEP] = partial(np.array, [float(steps.pop())])
             scalars.append(_STEP)
-        table = ColumnarFile(path.name, tuple(loads), lambda name: loads[name](), scalars, clocks, others)
+        table = ColumnarFile(
+            path.name, tuple(loads), lambda name: loads[name](), scalars, clocks, others, options.missing
+        )
         weakref.finalize(table, stack.pop_all().close)
     return table
 

@@ -1,6 +1,6 @@
 """Repair of irregular sampling: gaps and missing values become segments or are interpolated, or resampled."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +11,7 @@ from islands.io.records.sampling.missing_values import drop_repeated, repair_mis
 from islands.io.records.sampling.recording import Recording, UniformRecording, count_text
 from islands.io.records.sampling.resampling import resample
 from islands.io.records.sampling.uniform_grid import (
+    AGREEMENT,
     GAP,
     allowed_deviation,
     describe_gaps,
@@ -68,6 +69,30 @@ def make_uniform(
     if found.any():
         steps.append(f"interpolated: {describe_gaps(recording.stamps, recording.rows, found)}")
     return _resample_parts(parts, usual, dt, steps)
+
+
+def join_recordings(parts: Sequence[UniformRecording], file: str) -> UniformRecording:
+    """Return recordings of one file as one, each a segment or several.
+
+    Raises
+    ------
+    RecordError
+        Their sampling times differ.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    first = parts[0]
+    for number, part in enumerate(parts, 1):
+        if abs(part.dt - first.dt) > AGREEMENT * first.dt:
+            raise RecordError(
+                f"{file}: the sampling time of recording 1 is {first.dt:.6g} s, that of recording {number} "
+                f"{part.dt:.6g} s: give --resample {max(part.dt, first.dt):.6g} (library: resample=)"
+            )
+    segments = (length for part in parts for length in part.segments or (len(part.values),))
+    steps = (f"recording {number}: {step}" for number, part in enumerate(parts, 1) for step in part.steps)
+    return UniformRecording(
+        np.concatenate([part.values for part in parts]), first.dt, first.start, tuple(segments), tuple(steps)
+    )
 
 
 def _start(parts: list[Recording]) -> float:

@@ -1,6 +1,6 @@
 """Sampling time of a record, from a time column that is checked against a uniform grid or as stated."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,8 @@ def find_sampling(
     RecordError
         The time column is not uniform, the sampling time is unknown, or two sources disagree.
     """
+    if len(parts := columns.split(time)) > 1:
+        return _find_common_sampling(table, parts, time, dt, structure, given)
     file = columns.rows.file
     known: dict[str, float] = {}
     start = None
@@ -70,6 +72,19 @@ def find_sampling(
     if not known:
         raise RecordError(_unknown_sampling_message(table, file, structure))
     return _reconcile(known, file), start
+
+
+def _find_common_sampling(
+    table: Table, parts: Sequence[Columns], time: str | None, dt: float | None, structure: str, given: bool
+) -> tuple[float, float | None]:
+    """Return the sampling time of all recordings of a file, and the time of the first sample."""
+    file = parts[0].rows.file
+    parts = [part for part in parts if len(part.rows) > 1]
+    if not parts:
+        raise RecordError(f"{file}: each sample has its header: delete the repeated headers")
+    found = [find_sampling(table, part, time, dt, structure, given) for part in parts]
+    known = {f"the rows from {part.rows.row(0)}": step for part, (step, _) in zip(parts, found, strict=True)}
+    return _reconcile(known, file), found[0][1]
 
 
 def make_recording(

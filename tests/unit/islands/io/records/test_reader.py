@@ -380,6 +380,6 @@ def test_a_file_that_cannot_be_opened_is_refused_with_the_reason(tmp_path):
 
 
 def test_an_unknown_suffix_is_refused_with_the_known_ones(tmp_path):
-    message = refusal(tmp_path, lines(), name="bad.docx")
+    message = refusal(tmp_path, ["a letter", "of two lines"], name="bad.docx")
     assert "bad.docx: files ending in '.docx' are not supported" in message
     assert all(suffix in message for suffix in READERS)

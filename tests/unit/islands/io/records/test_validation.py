@@ -43,7 +43,7 @@ def test_an_infinite_value_is_refused_even_in_an_optional_output(tmp_path, cell)
     assert "leave the row out" in message
 
 
-@pytest.mark.parametrize("cell", ["off", "1.5 V", "1_5", "1,5e", "0x1F", "--3"])
+@pytest.mark.parametrize("cell", ["1.5 V", "1_5", "1,5e", "0x1F", "--3"])
 def test_a_text_cell_is_refused_and_shown(tmp_path, cell):
     rows = [line.replace(",", ";") for line in lines()]
     rows[7] = f"0.06;{cell};2.5"
@@ -51,6 +51,14 @@ def test_a_text_cell_is_refused_and_shown(tmp_path, cell):
     assert message == (
         f"bad.csv, line 8, column u_V: '{cell}' is not a number: correct the cell or leave its row out"
     )
+
+
+def test_a_word_is_refused_with_the_option_for_missing_values(tmp_path):
+    rows = lines()
+    rows[7] = "0.06,Defekt 3,2.5"
+    message = refusal(tmp_path, rows)
+    assert "bad.csv, line 8, column u_V: 'Defekt 3' is not a number" in message
+    assert "missing" in message
 
 
 def test_the_first_of_several_bad_cells_is_named(tmp_path):

@@ -39,10 +39,10 @@ def read_matlab(path: Path, options: ReadingOptions = DEFAULT_READING) -> Column
     if not head:
         raise RecordError(f"{file} is empty: save it again in MATLAB or Octave with save -v7 {file}")
     if any(head.startswith(_HDF5, start) for start in _HDF5_STARTS):
-        return make_columns(v73.read_variables(path), file)
+        return make_columns(v73.read_variables(path), file, options.missing)
     content = path.read_bytes()
     variables = v5.read_variables(content) or v4.read_variables(content)
     if variables is None:
         message = next(text for signature, text in _OTHER_FORMATS.items() if head.startswith(signature))
         raise RecordError(f"{file} {message.format(file=file)}")
-    return make_columns(variables, file)
+    return make_columns(variables, file, options.missing)

@@ -70,11 +70,12 @@ class Variable:
     load: Callable[[], NDArray[Any]]
 
 
-def make_columns(variables: Iterable[Variable], file: str) -> ColumnarFile:
+def make_columns(variables: Iterable[Variable], file: str, missing: tuple[str, ...] = ()) -> ColumnarFile:
     """Convert variables to columns.
 
     A vector keeps its name; a matrix of a few channels becomes ``x_1, x_2 ...``. A matrix is not split if one
-    of the new names is taken; it is then not usable as a channel.
+    of the new names is taken; it is then not usable as a channel. ``missing`` are the words and numbers that
+    mean a missing value.
 
     Raises
     ------
@@ -97,7 +98,7 @@ def make_columns(variables: Iterable[Variable], file: str) -> ColumnarFile:
             names.append(variable.name)
     # Numbers only: a timeseries object is often called ts but does not state the sampling time.
     single = [variable.name for variable in variables if not variable.kind and math.prod(variable.shape) == 1]
-    return ColumnarFile(file, tuple(names), lambda name: loads[name](), single)
+    return ColumnarFile(file, tuple(names), lambda name: loads[name](), single, missing=missing)
 
 
 def _list_variables(variables: Iterable[Variable], file: str) -> list[Variable]:

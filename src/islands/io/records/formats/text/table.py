@@ -1,7 +1,7 @@
 """Text tables: a header with names, then one sample per line.
 
-Encoding, start of the table, separator and decimal comma are inferred, because instruments write them in many
-ways. `text_encoding`, `table_start` and `number_parsing` do that; a preview states what was inferred.
+Encoding, start of the table, separator and decimal comma are inferred: instruments write them in many ways.
+`encoding`, `table_start`, `other_rows` and `number_parsing` do that; a preview states what was inferred.
 """
 
 import csv
@@ -17,8 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
+from islands.io.records.column_names import append_unit
 from islands.io.records.formats.text.encoding import decode
-from islands.io.records.formats.text.number_parsing import describe_numbers, is_missing, parse_numbers
+from islands.io.records.formats.text.missing_words import MissingWords, is_missing, parse_words
+from islands.io.records.formats.text.number_parsing import describe_numbers, parse_numbers
+from islands.io.records.formats.text.other_rows import describe_left_out, keep_samples
+from islands.io.records.formats.text.quantities import find_unit
 from islands.io.records.formats.text.table_start import TableStart, collapse_blanks, find_table
 from islands.io.records.formats.text.time_stamps import (
     DATE_ONLY,
@@ -61,6 +65,12 @@ class DelimitedText:
         Decimal mark, order of dates, time zone.
     notes : tuple of str
         What was inferred about the file as a whole.
+    units : mapping of str to str
+        Units of the cells of the columns that have them.
+    starts : tuple of int
+        Samples that follow a repeated header.
+    left_out : tuple of str
+        Which rows are not samples.
     others : str
         Other tables of the file; see `islands.io.records.table.Table`.
     """
@@ -72,6 +82,9 @@ class DelimitedText:
     clocks: Mapping[str, str]
     options: ReadingOptions = DEFAULT_READING
     notes: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    starts: tuple[int, ...] = ()
+    left_out: tuple[str, ...] = ()
     others: str = ""
     # Both are found once: a search per column would take the square of the time.
     _places: Mapping[str, int] = field(init=False, repr=False)
@@ -93,12 +106,19 @@ class DelimitedText:
         kept = slice(chosen.start, chosen.stop)
         cells, where = self.cells[kept], RowRange(self.rows.file, self.rows.counted, self.rows.numbers[kept])
         texts = self._select_columns([name for name in names if name not in self.clocks], cells)
-        numbers = parse_numbers(texts, where, self.options.decimal_mark, self.separator)
+        parsed = parse_numbers(
+            *(texts, where, self.options.decimal_mark, self.separator, self._missing, self.units)
+        )
+        numbers = parsed.numbers
         for name in names:
             if name in self.clocks:
                 stamps = self._join_date(name, cells)
-                numbers[name] = parse_stamps(stamps, name, where, self.options.dates, self.options.timezone)
-        return Columns(where, numbers, chosen.start, frozenset(name for name in names if name in self.clocks))
+                numbers[name] = parse_stamps(
+                    *(stamps, name, where, self.options.dates, self.options.timezone, self._missing.texts)
+                )
+        clocks = frozenset(name for name in names if name in self.clocks)
+        starts = tuple(at - chosen.start for at in self.starts if chosen.start < at < chosen.stop)
+        return Columns(where, numbers, chosen.start, clocks, starts, (*self.left_out, *parsed.notes))
 
     def remarks(self, names: Sequence[str]) -> tuple[str, ...]:
         """Return what was inferred: of the file, and how numbers are written, or that it is uncertain."""
@@ -109,10 +129,16 @@ class DelimitedText:
                 self.rows,
                 self.options.decimal_mark,
                 self.separator,
+                self._missing,
+                self.units,
             )
         except RecordError as error:
             return (*self.notes, str(error))
         return (*self.notes, *([note] if note else []))
+
+    @property
+    def _missing(self) -> MissingWords:
+        return parse_words(self.options.missing)
 
     def _join_date(self, name: str, cells: Sequence[list[str]]) -> list[str]:
         """Return the time stamps of a column, each with the date in another column if there is one."""
@@ -120,8 +146,9 @@ class DelimitedText:
         if not (source := self.clocks[name]):
             return times
         dates = self._select_columns([source], cells)[source]
+        missing = self._missing.texts
         return [
-            "" if is_missing(time) or is_missing(day) else f"{day.strip()} {time.strip()}"
+            "" if is_missing(time, missing) or is_missing(day, missing) else f"{day.strip()} {time.strip()}"
             for day, time in zip(dates, times, strict=True)
         ]
 
@@ -199,11 +226,29 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
     if not rows:
         header = "no" if start.header is None else f"a header in {counted} {start.header + 1} but no"
         raise RecordError(f"{file} has {header} samples{' below it' if start.header is not None else ''}")
-    where = RowRange(file, counted, numbers)
-    names, cells = _trim(start.names, rows)
-    clocks = _find_clocks(names, cells)
+    missing = parse_words(options.missing).texts
+    kept = keep_samples(numbers, rows, start.labels, counted, missing)
+    left_out = kept.notes
+    if start.properties:
+        above = describe_left_out(
+            counted, start.first - start.properties + 1, start.first, "below the header"
+        )
+        left_out = (above, *left_out)
+    names, cells = _trim(start.names, kept.cells)
+    clocks = _find_clocks(names, cells, missing)
+    units = _find_units(names, cells, clocks, missing)
+    titles = {name: append_unit(name, unit) for name, unit in units.items()}
     return DelimitedText(
-        names, start.separator, cells, where, clocks, options, _list_notes(file, start, counted)
+        tuple(titles.get(name, name) for name in names),
+        start.separator,
+        cells,
+        RowRange(file, counted, kept.numbers),
+        clocks,
+        options,
+        _list_notes(file, start, counted),
+        {titles[name]: unit for name, unit in units.items()},
+        kept.starts,
+        left_out,
     )
 
 
@@ -265,11 +310,24 @@ def _trim(names: tuple[str, ...], cells: list[list[str]]) -> tuple[tuple[str, ..
     return names, cells
 
 
-def _find_clocks(names: Sequence[str], cells: Sequence[list[str]]) -> dict[str, str]:
+def _find_units(
+    names: Sequence[str], cells: Sequence[list[str]], clocks: Mapping[str, str], missing: frozenset[str]
+) -> dict[str, str]:
+    """Return the units of the cells of all columns that have such cells."""
+    stamps = {*clocks, *clocks.values()}
+    found = {
+        name: find_unit((row[place] for row in cells if len(row) > place), missing)
+        for place, name in enumerate(names)
+        if name and name not in stamps
+    }
+    return {name: unit for name, unit in found.items() if unit}
+
+
+def _find_clocks(names: Sequence[str], cells: Sequence[list[str]], missing: frozenset[str]) -> dict[str, str]:
     """Return the columns of time stamps with the columns of their dates."""
     first = list(islice(cells, _DECIDING))
     kinds = {
-        name: find_kind([row[place] for row in first if len(row) > place])
+        name: find_kind([row[place] for row in first if len(row) > place], missing)
         for place, name in enumerate(names)
         if name
     }

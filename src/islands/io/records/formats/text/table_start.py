@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain, islice
@@ -10,8 +10,10 @@ from itertools import chain, islice
 from islands.data.channel_names import is_unit, spell_unit
 from islands.errors import RecordError
 from islands.io.records.column_names import append_unit
+from islands.io.records.formats.text.missing_words import EMPTY, is_missing, parse_words
 from islands.io.records.formats.text.number_format import is_number
-from islands.io.records.formats.text.number_parsing import is_missing
+from islands.io.records.formats.text.quantities import split_quantity
+from islands.io.records.formats.text.states import is_state
 from islands.io.records.formats.text.time_stamps import kind_of
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 
@@ -23,10 +25,13 @@ SEPARATORS = (";", "\t", "|", ",", " ")
 _SHOWN = 40
 
 #: Marks of a comment. numpy.savetxt writes its header as a comment.
-_COMMENTS = "#%!"
+COMMENTS = "#%!"
 
 #: Lines of samples that decide where a table starts, and lines that may precede it.
 _SAMPLES, _MOST_LINES = 5, 300
+
+#: Rows of properties between a header and the samples.
+_MOST_PROPERTIES = 40
 
 #: Labels in the first cell of a row of units.
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
@@ -55,6 +60,10 @@ class TableStart:
         Whether lines with a description of the measurement precede the table.
     units : int or None
         Index of the row of units; None if there is none.
+    labels : tuple of str
+        Cells of the header, without the units of the row of units; empty if there is no header.
+    properties : int
+        Number of lines directly above ``first`` with properties that are numbers.
     """
 
     separator: str
@@ -63,6 +72,8 @@ class TableStart:
     first: int
     described: bool
     units: int | None
+    labels: tuple[str, ...] = ()
+    properties: int = 0
 
 
 def find_table(lines: Sequence[str], file: str, options: ReadingOptions = DEFAULT_READING) -> TableStart:
@@ -89,21 +100,22 @@ def find_table(lines: Sequence[str], file: str, options: ReadingOptions = DEFAUL
     given = re.fullmatch(r"\ufeff?sep=(.)\s*", lines[top])  # a line for Excel
     if given:
         top = next((at for at in range(top + 1, len(lines)) if lines[at].strip()), top)
+    missing = parse_words(options.missing).texts
     if not options.has_header:
-        return _find_without_header(lines, top, file, options.names)
+        return _find_without_header(lines, top, file, options.names, missing)
     separator = _infer_separator(_uncomment(lines[top]), list(islice(_list_filled(lines, top + 1), _SAMPLES)))
     separator = given[1] if given else separator
     cells, first = _read_row(lines, top, separator)
     start = top
     # A spreadsheet fills the lines of a description up to the width of the table with empty cells.
-    is_header = all(cell.strip() for cell in cells) and _fits(len(cells), lines, first, separator)
-    if not is_header and (found := _find_samples(lines, top)):
+    is_header = all(cell.strip() for cell in cells) and _fits(len(cells), lines, first, separator, missing)
+    if not is_header and (found := _find_samples(lines, top, missing)):
         separator, samples = found
         start = _find_header(lines, top, samples, separator, file)
         cells, first = _read_row(lines, start, separator)
     if first == len(lines) > start + 1:
         raise RecordError(f"{file}, line {start + 1}: is a quote never closed?")
-    names = tuple(name.strip() for name in cells)
+    names = labels = tuple(name.strip() for name in cells)
     properties = _list_properties(lines, first, separator, len(names))
     rows = {at: _read_units(lines[at], separator) for at in properties}
     units = next((at for at, row in rows.items() if len(row) == len(names)), None)
@@ -111,7 +123,8 @@ def find_table(lines: Sequence[str], file: str, options: ReadingOptions = DEFAUL
     if units is not None:
         names = tuple(map(append_unit, names, rows[units]))
     first = max([first, *(at + 1 for at in properties)])
-    return TableStart(separator, start, names, first, start > top, units)
+    samples = _skip_properties(lines, first, separator, missing)
+    return TableStart(separator, start, names, samples, start > top, units, labels, samples - first)
 
 
 def _list_properties(lines: Sequence[str], first: int, separator: str, width: int) -> list[int]:
@@ -121,16 +134,18 @@ def _list_properties(lines: Sequence[str], first: int, separator: str, width: in
         if not lines[at].strip():
             continue
         cells = _split(lines[at], separator)
-        filled = [cell for cell in cells if not is_missing(cell) or cell.strip() == "-"]
-        if len(cells) != width or not filled or any(is_number(cell) or kind_of(cell) for cell in filled):
+        filled = [cell for cell in cells if cell.strip() == "-" or cell.strip().lower() not in EMPTY]
+        if len(cells) != width or not filled or any(is_value(cell) or kind_of(cell) for cell in filled):
             return found
         found.append(at)
     return []  # the table contains text only
 
 
-def _find_without_header(lines: Sequence[str], top: int, file: str, given: tuple[str, ...]) -> TableStart:
+def _find_without_header(
+    lines: Sequence[str], top: int, file: str, given: tuple[str, ...], missing: frozenset[str]
+) -> TableStart:
     """Find the samples of a table whose names are given or are c1, c2, ..."""
-    found = _find_samples(lines, top)
+    found = _find_samples(lines, top, missing)
     if found is None:
         raise RecordError(
             f"{file} has no lines of numbers: export the record as a table, one line per sample"
@@ -160,7 +175,7 @@ def _read_row(lines: Sequence[str], at: int, separator: str) -> tuple[list[str],
 
 
 def _uncomment(line: str) -> str:
-    return line.lstrip(_COMMENTS)
+    return line.lstrip(COMMENTS)
 
 
 def _split(line: str, separator: str) -> list[str]:
@@ -196,20 +211,22 @@ def _infer_separator(header: str, first: Sequence[str]) -> str:
     return next(agreeing, usable[0] if usable else ",")
 
 
-def _fits(width: int, lines: Sequence[str], first: int, separator: str) -> bool:
+def _fits(width: int, lines: Sequence[str], first: int, separator: str, missing: frozenset[str]) -> bool:
     """Return whether one of the first lines below a header is a sample with as many cells."""
     below = [_split(line, separator) for line in islice(_list_filled(lines, first), _SAMPLES)]
-    return not below or any(len(cells) == width and _is_sample(cells) for cells in below)
+    return not below or any(len(cells) == width and _is_sample(cells, missing) for cells in below)
 
 
-def _find_samples(lines: Sequence[str], top: int) -> tuple[str, int] | None:
+def _find_samples(
+    lines: Sequence[str], top: int, missing: frozenset[str] = frozenset()
+) -> tuple[str, int] | None:
     """Return the separator and the index of the first sample, None if no lines look like samples."""
 
     @cache
     def width(at: int, separator: str) -> int:
         """Return the number of cells of a sample; 0 if the line is none."""
         cells = _split(lines[at], separator)
-        return len(cells) if _is_sample(cells) else 0
+        return len(cells) if _is_sample(cells, missing) else 0
 
     filled = (at for at in range(top, len(lines)) if lines[at].strip())
     block = list(islice(filled, _SAMPLES))
@@ -237,25 +254,63 @@ def _extend_upwards(lines: Sequence[str], top: int, samples: int, separator: str
     return samples
 
 
-def has_samples(lines: Sequence[str]) -> bool:
+def has_samples(lines: Sequence[str], options: ReadingOptions = DEFAULT_READING) -> bool:
     """Return whether the first lines of a table contain samples."""
+    missing = parse_words(options.missing).texts
     top = next((index for index, line in enumerate(lines) if line.strip()), None)
-    return top is not None and _find_samples(lines, top) is not None
+    return top is not None and _find_samples(lines, top, missing) is not None
 
 
-def _is_sample(cells: Sequence[str]) -> bool:
-    """Return whether the cells are numbers, time stamps or missing, except for one that is not the first.
+def _is_sample(cells: Sequence[str], missing: Collection[str] = ()) -> bool:
+    """Return whether the cells are numbers, time stamps, states or missing, except for one, not the first.
 
-    A line of a description begins with text: ``Sample interval,4e-09``.
+    A line of a description begins with text: ``Sample interval,4e-09``, ``Timeout;5``.
+
+    Parameters
+    ----------
+    cells : sequence of str
+    missing : collection of str
+        Words of the user for a missing value, in lower case.
     """
-    if not cells or _is_text(cells[0]):
+    if not cells or is_text(cells[0], missing):
         return False
-    others = islice(filter(_is_text, cells), 2)
-    return len(list(others)) < 2 and any(map(is_number, cells))
+    others = islice((cell for cell in cells[1:] if not is_missing(cell) and is_text(cell, missing)), 2)
+    return len(list(others)) < 2 and any(map(is_value, cells))
 
 
-def _is_text(cell: str) -> bool:
-    return not (is_number(cell) or is_missing(cell) or kind_of(cell))
+def is_text(cell: str, missing: Collection[str] = ()) -> bool:
+    """Return whether a cell is neither a number, with or without unit, nor a time stamp, a state or empty.
+
+    A known word for a missing value is text, because a description may begin with it. A single letter is a
+    name.
+    """
+    word = cell.strip()
+    if is_number(cell) or word.lower() in EMPTY or word.lower() in missing or kind_of(cell):
+        return False
+    return not ((len(word) > 1 and is_state(cell)) or split_quantity(cell))
+
+
+def _skip_properties(lines: Sequence[str], first: int, separator: str, missing: frozenset[str]) -> int:
+    """Return the index of the first sample below rows of properties with numbers, as of oscilloscopes.
+
+    The first cell of such a row is text, and others are, unless it is one of several such rows:
+    ``Sequence,Volt,Volt,0.1``.
+    """
+    if first == len(lines) or _is_sample(cells := _split(lines[first], separator), missing):
+        return first
+    for at in range(first, min(len(lines), first + _MOST_PROPERTIES)):
+        row = _split(lines[at], separator)
+        if _is_sample(row, missing) and len(row) == len(cells):
+            texts = sum(is_text(cell, missing) for cell in cells)
+            return at if texts > 1 or at > first + 1 else first
+        if not row or len(row) != len(cells) or not is_text(row[0], missing):
+            return first
+    return first
+
+
+def is_value(cell: str) -> bool:
+    """Return whether a cell is a number, with or without unit."""
+    return bool(is_number(cell) or split_quantity(cell))
 
 
 def _find_header(lines: Sequence[str], top: int, samples: int, separator: str, file: str) -> int:

@@ -5,7 +5,7 @@ Stamps are compared as integers of nanoseconds, because seconds since 1970 with 
 
 import re
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import UTC, date, datetime, timedelta
 from functools import lru_cache
 from zoneinfo import ZoneInfo
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.formats.text.number_parsing import is_missing
+from islands.io.records.formats.text.missing_words import is_missing
 from islands.io.records.table import RowRange
 
 _DATE = (
@@ -64,9 +64,9 @@ _DAY = 24 * _HOUR
 DATED, DATE_ONLY, TIME_ONLY = "date and time", "date", "time"
 
 
-def find_kind(texts: Sequence[str]) -> str:
+def find_kind(texts: Sequence[str], missing: Collection[str] = ()) -> str:
     """Return the kind of time stamps that a column contains; empty if it contains none."""
-    kinds = {kind_of(text) for text in texts if not is_missing(text)}
+    kinds = {kind_of(text) for text in texts if not is_missing(text, missing)}
     return kinds.pop() if len(kinds) == 1 else ""
 
 
@@ -81,7 +81,12 @@ def kind_of(text: str) -> str:
 
 
 def parse_stamps(
-    texts: Sequence[str], name: str, rows: RowRange, order: str | None, timezone: str | None
+    texts: Sequence[str],
+    name: str,
+    rows: RowRange,
+    order: str | None,
+    timezone: str | None,
+    missing: Collection[str] = (),
 ) -> NDArray[np.float64]:
     """Convert time stamps to seconds after the first one, shape (samples,). Missing cells become NaN.
 
@@ -98,6 +103,8 @@ def parse_stamps(
         ``day-first`` or ``month-first`` for dates such as 3/4/2026; by default inferred from all dates.
     timezone : str or None
         Time zone of stamps without an offset.
+    missing : collection of str
+        Words of the user for a missing value, in lower case.
 
     Raises
     ------
@@ -105,7 +112,8 @@ def parse_stamps(
         A cell is not a time stamp, or the order of day and month is not certain.
     """
     matches = [
-        None if is_missing(text) else _match(text, name, sample, rows) for sample, text in enumerate(texts)
+        None if is_missing(text, missing) else _match(text, name, sample, rows)
+        for sample, text in enumerate(texts)
     ]
     day_first = _is_day_first(matches, name, rows, order)
     zone = None if timezone is None else ZoneInfo(timezone)

@@ -55,7 +55,7 @@ def test_a_time_array_with_a_gap_is_refused_by_sample(tmp_path):
     assert "sample 40, column t follows a gap" in archived(tmp_path, t=t)
 
 
-@pytest.mark.parametrize(("content", "words"), [(b"", "is empty"), (b"u,y\n1,2\n", "is not a NumPy archive")])
+@pytest.mark.parametrize(("content", "words"), [(b"", "is empty"), (b"u,y\n", "is not a NumPy archive")])
 def test_a_file_of_another_format_is_refused(tmp_path, content, words):
     message = refusal(tmp_path, content, name="bad.npz")
     assert words in message
