@@ -10,7 +10,7 @@ from islands.data.channel_names import parse_unit
 from islands.errors import RecordError
 from islands.io.records import READERS, fingerprint, read_columns, read_record
 from islands.io.records.column_names import looks_like_time, time_column
-from support.bad_records import lines, refusal
+from support.bad_records import refusal
 
 SAMPLES = 50
 T = 0.01 * np.arange(SAMPLES)

@@ -55,7 +55,7 @@ def test_a_missing_input_is_refused_until_gaps_are_repaired(tmp_path):
 
 def test_words_of_the_user_are_missing_values(tmp_path):
     path = write(tmp_path, ["Sensor 3 tot", "-9999", "-9999.00"])
-    with pytest.raises(RecordError, match="'Sensor 3 tot' is not a number.*missing"):
+    with pytest.raises(RecordError, match=r"'Sensor 3 tot' is not a number.*missing"):
         read_record(path, ["u_V"], "y_um")
     record = read_record(path, ["u_V"], "y_um", missing=["sensor 3 tot", "-9999"])
     assert np.flatnonzero(np.isnan(record.y)).tolist() == [10, 11, 12]
