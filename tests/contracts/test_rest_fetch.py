@@ -250,8 +250,10 @@ def test_a_response_that_is_no_file_is_refused(service: Service, site: Site) -> 
         ("slow", "has sent nothing for 0.3 s"),
     ):
         assert reason in problem_of(fetch(service, site.url(f"/{path}.csv")), 422, "source-failed")
-    problem_of(fetch(service, site.url("/page.html")), 422, "invalid-record")
-    assert "/page.html" not in site.asked  # its name is refused before
+    problem_of(fetch(service, site.url("/record.mf4")), 422, "invalid-record")
+    assert "/record.mf4" not in site.asked  # its name is refused before
+    site.pages["/page.html"] = send(200, b"<html><p>1</p></html>")
+    assert "HTML" in problem_of(fetch(service, site.url("/page.html")), 422, "invalid-record")
 
 
 def test_a_file_beyond_the_limits_ends_while_it_is_received(service: Service, site: Site) -> None:

@@ -50,3 +50,53 @@ def test_an_unknown_option_has_similar_names(service):
     assert problem_of(answer, 422, "invalid-settings").endswith(
         "sheets: Unexpected keyword argument. Did you mean 'sheet'?"
     )
+
+
+@pytest.mark.parametrize(
+    "reading", ['{"missing": ["Failed", "-9999"]}', '{"header": false}', '{"gaps": "split"}']
+)
+def test_every_option_of_reading_works_over_rest(service, reading):
+    rows = lines() if "header" not in reading else lines()[1:]
+    rows[9] = rows[9].rpartition(",")[0] + (",Failed" if "missing" in reading else ",1.5")
+    stored = service.upload("\n".join(rows).encode(), reading=reading)
+    assert stored.status_code == 201, stored.text
+    document = stored.json()["preview"]
+    assert document["reading"] == json.loads(reading)
+    if "missing" in reading:
+        assert "column y_um: Failed is read as missing in line 10" in document["warnings"]
+
+
+@pytest.mark.parametrize("name", ["header", "missing", "inputz", "anything"])
+def test_an_unknown_query_parameter_or_form_field_of_an_upload_is_refused(service, name):
+    content = "\n".join(lines()).encode()
+    files = {"file": ("record.csv", content)}
+    query = service.client.post(f"/v1/datasets?{name}=false", files=files)
+    field = service.upload(content, **{name: "false"})
+    for answer, kind in ((query, "query parameter"), (field, "form field")):
+        detail = problem_of(answer, 422, "invalid-settings")
+        assert f"/v1/datasets has no {kind} '{name}'" in detail
+        assert ("reading={" in detail) == (name in {"header", "missing"})
+    assert service.client.get("/v1/datasets").json()["items"] == []
+
+
+@pytest.mark.parametrize(
+    "path", ["/v1/jobs", "/v1/datasets", "/v1/monitors", "/v1/jobs/a/models", "/v1/webhooks"]
+)
+def test_an_unknown_query_parameter_is_refused_everywhere(service, path):
+    answer = service.client.get(path, params={"limits": "3"})
+    assert "no query parameter 'limits'" in problem_of(answer, 422, "invalid-settings")
+
+
+@pytest.mark.parametrize("name", ["record.log", "record", "record.xls", "record.2026-11-22"])
+def test_a_table_of_text_is_uploaded_under_any_name(service, name):
+    stored = service.upload("\n".join(lines()).encode(), name)
+    assert stored.status_code == 201, stored.text
+    document = stored.json()
+    assert document["name"] == name
+    job = service.submit(dataset=document["id"], inputs=["u_V"], output="y_um")
+    assert job.status_code == 202, job.text
+
+
+def test_an_mdf_file_under_another_name_is_refused(service):
+    answer = service.upload(b"MDF     4.10    " + bytes(400), "record.dat")
+    assert "MDF" in problem_of(answer, 422, "invalid-record")

@@ -101,14 +101,14 @@ def test_uploads_in_progress_are_limited_per_owner_and_in_total(service):
         refused = service.upload(csv(), "c.csv", one)
         assert "2 uploads of this owner are in progress" in problem_of(refused, 429, "too-many-uploads")
         assert int(refused.headers["retry-after"]) >= 1
-        assert service.upload(csv(), "c.exe", two).status_code == 422
+        assert service.upload(csv(), "c.mf4", two).status_code == 422
         stack.enter_context(started(service, three))
         eventually(lambda: len(receiving(service)) == 3)
         refused = service.upload(csv(300), "c.csv", two)
         assert "3 uploads are in progress, the most of this service" in problem_of(
             refused, 429, "too-many-uploads"
         )
-    eventually(lambda: service.upload(csv(), "c.exe", one).status_code == 422)
+    eventually(lambda: service.upload(csv(), "c.mf4", one).status_code == 422)
     eventually(lambda: not receiving(service))
 
 

@@ -16,12 +16,14 @@ from operator import itemgetter
 from typing import Annotated, Any, ClassVar
 
 from fastapi import Header, Query, Request, Response
+from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 
 from islands.errors import IslandsError, SettingsError
 from islands_api.web.auth import Principal, authenticate, check_scope
 from islands_api.web.middleware import FORM_OVERHEAD_BYTES
+from islands_api.web.parameter_names import check_names
 from islands_api.web.problems import MalformedBodyError, PayloadTooLargeError, UnsupportedMediaTypeError
 from islands_api.web.uploads.body_reader import BodyReader
 from islands_api.web.uploads.request import UploadRequest
@@ -40,7 +42,28 @@ _LARGE_BODY = 20_000
 _MAX_QUOTED_NAME = 40
 
 
-class BodyRoute(APIRoute):
+class StrictRoute(APIRoute):
+    """Route that refuses unknown query parameters, which the framework ignores."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return a handler that checks the names of the query parameters first."""
+        handler = super().get_route_handler()
+        known = _list_query_parameters(self.dependant)
+
+        async def handle(request: Request) -> Response:
+            check_names(request.query_params, known, "query parameter", self.path)
+            return await handler(request)
+
+        return handle
+
+
+def _list_query_parameters(dependant: Dependant) -> tuple[str, ...]:
+    """Return the query parameters of a route and of what it depends on."""
+    own = [parameter.alias for parameter in dependant.query_params]
+    return (*own, *(name for each in dependant.dependencies for name in _list_query_parameters(each)))
+
+
+class BodyRoute(StrictRoute):
     """Route that accepts bodies of one media type."""
 
     media: ClassVar[str]
@@ -120,7 +143,8 @@ class FormRoute(BodyRoute):
             ):
                 room = reserved + FORM_OVERHEAD_BYTES
                 body = BodyReader(request.receive, settings.body_timeout, settings.body_rate, room)
-                yield UploadRequest(request.scope, body.receive, target)
+                fields = [field.alias for field in self.dependant.body_params]
+                yield UploadRequest(request.scope, body.receive, target, fields, self.path)
 
 
 class _StrictRequest(Request):

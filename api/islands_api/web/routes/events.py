@@ -12,11 +12,12 @@ from starlette.types import Receive, Scope, Send
 from islands_api.web.auth import KeyCache, Principal, Reader
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
+from islands_api.web.requests import StrictRoute
 from islands_api.web.responses import json_text
 from islands_api.web.routes.jobs import Id
 from islands_service.domain.job import TERMINAL, Event, Job
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=StrictRoute)
 
 #: Idle seconds after which a comment is sent: some proxies close idle connections. After its key was revoked,
 #: a stream ends within twice this time.

@@ -18,6 +18,7 @@ from islands_api.web.auth import Principal, Reader
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.job_submission import get_job_of_kind, get_result
 from islands_api.web.problems import RESPONSES, ResourceNotFoundError
+from islands_api.web.requests import StrictRoute
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import Rank, get_model
 from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, MONITORING, REPORT
@@ -29,7 +30,7 @@ from islands_service.store.database import StorageFullError, StoreUnavailableErr
 
 log = structlog.get_logger()
 
-router = APIRouter(prefix="/v1/jobs", tags=["figures"], responses=RESPONSES)
+router = APIRouter(prefix="/v1/jobs", tags=["figures"], responses=RESPONSES, route_class=StrictRoute)
 
 #: The figure that exists only for searches with several islands.
 _MULTI_ISLAND_FIGURE = "islands"

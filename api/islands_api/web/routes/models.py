@@ -17,12 +17,13 @@ from islands_api.web.auth import Principal, Reader
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.job_submission import get_job_of_kind, get_result
 from islands_api.web.problems import RESPONSES, ResourceNotFoundError
+from islands_api.web.requests import StrictRoute
 from islands_api.web.responses import JSONDocument, JSONItems
 from islands_api.web.routes.jobs import Id
 from islands_service.domain.job import IDENTIFICATION
 from islands_service.store.results import StoredModel
 
-router = APIRouter(prefix="/v1/jobs", tags=["models"], responses=RESPONSES)
+router = APIRouter(prefix="/v1/jobs", tags=["models"], responses=RESPONSES, route_class=StrictRoute)
 
 #: Results of all kinds of jobs.
 AnyResult = IdentificationResult | CoupledIdentificationResult | DiscrepancyResult | MonitoredRecordResult

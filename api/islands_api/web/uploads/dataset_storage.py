@@ -5,7 +5,7 @@ from typing import IO
 
 from islands_api.web.auth import Principal
 from islands_api.web.dependencies import AppState
-from islands_api.web.uploads.uploaded_file import receive
+from islands_api.web.uploads.uploaded_file import find_stored_suffix, receive
 from islands_service.intake.file_inspection import InspectionRequest, inspect_file
 from islands_service.intake.job_inputs import link_blob
 from islands_service.store.datasets import StoredDataset
@@ -46,7 +46,7 @@ async def store_dataset(
                 preview = await inspect_file(
                     path, inspection, settings.inspection_memory, settings.inspection_seconds
                 )
-            suffix = Path(name).suffix.lower()
+            suffix = find_stored_suffix(name)
             await state.run_blocking(
                 state.store.datasets.check_room,
                 owner,

@@ -1,5 +1,6 @@
 """Request with a form whose file is received into a given file, instead of the system's temporary folder."""
 
+from collections.abc import Collection
 from http import HTTPStatus
 from typing import IO, Any, BinaryIO, cast
 
@@ -8,6 +9,8 @@ from starlette.datastructures import FormData, UploadFile
 from starlette.exceptions import HTTPException
 from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.types import Receive, Scope
+
+from islands_api.web.parameter_names import check_names
 
 
 class UploadRequest(Request):
@@ -19,11 +22,17 @@ class UploadRequest(Request):
         See ASGI.
     target : file object
         Empty file on the disk that receives the single file of the form.
+    fields : collection of str
+        Names of the fields of the form.
+    path : str
+        Path of the route, for messages.
     """
 
-    def __init__(self, scope: Scope, receive: Receive, target: IO[bytes]) -> None:
+    def __init__(
+        self, scope: Scope, receive: Receive, target: IO[bytes], fields: Collection[str], path: str
+    ) -> None:
         super().__init__(scope, receive)
-        self._target = target
+        self._target, self._fields, self._path = target, fields, path
 
     async def form(self, **limits: Any) -> FormData:  # type: ignore[override]
         """Parse the form; the limits are those of the framework.
@@ -32,6 +41,8 @@ class UploadRequest(Request):
         ------
         HTTPException
             The form is malformed.
+        SettingsError
+            A field is unknown.
         """
         if self._form is None:
             parser = _FileParser(self.headers, self.stream(), **limits)
@@ -40,6 +51,7 @@ class UploadRequest(Request):
                 self._form = await parser.parse()
             except MultiPartException as error:
                 raise HTTPException(HTTPStatus.BAD_REQUEST, error.message) from None
+            check_names(self._form, self._fields, "form field", self._path)
         return self._form
 
 

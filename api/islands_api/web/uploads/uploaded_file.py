@@ -13,8 +13,14 @@ from islands_api.web.problems import PayloadTooLargeError
 #: Number of bytes that are copied at once.
 CHUNK_BYTES = 1 << 20
 
-#: Suffixes of uploads. The reader of MDF writes temporary files, which the inspection forbids.
-SUFFIXES = tuple(suffix for suffix in READERS if suffix not in {".mf4", ".mdf"})
+#: Suffixes that are refused. The reader of MDF writes temporary files, which the inspection forbids.
+_REFUSED = (".mf4", ".mdf")
+
+#: Suffixes of uploads; the content of a file with another one decides.
+SUFFIXES = tuple(suffix for suffix in READERS if suffix not in _REFUSED)
+
+#: Suffix in the id of a data set whose own suffix is not that of a format.
+_OTHER = ".txt"
 
 #: Maximum length in bytes of a file name.
 MAX_NAME_BYTES = 200
@@ -29,22 +35,28 @@ def parse_file_name(given: str | None) -> tuple[str, bool]:
     Raises
     ------
     RecordError
-        The file has no name, or its suffix is not that of a supported format.
+        The file has no name, or is an MDF file.
     """
     name = PurePosixPath(PureWindowsPath(given or "").name).name
     name = "".join(character for character in name if character.isprintable()).lstrip(".")
     compressed = name.lower().endswith(GZIP_SUFFIX)
     name = name[: -len(GZIP_SUFFIX)] if compressed else name
     suffix = PurePosixPath(name).suffix.lower()
-    if suffix not in SUFFIXES:
-        known = ", ".join(SUFFIXES)
+    if not name or suffix in _REFUSED:
         raise RecordError(
-            f"{name or 'the file'}: its name must end in one of {known}, optionally followed by "
-            f"{GZIP_SUFFIX}: export the record to one of these formats"
+            f"{name or 'the file'}: a service reads files of a name that does not end in "
+            f"{' or '.join(_REFUSED)}: export the record as one of {', '.join(SUFFIXES)}, or {GZIP_SUFFIX}"
         )
+    suffix = suffix if suffix in SUFFIXES else ""
     # A file name has at most 255 bytes on Linux, and the table of data sets stores at most 255 characters.
-    stem = name[: -len(suffix)].encode()[: MAX_NAME_BYTES - len(suffix)].decode(errors="ignore")
+    stem = name[: len(name) - len(suffix)].encode()[: MAX_NAME_BYTES - len(suffix)].decode(errors="ignore")
     return stem + suffix, compressed
+
+
+def find_stored_suffix(name: str) -> str:
+    """Return the suffix that the id of a data set has: its own if it is that of a format."""
+    suffix = PurePosixPath(name).suffix.lower()
+    return suffix if suffix in SUFFIXES else _OTHER
 
 
 def receive(
