@@ -1,4 +1,4 @@
-"""Fuzzing of all readers of uploads: a mutated file is read, or refused with an error for its owner.
+"""Fuzzing of all readers of records: a mutated file is read, or refused with an error for its owner.
 
     python benchmarks/fuzz_readers.py [--seconds 60] [--cases N] [--seed 0] [--suffix .csv ...]
     python benchmarks/fuzz_readers.py --families 1000000
@@ -20,8 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from islands.io.records import preview
-from islands_api.web.uploads.uploaded_file import SUFFIXES
+from islands.io.records import READERS, preview
 from support.fuzzing import SLOW, Defect, corpus
 from support.hostile_tables import FAMILIES, reading_seconds
 
@@ -94,7 +93,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60.0, help="of all formats together")
     parser.add_argument("--cases", type=int, help="of each format, in place of --seconds")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--suffix", nargs="*", default=[each for each in SUFFIXES if corpus(each)])
+    parser.add_argument("--suffix", nargs="*", default=[each for each in READERS if corpus(each)])
     parser.add_argument("--families", type=int, metavar="BYTES", help="time of costly files of this size")
     options = parser.parse_args()
     if options.families:

@@ -18,6 +18,7 @@ import traceback
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 
@@ -106,8 +107,22 @@ def write_mat_73(path: Path) -> None:
             file[name].attrs["MATLAB_class"] = np.bytes_("double")
 
 
+def write_mdf(path: Path) -> None:
+    """Write the record of the corpus as MDF, with the same bytes at every run."""
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as file:
+        file.start_time = datetime(2026, 1, 1, tzinfo=UTC)
+        file.append([Signal(U, T, name="u", unit="V"), Signal(Y, T, name="y", unit="um")])
+        file.save(path, overwrite=True)
+
+
 #: Files in addition to those of the corpus.
-FURTHER = (OddFile("Parquet", "r.parquet", write_parquet), OddFile("MAT 7.3", "r.mat", write_mat_73))
+FURTHER = (
+    OddFile("Parquet", "r.parquet", write_parquet),
+    OddFile("MAT 7.3", "r.mat", write_mat_73),
+    OddFile("MDF", "r.mf4", write_mdf),
+)
 
 
 @cache
@@ -127,6 +142,9 @@ def _remove_dates(content: bytes) -> bytes:
     """Return a file without the time of its writing, so that its mutations are the same at every run."""
     if content.startswith(b"MATLAB 5.0"):
         return b"MATLAB 5.0 MAT-file".ljust(116) + content[116:]
+    if content.startswith(b"MDF"):
+        at = content.index(b"##FH") + 40  # the time of the block of the file's history
+        return content[:at] + bytes(8) + content[at + 8 :]
     try:
         members = _read_members(content)
     except zipfile.BadZipFile:

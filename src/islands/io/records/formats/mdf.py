@@ -1,8 +1,10 @@
 """MDF files of test benches and loggers (.mf4, .mdf), read by asammdf (extra `mdf`)."""
 
+import logging
+import textwrap
 import weakref
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,9 @@ from islands.io.records.validation import MIN_SAMPLES
 
 #: Name of the column with the times of a group.
 _TIME = "t_s"
+
+#: Characters of an error of the library in a message.
+_SHOWN = 120
 
 
 def read_mdf(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarFile:
@@ -60,8 +65,19 @@ def read_mdf(path: Path, options: ReadingOptions = DEFAULT_READING) -> ColumnarF
 
 def _open(path: Path) -> Any:
     from asammdf import MDF  # noqa: PLC0415
+    from asammdf.blocks.mdf_v3 import MDF3  # noqa: PLC0415
+    from asammdf.blocks.mdf_v4 import MDF4  # noqa: PLC0415
 
+    # The destructor of a reader that has not opened its file raises, and Python prints the traceback.
+    MDF3.__del__ = MDF4.__del__ = _close
+    # It also logs what it finds in a damaged file, and then raises or reads it.
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)
     return MDF(path)
+
+
+def _close(reader: Any) -> None:
+    with suppress(Exception):
+        reader.close()
 
 
 @contextmanager
@@ -73,7 +89,9 @@ def _translated_errors(file: str) -> Iterator[None]:
     try:
         yield
     except (*DAMAGED, MdfException) as error:
-        raise RecordError(f"{file} is damaged or not an MDF file ({error}): write it again") from error
+        # The library quotes whole blocks of the file.
+        reason = textwrap.shorten(str(error), _SHOWN, placeholder="...")
+        raise RecordError(f"{file} is damaged or not an MDF file ({reason}): write it again") from error
 
 
 def _name_groups(file: Any) -> dict[str, int]:
@@ -94,12 +112,14 @@ def _name_channel(channel: Any) -> str:
 def _read_times(file: Any, path: Path, number: int) -> NDArray[Any]:
     with _translated_errors(path.name):
         _check_size(file, path, number, _TIME)
+        _check_places(file, path, number)
         return np.asarray(file.get_master(number))
 
 
 def _read_channel(file: Any, path: Path, number: int, place: int, name: str) -> NDArray[Any]:
     with _translated_errors(path.name):
         _check_size(file, path, number, name)
+        _check_places(file, path, number, place)
         return np.asarray(file.get(group=number, index=place).samples)
 
 
@@ -107,3 +127,20 @@ def _check_size(file: Any, path: Path, number: int, name: str) -> None:
     group = file.groups[number].channel_group
     check_samples(group.cycles_nr, name, path.name)
     check_stored(group.cycles_nr * group.samples_byte_nr, path.stat().st_size, True, name, path.name)
+
+
+def _check_places(file: Any, path: Path, number: int, *places: int) -> None:
+    """Refuse channels outside of the records of their group: the library reads beyond its memory for them.
+
+    It reads the times of the group with each channel.
+    """
+    group = file.groups[number]
+    master = file.masters_db.get(number)
+    for place in (*places, *([] if master is None else [master])):
+        channel = group.channels[place]
+        bits = channel.bit_count + getattr(channel, "bit_offset", 0)
+        if getattr(channel, "byte_offset", 0) + -(-bits // 8) > group.channel_group.samples_byte_nr:
+            raise RecordError(
+                f"{path.name}: channel {channel.name} is outside of the records of its group: the file is "
+                "damaged, write it again"
+            )

@@ -1,5 +1,8 @@
 """MDF files: the channels of a channel group with its times and units."""
 
+import gc
+import re
+
 import numpy as np
 import pytest
 
@@ -28,3 +31,35 @@ def test_a_channel_group_is_read_with_its_times_and_units(tmp_path):
     path.write_bytes(b"MDF" + bytes(200))
     with pytest.raises(RecordError, match=r"r\.mf4 is damaged or not an MDF file"):
         read_record(path, ["u"], "y")
+
+
+def save(path):
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as file:
+        file.append([Signal(K % 7 - 3.0, K / 100, name="u", unit="V"), Signal(K % 11, K / 100, name="y")])
+        file.save(path)
+    return path.read_bytes()
+
+
+def test_a_file_truncated_at_any_position_is_refused_without_other_output(tmp_path, capfd):
+    content = save(tmp_path / "whole.mf4")
+    path = tmp_path / "r.mf4"
+    for length in range(0, len(content) - 3000, 211):
+        path.write_bytes(content[:length])
+        with pytest.raises(RecordError) as caught:
+            read_record(path, ["u"], "y")
+        assert len(str(caught.value)) < 300
+        gc.collect()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_channel_outside_of_its_records_is_refused(tmp_path):
+    content = save(tmp_path / "whole.mf4")
+    path = tmp_path / "r.mf4"
+    places = [found.start() + 92 for found in re.finditer(b"##CN", content)]
+    assert len(places) == 3
+    for place in places:
+        path.write_bytes(content[:place] + (60_000).to_bytes(4, "little") + content[place + 4 :])
+        with pytest.raises(RecordError, match=r"outside of the records of its group"):
+            read_record(path, ["u"], "y")
