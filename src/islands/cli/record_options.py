@@ -22,11 +22,15 @@ _LISTS = frozenset({"names", "missing"})
 
 def _make_option(option: Field[Any]) -> Parameter:
     if option.name == "header":
-        annotation: Any = Annotated[bool, typer.Option("--no-header", help=option.metadata["help"])]
+        annotation: Any = Annotated[
+            bool, typer.Option(ReadingOptions.flag(option.name), help=option.metadata["help"])
+        ]
         default = False
     else:
         kind = _TYPES.get(option.name, str | None)
-        annotation = Annotated[kind, typer.Option(f"--{option.name}", help=option.metadata["help"])]
+        annotation = Annotated[
+            kind, typer.Option(ReadingOptions.flag(option.name), help=option.metadata["help"])
+        ]
         default = None
     return make_option(_PREFIX + option.name, annotation, default)
 

@@ -25,7 +25,7 @@ from islands.io.records.column_names import find_column, split_structures
 from islands.io.records.preview import ColumnPreview, Preview, preview_table
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, KEEP, ReadingOptions
-from islands.io.records.sampling.time_step import time_scale
+from islands.io.records.sampling.time_step import find_time_scale
 from islands.io.records.table import Columns, Table
 from islands.io.records.table_reading import exclude_gross_errors, read_table
 from islands.io.records.validation import MIN_SAMPLES, check_choice
@@ -233,7 +233,9 @@ class _FileInspection:
         dt = self.found.dt if self.dt is None else self.dt
         problem = _find_sampling_problem(self.found, dt)
         if time is not None and time in read and len(read[time].rows) == size:
-            seconds = read[time].numbers[time] * self._scale(read[time], time)
+            structure = split_structures(self.table.names)[time]
+            scale = find_time_scale(self.table, read[time], time, structure, self.reading)
+            seconds = scale.stamps * scale.seconds
             stamps = describe_stamps(seconds) if np.isfinite(seconds).all() else None
         if stamps is None:
             return None, InspectedSampling(time, size, dt, None, (), (), (), NO_BREAKS, problem)
@@ -246,10 +248,6 @@ class _FileInspection:
         return stamps, InspectedSampling(
             time, size, dt, stamps.jitter, gaps, repeated, backward, stamps.counts, problem
         )
-
-    def _scale(self, columns: Columns, time: str) -> float:
-        structure = split_structures(self.table.names)[time]
-        return time_scale(self.table, columns, time, structure, self.reading.time is not None)
 
     def _field(self, name: str) -> str:
         return name.removeprefix(split_structures(self.table.names)[name])
@@ -332,11 +330,9 @@ class _FileInspection:
         if stamps is not None and stamps.breaks and not self.reading.gaps and self.reading.resample is None:
             words += ["--gaps", "split"]
         for name, value in self.reading.changes().items():
-            words += (
-                ["--no-header"]
-                if name == "header"
-                else [f"--{name}", ",".join(value) if isinstance(value, list) else str(value)]
-            )
+            words.append(self.reading.flag(name))
+            if name != "header":
+                words.append(",".join(value) if isinstance(value, list) else str(value))
         return shlex.join([*words, "--out", "result"])
 
 

@@ -12,13 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.column_names import TIME_UNITS, looks_like_time, seconds_per_unit
+from islands.io.records.column_names import looks_like_time, seconds_per_unit
 
 if TYPE_CHECKING:
     import xarray
 
 #: Column that a time index without a name becomes.
 _TIME = "time"
+
+#: Column that a coordinate with a unit of time becomes.
+_SECONDS = "time_s"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,8 +135,9 @@ def _read_xarray(data: "xarray.Dataset") -> MemoryColumns:
             if kind in "mM":
                 time = _TIME, _load_variable(variable)
             elif kind in "fiu" and looks_like_time(str(name)):
-                seconds = TIME_UNITS.get(unit)
-                time = str(name) if seconds is None else _TIME, variable.values * (seconds or 1.0)
+                # "days since 2000-01-01" are the conventions for climate data, if they are not decoded.
+                seconds = seconds_per_unit(f"t ({unit.partition(' since ')[0]})") if unit else None
+                time = str(name) if seconds is None else _SECONDS, variable.values * (seconds or 1.0)
     units = {str(name): str(variable.attrs.get("units", "")) for name, variable in data.variables.items()}
     if time is not None:
         loads = {name: load for name, load in loads.items() if data[name].dims != (name,)}

@@ -9,7 +9,7 @@ from islands.data.channel_names import AT_ONCE, is_unit, normalise_unit, parse_u
 from islands.errors import RecordError
 
 #: Units of time columns in seconds. A column without a unit is in seconds.
-TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86_400.0}
 
 #: Units with which a capital T means a temperature.
 TEMPERATURE_UNITS = ("K", "C", "degC", "°C", "F", "degF", "°F")
@@ -23,7 +23,7 @@ _TIME = re.compile(
 _OPENING, _CLOSING = "_[(/", "])"
 
 #: Last words of names of time columns that are not a unit.
-_WORDS = ("time", "value", "stamp")
+_WORDS = ("time", "value", "stamp", "utc", "gmt", "local", "unix", "posix", "epoch", "excel", "serial")
 
 
 #: Names that a message lists, at most.
@@ -77,8 +77,23 @@ def looks_like_time(name: str) -> bool:
 
 def seconds_per_unit(name: str) -> float | None:
     """Return the unit of a time column in seconds, None if the unit is unknown."""
+    return TIME_UNITS.get(_unit_word(name))
+
+
+def states_unit(name: str) -> bool:
+    """Return whether a name ends in a unit of time, as a symbol or in words: ``t_ms``, ``Time (days)``.
+
+    ``y_min`` is the least y, so that short symbols count behind the name of a time only.
+    """
+    unit = _unit_word(name)
+    is_word = spell_unit(_last_word(name).lower()) != _last_word(name).lower()
+    return unit != "" and unit in TIME_UNITS and (is_word or bool(parse_unit(name)))
+
+
+def _unit_word(name: str) -> str:
+    """Return the last word of a name as a symbol, empty if it is not meant as a unit."""
     text = normalise_unit(spell_unit(_last_word(name).lower()))
-    return TIME_UNITS.get("" if text.isdigit() or text in _WORDS else text)
+    return "" if text.isdigit() or text in _WORDS else text
 
 
 def _last_word(name: str) -> str:

@@ -12,7 +12,7 @@ from islands.errors import RecordError
 from islands.io.records.column_names import find_column, split_structures, time_column
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.sampling.time_step import find_sampling
+from islands.io.records.sampling.time_step import find_sampling, find_time_scale
 from islands.io.records.table import Columns, RowRange, Table
 from islands.io.records.validation import (
     MIN_SAMPLES,
@@ -95,7 +95,7 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
     main = groups[0][0] if groups else None
     unmatched, unequal = _check_lengths(groups, columns, file)
     problems = unread | unmatched
-    time, dt, sampling_problem = _preview_sampling(table, columns, problems, main, file, options.time)
+    time, dt, sampling_problem = _preview_sampling(table, columns, problems, main, file, options)
     for name, column in columns.items():
         problems.setdefault(name, _find_problem(column, name, is_time=name == time))
     warnings = (
@@ -103,6 +103,7 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
         *unequal,
         _error_message(check_length, columns[main]) if main else "",
         sampling_problem,
+        _describe_time_unit(table, columns, time, options),
         *table.remarks(tuple(columns)),
         *dict.fromkeys(note for column in columns.values() for note in column.notes),
     )
@@ -176,13 +177,13 @@ def _preview_sampling(
     problems: Mapping[str, str],
     main: str | None,
     file: str,
-    given: str | None,
+    options: ReadingOptions,
 ) -> tuple[str | None, float | None, str]:
     """Return the time column, the sampling time in seconds, and the reason if the latter is unknown."""
     time = None
     structure = split_structures(table.names)[main] if main else ""
     try:
-        named = None if given is None else find_column(given, table.names)
+        named = None if options.time is None else find_column(options.time, table.names)
         time = named or time_column(table.names, file, structure=structure, clocks=table.clocks)
         source = time or main
         if source is not None and source in problems:
@@ -192,9 +193,21 @@ def _preview_sampling(
             check_values(known, time)
             if len(known.rows) < 2:  # no step; the message of `check_length` is more helpful
                 return time, None, ""
-        return time, find_sampling(table, known, time, None, structure, given is not None)[0], ""
+        return time, find_sampling(table, known, time, None, structure, options)[0], ""
     except RecordError as error:
         return time, None, str(error)
+
+
+def _describe_time_unit(
+    table: Table, columns: Mapping[str, Columns], time: str | None, options: ReadingOptions
+) -> str:
+    """Return the unit of the time column if it was assumed; empty otherwise."""
+    if time is None or time not in columns:
+        return ""
+    try:
+        return find_time_scale(table, columns[time], time, split_structures(table.names)[time], options).note
+    except RecordError:
+        return ""  # `_preview_sampling` states it
 
 
 def _find_problem(column: Columns, name: str, is_time: bool) -> str:

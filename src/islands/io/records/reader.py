@@ -54,6 +54,7 @@ def read_record(
     names: Sequence[str] = (),
     header: bool = True,
     time: str | None = None,
+    time_unit: str | None = None,
     sheet: str | None = None,
     decimal: str | None = None,
     dates: str | None = None,
@@ -104,6 +105,10 @@ def read_record(
         Whether a table has a header. Without one and without ``names``, the columns are c1, c2, ...
     time : str, optional
         The time column, if its name does not tell. Without a unit it is in seconds.
+    time_unit : str, optional
+        Unit of the numbers of the time column: ``s``, ``ms``, ``us``, ``ns``, ``min``, ``h`` or ``d``. By
+        default that of its name, or of a known count: days of Excel and MATLAB, seconds of LabVIEW, seconds
+        to nanoseconds of Unix, ticks of Windows. ``reading`` of the record then states it.
     sheet : str, optional
         Sheet of a workbook, or group of an HDF5, MDF or TDMS file; by default the first with a table.
     decimal : str, optional
@@ -145,6 +150,7 @@ def read_record(
         names=tuple(names),
         header=header,
         time=time,
+        time_unit=time_unit,
         sheet=sheet,
         decimal=decimal,
         dates=dates,

@@ -7,12 +7,16 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 from islands.errors import SettingsError, suggest
+from islands.io.records.column_names import TIME_UNITS
 
 #: Characters of the decimal marks by the values of ``decimal``.
 DECIMAL_MARKS = {"point": ".", "comma": ","}
 
 #: Values of ``dates``: the order of day and month in dates such as 3/4/2026.
 DATE_ORDERS = ("day-first", "month-first")
+
+#: Values of ``time_unit``.
+TIME_UNIT_CHOICES = tuple(unit for unit in TIME_UNITS if unit)
 
 #: Values of ``gaps``.
 GAPS = ("split", "interpolate")
@@ -38,6 +42,9 @@ class ReadingOptions:
         c2, ...
     time : str, optional
         The time column; by default it is found by its name.
+    time_unit : str, optional
+        Unit of the numbers of the time column, ``s``, ``ms``, ``us``, ``ns``, ``min``, ``h`` or ``d``; by
+        default that of its name, or of a known count such as the days of Excel.
     sheet : str, optional
         Sheet of a workbook, or group of an HDF5, MDF or TDMS file; by default the first with a table.
     decimal : str, optional
@@ -65,6 +72,9 @@ class ReadingOptions:
     names: tuple[str, ...] = _option("Names of the columns of a table without header, as a,b,c.", ())
     header: bool = _option("The table has no header: its columns are c1, c2, ...", True)
     time: str | None = _option("Time column, if its name does not tell.")
+    time_unit: str | None = _option(
+        "Unit of the time column: s, ms, us, ns, min, h or d; by default inferred."
+    )
     sheet: str | None = _option("Sheet of a workbook, or group of a file; by default the first with a table.")
     decimal: str | None = _option("Decimal mark: point or comma; by default inferred.")
     dates: str | None = _option("Order in dates such as 3/4/2026: day-first or month-first.")
@@ -88,6 +98,7 @@ class ReadingOptions:
         if not all(words):
             raise SettingsError("--missing: a word is empty; empty cells are missing values without it")
         object.__setattr__(self, "missing", words)
+        _check_choice("time-unit", self.time_unit, TIME_UNIT_CHOICES)
         _check_choice("decimal", self.decimal, DECIMAL_MARKS)
         _check_choice("dates", self.dates, DATE_ORDERS)
         _check_choice("gaps", self.gaps, GAPS)
@@ -95,6 +106,11 @@ class ReadingOptions:
         if self.resample is not None and not (isfinite(self.resample) and self.resample > 0):
             raise SettingsError(f"--resample is a number of seconds above 0, got {self.resample}")
         _check_timezone(self.timezone)
+
+    @staticmethod
+    def flag(name: str) -> str:
+        """Return the option of the command line for a field: ``--time-unit`` for ``time_unit``."""
+        return "--no-header" if name == "header" else f"--{name.replace('_', '-')}"
 
     @property
     def has_header(self) -> bool:

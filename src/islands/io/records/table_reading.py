@@ -14,7 +14,7 @@ from islands.io.records.column_names import find_column, split_structures, time_
 from islands.io.records.reading_options import DEFAULT_READING, KEEP, ReadingOptions
 from islands.io.records.sampling.recording import Recording, UniformRecording
 from islands.io.records.sampling.repair import join_recordings, make_uniform
-from islands.io.records.sampling.time_step import find_sampling, make_recording
+from islands.io.records.sampling.time_step import find_sampling, find_time_scale, make_recording
 from islands.io.records.table import Columns, Table
 from islands.io.records.validation import (
     and_others,
@@ -74,7 +74,6 @@ def read_table(
     if options.gaps is None:
         for name in columns.numbers:
             check_values(columns, name, missing=name == output)
-    is_given = time is not None
     parts = [part for part in columns.split(clock) if len(part.rows) > 1]
     blocks = [np.column_stack([part.numbers[name] for name in chosen]) for part in parts]
     steps = [
@@ -83,19 +82,22 @@ def read_table(
         *(f"{errors} are left out" for errors in excluded),
     ]
     if options.gaps is None and options.resample is None:
-        step, start = find_sampling(table, columns, clock, dt, structure, is_given)
+        step, start = find_sampling(table, columns, clock, dt, structure, options)
         start = step * columns.first if start is None else start
         segments = tuple(map(len, blocks)) if len(blocks) > 1 else ()
         found = UniformRecording(np.concatenate(blocks), step, start, segments, tuple(steps))
     else:
         recordings = [
-            make_recording(table, part, values, clock, dt, structure, is_given)
+            make_recording(table, part, values, clock, dt, structure, options)
             for part, values in zip(parts, blocks, strict=True)
         ]
         found = _repair(recordings, chosen, required, options, file)
         found = replace(found, steps=(*steps, *found.steps))
     for name in () if missing_output else (*(() if resting_inputs else sources), *outputs):
         check_varies(columns, name)
+    if clock is not None:
+        note = find_time_scale(table, columns, clock, structure, options).note
+        found = replace(found, steps=(*([note] if note else []), *found.steps))
     record = _make_record(found, sources, output, structures, columns.units, file)
     return advance_inputs(record, _find_advanced(inputs, sources))
 

@@ -5,16 +5,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.channel_names import parse_unit
 from islands.errors import RecordError
 from islands.io.records.column_names import TIME_UNITS, looks_like_time, seconds_per_unit
+from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.sampling.recording import Recording
+from islands.io.records.sampling.time_unit import TimeScale, find_time_unit
 from islands.io.records.sampling.uniform_grid import AGREEMENT, agrees_with_step, uniform_step
-from islands.io.records.table import Columns, Table
-
-#: Smallest numbers of time stamps without a unit that cannot be seconds since 1970, and the units of such
-#: numbers in seconds: 1e11 s are 3000 years.
-_EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
+from islands.io.records.table import Columns, RowRange, Table
 
 
 def find_sampling(
@@ -23,7 +20,7 @@ def find_sampling(
     time: str | None,
     dt: float | None,
     structure: str = "",
-    given: bool = False,
+    options: ReadingOptions = DEFAULT_READING,
 ) -> tuple[float, float | None]:
     """Return the sampling time and the time of the first sample in seconds.
 
@@ -40,8 +37,8 @@ def find_sampling(
         stamps.
     structure : str
         The structure of the output. A sampling time stated in it takes precedence over one at the top level.
-    given : bool
-        Whether the user has named the time column.
+    options : ReadingOptions
+        The name and the unit of the time column, if the user has given them.
 
     Raises
     ------
@@ -49,23 +46,28 @@ def find_sampling(
         The time column is not uniform, the sampling time is unknown, or two sources disagree.
     """
     if len(parts := columns.split(time)) > 1:
-        return _find_common_sampling(table, parts, time, dt, structure, given)
+        return _find_common_sampling(table, parts, time, dt, structure, options)
     file = columns.rows.file
     known: dict[str, float] = {}
     start = None
+    if time is None and options.time_unit is not None:
+        raise RecordError(
+            f"{file} has no time column that --time-unit could describe: name the column by --time, or leave "
+            "--time-unit out (library: time=, time_unit=)"
+        )
     if dt is not None and not (np.isfinite(dt) and dt > 0):
         raise RecordError(
             f"the sampling time --dt (library: dt=) must be a positive number of seconds, got {dt}"
         )
     if time is not None:
-        stamps = columns.numbers[time]
-        seconds = time_scale(table, columns, time, structure, given)
+        scale = find_time_scale(table, columns, time, structure, options)
+        stamps, seconds = scale.stamps, scale.seconds
         if dt is not None and agrees_with_step(stamps, dt / seconds):
-            step = _uniform_step_or(dt / seconds, columns, time, seconds)
+            step = _uniform_step_or(dt / seconds, scale, time, columns.rows)
         else:
             step = uniform_step(stamps, time, columns.rows, seconds)
         known[f"column {time}"] = step * seconds
-        start = None if time in columns.clocks else float(stamps[0]) * seconds
+        start = None if scale.elapsed else float(stamps[0]) * seconds
     if dt is not None:
         known["--dt (library: dt=)"] = float(dt)
     known |= {f"array {name}": seconds for name, seconds in table.stated(structure).items()}
@@ -75,14 +77,19 @@ def find_sampling(
 
 
 def _find_common_sampling(
-    table: Table, parts: Sequence[Columns], time: str | None, dt: float | None, structure: str, given: bool
+    table: Table,
+    parts: Sequence[Columns],
+    time: str | None,
+    dt: float | None,
+    structure: str,
+    options: ReadingOptions,
 ) -> tuple[float, float | None]:
     """Return the sampling time of all recordings of a file, and the time of the first sample."""
     file = parts[0].rows.file
     parts = [part for part in parts if len(part.rows) > 1]
     if not parts:
         raise RecordError(f"{file}: each sample has its header: delete the repeated headers")
-    found = [find_sampling(table, part, time, dt, structure, given) for part in parts]
+    found = [find_sampling(table, part, time, dt, structure, options) for part in parts]
     known = {f"the rows from {part.rows.row(0)}": step for part, (step, _) in zip(parts, found, strict=True)}
     return _reconcile(known, file), found[0][1]
 
@@ -94,14 +101,14 @@ def make_recording(
     time: str | None,
     dt: float | None,
     structure: str = "",
-    given: bool = False,
+    options: ReadingOptions = DEFAULT_READING,
 ) -> Recording:
     """Return samples with their times, which may be irregular. Without a time column they are uniform.
 
     Parameters
     ----------
     values : ndarray, shape (samples, columns)
-    table, columns, time, dt, structure, given
+    table, columns, time, dt, structure, options
         As in `find_sampling`.
 
     Raises
@@ -110,39 +117,47 @@ def make_recording(
         The sampling time is unknown.
     """
     if time is None:
-        step, _ = find_sampling(table, columns, None, dt, structure)
+        step, _ = find_sampling(table, columns, None, dt, structure, options)
         stamps = step * (columns.first + np.arange(len(values), dtype=np.float64))
         return Recording(columns.rows, stamps, values, "time", 1.0)
-    seconds = time_scale(table, columns, time, structure, given)
-    return Recording(columns.rows, columns.numbers[time], values, time, seconds)
+    scale = find_time_scale(table, columns, time, structure, options)
+    return Recording(columns.rows, scale.stamps, values, time, scale.seconds)
 
 
-def _uniform_step_or(step: float, columns: Columns, time: str, seconds: float) -> float:
+def _uniform_step_or(step: float, scale: TimeScale, time: str, rows: RowRange) -> float:
     """Return the mean step of the time column if it is uniform, else the given step."""
     try:
-        return uniform_step(columns.numbers[time], time, columns.rows, seconds)
+        return uniform_step(scale.stamps, time, rows, scale.seconds)
     except RecordError:
         return step
 
 
-def time_scale(table: Table, columns: Columns, time: str, structure: str = "", given: bool = False) -> float:
-    """Return the unit of the numbers of a time column in seconds.
+def find_time_scale(
+    table: Table,
+    columns: Columns,
+    time: str,
+    structure: str = "",
+    options: ReadingOptions = DEFAULT_READING,
+) -> TimeScale:
+    """Return the numbers of a time column with their unit.
 
     Raises
     ------
     RecordError
-        The unit is unknown.
+        The unit is unknown, or a unit is given for time stamps.
     """
     if time in columns.clocks:
-        return 1.0
+        if options.time_unit is not None:
+            raise RecordError(
+                f"{columns.rows.file}: column {time} holds time stamps, which have no unit: leave "
+                "--time-unit out (library: time_unit=)"
+            )
+        return TimeScale(columns.numbers[time], 1.0, elapsed=True)
     field = time.removeprefix(structure)
-    seconds = 1.0 if given and not parse_unit(field) else seconds_per_unit(field)
-    if seconds is None:
+    found = find_time_unit(columns.numbers[time], field, options.time is not None, options.time_unit)
+    if found is None:
         raise RecordError(_unknown_sampling_message(table, columns.rows.file, structure))
-    if not parse_unit(field):
-        largest = float(np.nanmax(np.abs(columns.numbers[time]), initial=0.0))
-        return next((unit for least, unit in _EPOCHS if largest >= least), seconds)
-    return seconds
+    return found
 
 
 def _unknown_sampling_message(table: Table, file: str, structure: str) -> str:
@@ -156,7 +171,10 @@ def _unknown_sampling_message(table: Table, file: str, structure: str) -> str:
     ]
     if unknown_unit:
         units = ", ".join(unit for unit in TIME_UNITS if unit)
-        message += f"; if {unknown_unit[0]} is the time, end its name in one of the units {units}"
+        message += (
+            f"; if {unknown_unit[0]} is the time, end its name in one of the units {units}, or give "
+            "--time and --time-unit (library: time=, time_unit=)"
+        )
     return message
 
 

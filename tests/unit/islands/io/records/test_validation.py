@@ -267,9 +267,9 @@ def test_a_file_without_a_sampling_time_is_refused(tmp_path):
 
 def test_a_time_column_in_an_unknown_unit_is_named(tmp_path):
     rows = lines()
-    rows[0] = "t_days,u_V,y_um"
+    rows[0] = "t_weeks,u_V,y_um"
     message = refusal(tmp_path, rows)
-    assert "if t_days is the time, end its name in one of the units s, ms, us, ns, min, h" in message
+    assert "if t_weeks is the time, end its name in one of the units s, ms, us, ns, min, h" in message
 
 
 def test_two_possible_time_columns_are_refused(tmp_path):

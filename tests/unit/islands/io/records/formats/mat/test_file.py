@@ -160,8 +160,8 @@ def test_each_structure_has_its_own_time_and_sampling_time(save, version):
 
 
 def test_a_field_that_may_be_a_time_in_an_unknown_unit_is_named(save):
-    message = refusal(save("7", run={"u": U, "y": Y, "t_days": T}), ["run.u"], "run.y")
-    assert "if run.t_days is the time, end its name in one of the units s, ms" in message
+    message = refusal(save("7", run={"u": U, "y": Y, "t_weeks": T}), ["run.u"], "run.y")
+    assert "if run.t_weeks is the time, end its name in one of the units s, ms" in message
 
 
 def test_a_structure_with_a_name_like_time_is_not_the_time(save):
