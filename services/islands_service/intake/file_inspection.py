@@ -163,8 +163,9 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
     found = preview_table(table, name, options)
     # Check this first: a message about missing columns lists the existing ones.
     _check_readable(found, name)
+    assumed: tuple[str, ...] = ()
     if request.inputs and request.output is not None:
-        read_table(
+        record = read_table(
             table,
             name,
             request.inputs,
@@ -174,9 +175,13 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
             options=options,
             resting_inputs=request.resting_inputs,
         )
+        assumed = record.reading
     elif options.gaps is None:
         _check_usable({column.name: column.problem for column in found.columns}, request)
-    measured = _measure(table, found, path, request, options)
+    measured, inspected = _measure(table, found, path, request, options)
+    assumed = assumed or inspected
+    warnings = [each for each in found.warnings if not any(step.startswith(each) for step in assumed)]
+    found = replace(found, warnings=(*warnings, *assumed))
     if options.resample is not None:
         found = replace(found, dt=options.resample)
     return {**asdict(found), "inspection": measured, "reading": options.changes()}
@@ -184,8 +189,11 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
 
 def _measure(
     table: "Table", found: "Preview", path: Path, request: InspectionRequest, options: "ReadingOptions"
-) -> dict[str, Any] | None:
-    """Return the choice of columns and the facts about the record; None if there is no record."""
+) -> tuple[dict[str, Any] | None, tuple[str, ...]]:
+    """Return the choice of columns with the facts about the record, and how it was read.
+
+    Both are empty if there is no record.
+    """
     from islands.facade.inspect_record import inspect_table  # noqa: PLC0415
     from islands.inspection.record_facts import MOST_SAMPLES  # noqa: PLC0415
     from islands.io.records.row_range import parse_rows  # noqa: PLC0415
@@ -200,11 +208,12 @@ def _measure(
         )
     except RecordError:
         # The preview states the problems of the file.
-        return None
+        return None, ()
     if not inspected.facts.facts:
-        return None
+        return None, ()
     document = inspected.as_document()
-    return {"rows": rows, "choice": document["choice"], "facts": document["facts"]}
+    assumed = () if inspected.record is None else inspected.record.reading
+    return {"rows": rows, "choice": document["choice"], "facts": document["facts"]}, assumed
 
 
 def _check_columns(names: Sequence[str], file: str) -> None:

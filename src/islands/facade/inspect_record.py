@@ -4,6 +4,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,12 @@ from islands.inspection.stamp_regularity import NO_BREAKS, TimeStamps, describe_
 from islands.io.records.column_names import find_column, split_structures
 from islands.io.records.preview import ColumnPreview, Preview, preview_table
 from islands.io.records.reader import open_record
-from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, KEEP, ReadingOptions
+from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, KEEP, ROWS, SAMPLE, ReadingOptions
+from islands.io.records.sampling.column_clocks import find_clocks, may_differ
+from islands.io.records.sampling.common_clock import ColumnUse, align_columns
+from islands.io.records.sampling.recording import Recording
 from islands.io.records.sampling.time_step import find_time_scale
+from islands.io.records.sampling.time_unit import TimeScale
 from islands.io.records.table import Columns, Table
 from islands.io.records.table_reading import exclude_gross_errors, read_table
 from islands.io.records.validation import MIN_SAMPLES, check_choice
@@ -35,6 +40,9 @@ _MOST_COLUMNS = 32
 
 #: Remark on a file without a sampling time.
 _NO_SAMPLING_TIME = "The sampling time is unknown: the facts count a sample as one second."
+
+#: Samples that columns of different clocks have in common, at least, to be compared at these.
+_LEAST_ALIGNED = 100
 
 #: Samples of a part without gaps that facts are measured on, at least.
 _LEAST_PART = 20
@@ -161,7 +169,7 @@ class _FileInspection:
             if len(column) == size and name != self.found.time and np.isfinite(column).any()
         }
         given = tuple(find_column(name, self.table.names) for name in inputs)
-        choice = choose_columns(usable, given, output)
+        choice = choose_columns(self._align(usable, read), given, output)
         if inputs and choice.inputs:
             choice = replace(choice, inputs=inputs)
         errors, excluded = self._find_gross_errors(read, choice)
@@ -169,13 +177,25 @@ class _FileInspection:
             values |= errors
         stamps, sampling = self._describe_sampling(read, size)
         warnings = [warning for warning in self.found.warnings if warning != sampling.problem]
-        record, facts = None, RecordFacts(())
+        record, facts, remedy = None, RecordFacts(()), self.reading
         if choice.output:
-            repaired, problem = self._read_repaired(choice)
+            repaired, problem = self._read_repaired(choice, self.reading)
             is_repaired = self.reading.gaps is not None or self.reading.resample is not None
-            record = repaired if is_repaired else self._cut(values, choice, sampling.dt or 1.0, stamps)
+            # A record with other samples than the rows has those of columns with different clocks.
+            is_aligned = repaired is not None and not is_repaired and repaired.samples != size
+            if repaired is not None and is_aligned:
+                sampling = _describe_aligned(repaired, sampling)
+                steps = repaired.reading
+                warnings = [each for each in warnings if not any(step.startswith(each) for step in steps)]
+                warnings += steps
+            if is_repaired or is_aligned:
+                record = repaired
+            else:
+                record = self._cut(values, choice, sampling.dt or 1.0, stamps)
             facts = measure_facts(record) if record is not None else facts
             warnings += [problem, *excluded]
+            if repaired is None and not is_repaired:
+                remedy = self._find_remedy(choice, sampling.dt)
         if sampling.dt is None and facts.facts:
             warnings.append(_NO_SAMPLING_TIME)
         return RecordInspection(
@@ -185,7 +205,7 @@ class _FileInspection:
             choice,
             facts,
             tuple(dict.fromkeys(filter(None, [sampling.problem, *warnings]))),
-            self._make_command(choice, stamps),
+            self._make_command(choice, remedy),
             record,
         )
 
@@ -221,6 +241,26 @@ class _FileInspection:
             treatment = "are used; --outliers exclude leaves them out"
         return found.numbers, [f"{errors} {treatment}" for errors in excluded]
 
+    def _align(
+        self, usable: Mapping[str, NDArray[np.float64]], read: Mapping[str, Columns]
+    ) -> Mapping[str, NDArray[np.float64]]:
+        """Return columns with samples in different rows at the times of the slowest one."""
+        if self.reading.rates == ROWS or not usable:
+            return usable
+        names, values = tuple(usable), np.column_stack(list(usable.values()))
+        if not may_differ(values, ()):
+            return usable
+        time, rows = self.found.time, read[names[0]].rows
+        stamps = np.arange(len(values), dtype=np.float64)
+        if time is not None and time in read and len(read[time].rows) == len(values):
+            stamps = self._scale(read[time], time).stamps
+        clocks = find_clocks(stamps, values, ())
+        if not clocks:
+            return usable
+        recording = Recording(rows, stamps, values, str(time), 1.0)
+        aligned = align_columns(recording, clocks, ColumnUse(names, (), SAMPLE), []).values
+        return dict(zip(names, aligned.T, strict=True)) if len(aligned) >= _LEAST_ALIGNED else usable
+
     @staticmethod
     def _most_common_length(values: Mapping[str, NDArray[np.float64]]) -> int:
         lengths = [len(column) for column in values.values()]
@@ -233,8 +273,7 @@ class _FileInspection:
         dt = self.found.dt if self.dt is None else self.dt
         problem = _find_sampling_problem(self.found, dt)
         if time is not None and time in read and len(read[time].rows) == size:
-            structure = split_structures(self.table.names)[time]
-            scale = find_time_scale(self.table, read[time], time, structure, self.reading)
+            scale = self._scale(read[time], time)
             seconds = scale.stamps * scale.seconds
             stamps = describe_stamps(seconds) if np.isfinite(seconds).all() else None
         if stamps is None:
@@ -248,6 +287,10 @@ class _FileInspection:
         return stamps, InspectedSampling(
             time, size, dt, stamps.jitter, gaps, repeated, backward, stamps.counts, problem
         )
+
+    def _scale(self, columns: Columns, time: str) -> TimeScale:
+        structure = split_structures(self.table.names)[time]
+        return find_time_scale(self.table, columns, time, structure, self.reading)
 
     def _field(self, name: str) -> str:
         return name.removeprefix(split_structures(self.table.names)[name])
@@ -283,16 +326,30 @@ class _FileInspection:
             segments=tuple(int(length) for length in np.unique(part[kept], return_counts=True)[1]),
         )
 
-    def _read_repaired(self, choice: ColumnChoice) -> tuple[Dataset | None, str]:
+    def _read_repaired(self, choice: ColumnChoice, reading: ReadingOptions) -> tuple[Dataset | None, str]:
         """Return the record as it is read for a search, or the message with which it is refused."""
         file = self.path.name
         try:
             record = read_table(
-                *(self.table, file, choice.inputs, choice.output, self.dt, self.rows), options=self.reading
+                *(self.table, file, choice.inputs, choice.output, self.dt, self.rows), options=reading
             )
         except RecordError as error:
             return None, str(error)
         return record, ""
+
+    def _find_remedy(self, choice: ColumnChoice, dt: float | None) -> ReadingOptions:
+        """Return the first options with which the record can be read; those that are given if none helps."""
+        step = None if dt is None else float(f"{dt:.6g}")
+        remedies: list[dict[str, Any]] = [
+            {"gaps": "split"},
+            {"resample": step},
+            {"gaps": "split", "resample": step},
+        ]
+        for changes in remedies if step is not None else remedies[:1]:
+            reading = replace(self.reading, **changes)
+            if self._read_repaired(choice, reading)[0] is not None:
+                return reading
+        return self.reading
 
     def _describe_columns(
         self, values: Mapping[str, NDArray[np.float64]], choice: ColumnChoice
@@ -315,7 +372,7 @@ class _FileInspection:
             return InspectedColumn(column.name, column.unit, role, None, None, 0, column.problem)
         return _describe_values(column.name, column.unit, role, values[column.name], column.problem)
 
-    def _make_command(self, choice: ColumnChoice, stamps: TimeStamps | None) -> str:
+    def _make_command(self, choice: ColumnChoice, reading: ReadingOptions) -> str:
         if not choice.output:
             return ""
         words = ["islands", "identify", str(self.path)]
@@ -327,13 +384,16 @@ class _FileInspection:
         if self.rows is not None:
             bounds = ("" if bound is None else str(bound) for bound in (self.rows.start, self.rows.stop))
             words += ["--rows", ":".join(bounds)]
-        if stamps is not None and stamps.breaks and not self.reading.gaps and self.reading.resample is None:
-            words += ["--gaps", "split"]
-        for name, value in self.reading.changes().items():
-            words.append(self.reading.flag(name))
+        for name, value in reading.changes().items():
+            words.append(reading.flag(name))
             if name != "header":
                 words.append(",".join(value) if isinstance(value, list) else str(value))
         return shlex.join([*words, "--out", "result"])
+
+
+def _describe_aligned(record: Dataset, sampling: InspectedSampling) -> InspectedSampling:
+    """Return the sampling of a record whose columns had different clocks: the rows are not its samples."""
+    return InspectedSampling(sampling.time, record.samples, record.dt, None, (), (), (), NO_BREAKS, "")
 
 
 def _find_sampling_problem(found: Preview, dt: float | None) -> str:

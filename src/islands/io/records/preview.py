@@ -11,8 +11,11 @@ from islands.data.channel_names import parse_unit
 from islands.errors import RecordError
 from islands.io.records.column_names import find_column, split_structures, time_column
 from islands.io.records.reader import open_record
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.io.records.reading_options import DEFAULT_READING, ROWS, ReadingOptions
+from islands.io.records.sampling.column_clocks import ColumnClock, find_clocks, may_differ
+from islands.io.records.sampling.common_clock import common_step, describe_clocks
 from islands.io.records.sampling.time_step import find_sampling, find_time_scale
+from islands.io.records.sampling.time_unit import TimeScale
 from islands.io.records.table import Columns, RowRange, Table
 from islands.io.records.validation import (
     MIN_SAMPLES,
@@ -96,13 +99,19 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
     unmatched, unequal = _check_lengths(groups, columns, file)
     problems = unread | unmatched
     time, dt, sampling_problem = _preview_sampling(table, columns, problems, main, file, options)
+    names, clocks, row_times = _find_clocks(table, columns, groups, time, dt, options)
+    own = {name: each for name, each in zip(names, clocks, strict=True) if each.kind == "cells"}
+    if own and dt is None and (common := common_step(clocks)) is not None:
+        # The rows are those of several clocks, and irregular for this reason.
+        dt, sampling_problem = float(f"{common * row_times.seconds:.12g}"), ""
     for name, column in columns.items():
-        problems.setdefault(name, _find_problem(column, name, is_time=name == time))
+        problems.setdefault(name, _find_problem(column, name, name == time, name in own))
     warnings = (
         _error_message(check_unique, table.names, file),
         *unequal,
         _error_message(check_length, columns[main]) if main else "",
         sampling_problem,
+        describe_clocks(names, clocks, row_times.seconds) if own else "",
         _describe_time_unit(table, columns, time, options),
         *table.remarks(tuple(columns)),
         *dict.fromkeys(note for column in columns.values() for note in column.notes),
@@ -110,7 +119,8 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
     return Preview(
         columns=tuple(
             _preview_column(
-                name, _find_unit(name, structure, columns.get(name)), columns.get(name), problems[name]
+                *(name, _find_unit(name, structure, columns.get(name)), columns.get(name), problems[name]),
+                name in own,
             )
             for name, structure in split_structures(table.names).items()
             if name
@@ -210,14 +220,46 @@ def _describe_time_unit(
         return ""  # `_preview_sampling` states it
 
 
-def _find_problem(column: Columns, name: str, is_time: bool) -> str:
+def _find_clocks(
+    table: Table,
+    columns: Mapping[str, Columns],
+    groups: Sequence[Sequence[str]],
+    time: str | None,
+    dt: float | None,
+    options: ReadingOptions,
+) -> tuple[Sequence[str], Sequence[ColumnClock], TimeScale]:
+    """Return the columns of the main recording, their clocks, and the times of the rows.
+
+    There are no columns if all have the clock of the rows. Which values are held depends on the columns that
+    are chosen.
+    """
+    names = [name for name in (groups[0] if groups else ()) if name != time and name not in table.clocks]
+    none = (), (), TimeScale(np.empty(0), 1.0)
+    if not names or options.rates == ROWS or (time is not None and time not in groups[0]):
+        return none
+    values = np.column_stack([columns[name].numbers[name] for name in names])
+    if not may_differ(values, ()):
+        return none
+    scale = TimeScale((dt or 1.0) * np.arange(len(values), dtype=np.float64), 1.0)
+    if time is not None:
+        structure = split_structures(table.names)[time]
+        try:
+            scale = find_time_scale(table, columns[time], time, structure, options)
+        except RecordError:
+            return none
+    clocks = find_clocks(scale.stamps, values, ())
+    return (names, clocks, scale) if clocks else none
+
+
+def _find_problem(column: Columns, name: str, is_time: bool, has_clock: bool) -> str:
     """Return the message of `read_record` about a column's values.
 
-    `_preview_sampling` checks whether the time column is uniform.
+    `_preview_sampling` checks whether the time column is uniform. A column with a clock of fewer samples than
+    the rows has no values between them.
     """
     if not len(column.rows):
         return _error_message(check_length, column)
-    return _error_message(check_values, column, name) or (
+    return _error_message(check_values, column, name, has_clock) or (
         "" if is_time else _error_message(check_varies, column, name)
     )
 
@@ -226,8 +268,11 @@ def _find_unit(name: str, structure: str, column: Columns | None) -> str:
     return parse_unit(name.removeprefix(structure)) or ("" if column is None else column.units.get(name, ""))
 
 
-def _preview_column(name: str, unit: str, column: Columns | None, problem: str) -> ColumnPreview:
+def _preview_column(
+    name: str, unit: str, column: Columns | None, problem: str, has_clock: bool
+) -> ColumnPreview:
     values = np.empty(0) if column is None else column.numbers[name]
+    values = values[~np.isnan(values)] if has_clock else values
     samples = None if column is None else len(values)
     if not len(values):
         return ColumnPreview(name, unit, samples, None, None, None, None, problem)

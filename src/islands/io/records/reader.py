@@ -63,6 +63,7 @@ def read_record(
     missing: Sequence[str] = (),
     gaps: str | None = None,
     outliers: str = EXCLUDE,
+    rates: str | None = None,
     resting_inputs: bool = False,
 ) -> Dataset:
     """Read inputs and an output from a file and check them.
@@ -129,6 +130,11 @@ def read_record(
     outliers : str
         ``exclude`` treats gross errors of the output as missing values: isolated spikes, codes of missing
         values such as -9999, and parts in which a sensor is stuck. ``keep`` uses them.
+    rates : str, optional
+        For columns that are sampled less often than the rows, with empty cells or the last value between
+        their samples. By default the record has the samples of the slowest column. An input with more samples
+        is the ``mean`` from each of them to the next, or, if it predicts the output much better, the
+        ``sample`` at each of them. ``rows`` takes every row as a sample of every column.
     resting_inputs : bool
         Accept constant inputs, as of a creep test. A diagnosis can use such a record, an identification
         cannot.
@@ -137,7 +143,8 @@ def read_record(
     -------
     Dataset
         float64 with the columns' names and units; ``start`` is the time of the first sample; ``reading``
-        states what ``resample``, ``gaps`` and ``outliers`` have done.
+        states what was assumed about the time, and what ``resample``, ``gaps``, ``outliers`` and
+        ``rates`` have done.
 
     Raises
     ------
@@ -159,6 +166,7 @@ def read_record(
         missing=(missing,) if isinstance(missing, str) else tuple(missing),
         gaps=gaps,
         outliers=outliers,
+        rates=rates,
     )
     return read_dataset(path, inputs, output, dt, rows, missing_output, options, resting_inputs)
 

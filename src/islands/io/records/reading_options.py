@@ -23,6 +23,9 @@ GAPS = ("split", "interpolate")
 
 #: Values of ``outliers``.
 EXCLUDE, KEEP = "exclude", "keep"
+#: Values of ``rates``: how an input with more samples than the slowest column is read, or that every row is a
+#: sample of every column.
+MEAN, SAMPLE, ROWS = RATES = ("mean", "sample", "rows")
 
 
 def _option(help_text: str, default: Any = None) -> Any:
@@ -62,6 +65,11 @@ class ReadingOptions:
         ``split`` makes a segment of each part between gaps, ``interpolate`` fills them.
     outliers : str
         ``exclude`` treats gross errors of the output as missing values, ``keep`` uses them.
+    rates : str, optional
+        How columns of different sampling times are read. By default the record has the samples of the slowest
+        column, and an input with more samples is the ``mean`` from each of them to the next, or, if it
+        predicts the output much better, the ``sample`` at each of them. ``rows`` takes every row as a
+        sample of every column.
 
     Raises
     ------
@@ -88,6 +96,7 @@ class ReadingOptions:
         "Gross errors of the output (isolated spikes, codes such as -9999, a stuck sensor): exclude or keep.",
         EXCLUDE,
     )
+    rates: str | None = _option("Columns of different rates: mean or sample of the faster inputs, or rows.")
 
     def __post_init__(self) -> None:
         names = tuple(name.strip() for name in self.names)
@@ -103,6 +112,7 @@ class ReadingOptions:
         _check_choice("dates", self.dates, DATE_ORDERS)
         _check_choice("gaps", self.gaps, GAPS)
         _check_choice("outliers", self.outliers, (EXCLUDE, KEEP))
+        _check_choice("rates", self.rates, RATES)
         if self.resample is not None and not (isfinite(self.resample) and self.resample > 0):
             raise SettingsError(f"--resample is a number of seconds above 0, got {self.resample}")
         _check_timezone(self.timezone)

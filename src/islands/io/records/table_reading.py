@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.data.channel_names import AT_ONCE, parse_unit
 from islands.data.dataset import Dataset
@@ -11,10 +12,18 @@ from islands.data.input_lead import advance_inputs
 from islands.errors import RecordError
 from islands.inspection.gross_errors import find_gross_errors, find_input_codes
 from islands.io.records.column_names import find_column, split_structures, time_column
-from islands.io.records.reading_options import DEFAULT_READING, KEEP, ReadingOptions
+from islands.io.records.reading_options import DEFAULT_READING, KEEP, MEAN, ROWS, ReadingOptions
+from islands.io.records.sampling.column_clocks import ColumnClock, find_clocks, may_differ
+from islands.io.records.sampling.common_clock import (
+    ColumnUse,
+    align_columns,
+    choose_rates,
+    fill_between,
+)
 from islands.io.records.sampling.recording import Recording, UniformRecording
 from islands.io.records.sampling.repair import join_recordings, make_uniform
 from islands.io.records.sampling.time_step import find_sampling, find_time_scale, make_recording
+from islands.io.records.sampling.uniform_grid import AGREEMENT
 from islands.io.records.table import Columns, Table
 from islands.io.records.validation import (
     and_others,
@@ -71,28 +80,21 @@ def read_table(
     check_length(columns, *([2] if missing_output else []))
     columns, excluded = exclude_gross_errors(columns, sources, output, options)
     required = [name for name in columns.numbers if not (missing_output and name == output)]
-    if options.gaps is None:
-        for name in columns.numbers:
-            check_values(columns, name, missing=name == output)
+    steps = [*columns.notes, *(f"{errors} are left out" for errors in excluded)]
     parts = [part for part in columns.split(clock) if len(part.rows) > 1]
-    blocks = [np.column_stack([part.numbers[name] for name in chosen]) for part in parts]
-    steps = [
-        *columns.notes,
-        *_describe_parts(parts),
-        *(f"{errors} are left out" for errors in excluded),
-    ]
-    if options.gaps is None and options.resample is None:
-        step, start = find_sampling(table, columns, clock, dt, structure, options)
-        start = step * columns.first if start is None else start
-        segments = tuple(map(len, blocks)) if len(blocks) > 1 else ()
-        found = UniformRecording(np.concatenate(blocks), step, start, segments, tuple(steps))
+    values = np.column_stack([columns.numbers[name] for name in chosen])
+    use = ColumnUse(chosen, tuple(range(len(sources), len(chosen))), options.rates or MEAN, missing_output)
+    clocks = None
+    if len(parts) == 1:
+        clocks = _find_clocks(table, columns, values, clock, dt, structure, options, use)
+    if clocks is not None:
+        found = _read_clocks(*clocks, use, required, options)
     else:
-        recordings = [
-            make_recording(table, part, values, clock, dt, structure, options)
-            for part, values in zip(parts, blocks, strict=True)
-        ]
-        found = _repair(recordings, chosen, required, options, file)
-        found = replace(found, steps=(*steps, *found.steps))
+        if options.gaps is None:
+            _check_columns(columns, output)
+        steps += _describe_parts(parts)
+        found = _read_rows(table, columns, parts, chosen, clock, dt, structure, required, options)
+    found = replace(found, steps=(*steps, *found.steps))
     for name in () if missing_output else (*(() if resting_inputs else sources), *outputs):
         check_varies(columns, name)
     if clock is not None:
@@ -100,6 +102,95 @@ def read_table(
         found = replace(found, steps=(*([note] if note else []), *found.steps))
     record = _make_record(found, sources, output, structures, columns.units, file)
     return advance_inputs(record, _find_advanced(inputs, sources))
+
+
+def _read_rows(
+    table: Table,
+    columns: Columns,
+    parts: Sequence[Columns],
+    chosen: Sequence[str],
+    clock: str | None,
+    dt: float | None,
+    structure: str,
+    required: Sequence[str],
+    options: ReadingOptions,
+) -> UniformRecording:
+    """Read columns whose samples are the rows of the file; each part is a segment."""
+    blocks = [np.column_stack([part.numbers[name] for name in chosen]) for part in parts]
+    if options.gaps is None and options.resample is None:
+        step, start = find_sampling(table, columns, clock, dt, structure, options)
+        start = step * columns.first if start is None else start
+        segments = tuple(map(len, blocks)) if len(blocks) > 1 else ()
+        return UniformRecording(np.concatenate(blocks), step, start, segments, ())
+    recordings = [
+        make_recording(table, part, values, clock, dt, structure, options)
+        for part, values in zip(parts, blocks, strict=True)
+    ]
+    return _repair(recordings, chosen, required, options, columns.rows.file)
+
+
+def _check_columns(columns: Columns, output: str | None) -> None:
+    for name in columns.numbers:
+        check_values(columns, name, missing=name == output)
+
+
+def _find_clocks(
+    table: Table,
+    columns: Columns,
+    values: NDArray[np.float64],
+    clock: str | None,
+    dt: float | None,
+    structure: str,
+    options: ReadingOptions,
+    use: ColumnUse,
+) -> tuple[Recording, tuple[ColumnClock, ...]] | None:
+    """Return the rows with their times and the clocks of the columns; None if these are that of the rows."""
+    if options.rates == ROWS or not may_differ(values, use.outputs):
+        return None
+    try:
+        recording = make_recording(table, columns, values, clock, dt, structure, options)
+    except RecordError:
+        return None  # The checks of the columns come first.
+    problem = None
+    try:
+        step = find_sampling(table, columns, clock, dt, structure, options)[0] / recording.seconds
+        recording = replace(recording, stamps=recording.stamps[0] + step * np.arange(len(values)))
+    except RecordError as error:
+        problem = error
+    clocks = find_clocks(recording.stamps, values, use.outputs)
+    is_filled = options.gaps == "interpolate" and options.resample is None and problem is None
+    if not clocks or (is_filled and all(each.kind != "held" for each in clocks)):
+        return None
+    longest = max(each.step for each in clocks) * recording.seconds
+    if problem is not None and dt is not None and abs(longest - dt) > AGREEMENT * dt:
+        raise problem
+    return recording, clocks
+
+
+def _read_clocks(
+    recording: Recording,
+    clocks: Sequence[ColumnClock],
+    use: ColumnUse,
+    required: Sequence[str],
+    options: ReadingOptions,
+) -> UniformRecording:
+    """Bring columns of different clocks together and make the sampling uniform."""
+    steps: list[str] = []
+    if options.resample is None:
+        if options.rates is None:
+            use = replace(use, rates=choose_rates(recording, clocks, use))
+        recording = align_columns(recording, clocks, use, steps)
+    else:
+        recording = fill_between(recording, clocks, use.names, steps)
+    if options.gaps is None:
+        numbers = dict(zip(use.names, recording.values.T, strict=True))
+        known = Columns(recording.rows, numbers, 0)
+        for place, name in enumerate(use.names):
+            check_values(known, name, missing=place in use.outputs)
+        required = [name for place, name in enumerate(use.names) if place not in use.outputs]
+    found = _repair([recording], use.names, required, options, recording.rows.file)
+    # 59.9 s / 599 is not 0.1 s in binary numbers.
+    return replace(found, dt=float(f"{found.dt:.12g}"), steps=(*steps, *found.steps))
 
 
 def _describe_parts(parts: Sequence[Columns]) -> list[str]:

@@ -69,7 +69,7 @@ def _open(path: Path) -> Any:
     from asammdf.blocks.mdf_v4 import MDF4  # noqa: PLC0415
 
     # The destructor of a reader that has not opened its file raises, and Python prints the traceback.
-    MDF3.__del__ = MDF4.__del__ = _close
+    MDF3.__del__ = MDF4.__del__ = _close  # type: ignore[method-assign]
     # It also logs what it finds in a damaged file, and then raises or reads it.
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
     return MDF(path)

@@ -32,7 +32,7 @@ class Recording:
     time: str
     seconds: float
 
-    def __getitem__(self, kept: NDArray[np.bool_] | slice) -> "Recording":
+    def __getitem__(self, kept: NDArray[np.bool_] | NDArray[np.int64] | slice) -> "Recording":
         """Return a part of the samples."""
         numbers = np.asarray(self.rows.numbers)[kept].tolist()
         rows = RowRange(self.rows.file, self.rows.counted, numbers)
