@@ -19,6 +19,9 @@ _TIME = re.compile(
     re.IGNORECASE,
 )
 
+#: Unit at the end of a name in camel case.
+_CAPITAL_UNIT = re.compile(r"(?<=[a-z])(?:[MUN]s|[A-Z][a-z]{2,12})$")
+
 #: Marks before the last word of a name, and marks before which no last word begins.
 _OPENING, _CLOSING = "_[(/", "])"
 
@@ -87,7 +90,7 @@ def states_unit(name: str) -> bool:
     """
     unit = _unit_word(name)
     is_word = spell_unit(_last_word(name).lower()) != _last_word(name).lower()
-    return unit != "" and unit in TIME_UNITS and (is_word or bool(parse_unit(name)))
+    return unit != "" and unit in TIME_UNITS and (is_word or bool(parse_unit(name)) or looks_like_time(name))
 
 
 def _unit_word(name: str) -> str:
@@ -97,14 +100,23 @@ def _unit_word(name: str) -> str:
 
 
 def _last_word(name: str) -> str:
-    """Return the end of a name in brackets, behind a mark or behind ``in``; empty if there is none."""
+    """Return the end of a name in brackets, behind a mark or behind ``in``; empty if there is none.
+
+    A unit of time may also follow a blank (``Elapsed hours``), or begin with a capital (``timeMs``).
+    """
     text = name.strip()
     text = text[:-1] if text.endswith(tuple(_CLOSING)) else text
     place = max(text.rfind(mark) for mark in _OPENING + _CLOSING)
     if place >= 0 and text[place] in _OPENING:
         return text[place + 1 :].strip()
-    _, *word = re.split(r"\sin\s", text[place + 1 :], maxsplit=1)
-    return word[0].strip() if word else ""
+    rest = text[place + 1 :]
+    _, *word = re.split(r"\sin\s", rest, maxsplit=1)
+    if word:
+        return word[0].strip()
+    last = rest.split()[-1] if len(rest.split()) > 1 else ""
+    if not last and (capital := _CAPITAL_UNIT.search(rest)):
+        last = capital[0]
+    return last if normalise_unit(spell_unit(last.lower())) in TIME_UNITS else ""
 
 
 def time_column(

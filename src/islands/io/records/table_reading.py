@@ -181,7 +181,7 @@ def _read_clocks(
             use = replace(use, rates=choose_rates(recording, clocks, use))
         recording = align_columns(recording, clocks, use, steps)
     else:
-        recording = fill_between(recording, clocks, use.names, steps)
+        recording = fill_between(recording, clocks, use, steps)
     if options.gaps is None:
         numbers = dict(zip(use.names, recording.values.T, strict=True))
         known = Columns(recording.rows, numbers, 0)

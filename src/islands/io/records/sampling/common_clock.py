@@ -138,23 +138,23 @@ def common_step(clocks: Sequence[ColumnClock]) -> float | None:
 
 
 def fill_between(
-    recording: Recording, clocks: Sequence[ColumnClock], names: Sequence[str], steps: list[str]
+    recording: Recording, clocks: Sequence[ColumnClock], use: ColumnUse, steps: list[str]
 ) -> Recording:
     """Interpolate every column between its samples, also those that only hold the sample before.
 
     Rows in gaps of a column, and before its first and after its last sample, have no value; the latter are
-    left out.
+    left out. An output that may end before the inputs does not limit the rows.
     """
     ordered = recording[np.argsort(recording.stamps, kind="stable")]
     values = ordered.values.copy()
     for place, own in enumerate(clocks):
         if own.kind != "rows":
             values[:, place] = _interpolate(own, recording.values[own.rows, place], ordered.stamps)
-            steps.append(
-                f"interpolated: {names[place]} between its samples, {_describe_step(own, recording.seconds)}"
-            )
-    first = max(own.stamps[0] for own in clocks)
-    last = min(own.stamps[-1] for own in clocks)
+            text = _describe_step(own, recording.seconds)
+            steps.append(f"interpolated: {use.names[place]} between its samples, {text}")
+    limiting = [own for place, own in enumerate(clocks) if not (use.extend and place in use.outputs)]
+    first = max(own.stamps[0] for own in limiting)
+    last = min(own.stamps[-1] for own in limiting)
     inside = (ordered.stamps >= first) & (ordered.stamps <= last)
     return replace(ordered, values=values)[inside]
 

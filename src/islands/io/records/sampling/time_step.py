@@ -1,6 +1,7 @@
 """Sampling time of a record, from a time column that is checked against a uniform grid or as stated."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,7 +158,7 @@ def find_time_scale(
     found = find_time_unit(columns.numbers[time], field, options.time is not None, options.time_unit)
     if found is None:
         raise RecordError(_unknown_sampling_message(table, columns.rows.file, structure))
-    return found
+    return replace(found, note=found.note.replace(field, time, 1))
 
 
 def _unknown_sampling_message(table: Table, file: str, structure: str) -> str:

@@ -83,6 +83,9 @@ _DATE_WORDS = frozenset("date datetime datum fecha data excel ole serial datenum
 _DECIMAL_STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0)
 _CLOCK_STEPS = (1, 2, 2.5, 3, 4, 5, 6, 7, 7.5, 8, 9, 10, 12, 15, 20, 24, 30, 40, 45)
 
+#: Times of day are less than this many days, and begin as many steps after midnight, to be read as such.
+_MOST_DAYS_OF_TIME, _LATE = 2.0, 20.0
+
 #: Tolerance of a usual step, and steps of whole seconds and milliseconds in which stamps with jitter count.
 _STEP_TOLERANCE, _GRIDS = 2e-3, (1.0, 1e-3)
 
@@ -139,6 +142,8 @@ def find_time_unit(
         return None if seconds is None else TimeScale(numbers, seconds)
     if days is not None and known.size > 1:
         return _read_days(numbers, known, name, days)
+    if known.size > 1 and low >= 0.0 and high < _MOST_DAYS_OF_TIME:
+        return _read_fractions(numbers, known, name, seconds)
     large = next((count for count in _LARGE if count.contains(low, high)), None)
     if large is not None:
         note = (
@@ -190,6 +195,24 @@ def _read_days(
         1.0,
         note=f"column {name} is read as seconds; its numbers are also possible as days: {number}; if they "
         "are, give --time-unit d (library: time_unit=)",
+    )
+
+
+def _read_fractions(
+    numbers: NDArray[np.float64], known: NDArray[np.float64], name: str, seconds: float
+) -> TimeScale:
+    """Read small numbers, which may be times of day as fractions of a day in a spreadsheet.
+
+    A record of seconds begins at zero, a time of day seldom does.
+    """
+    step = _usual_step(known)
+    if known[0] < _LATE * step or _is_decimal_step(step) or not _is_clock_step(step * _DAY):
+        return TimeScale(numbers, seconds)
+    first = (datetime(1970, 1, 1) + timedelta(days=float(known[0]))).time()
+    return _elapse(
+        numbers,
+        f"column {name} is read as fractions of a day: {known[0]:.10g} is {first:%H:%M:%S} (Excel); if it is "
+        "in seconds, give --time-unit s (library: time_unit=)",
     )
 
 

@@ -118,9 +118,23 @@ def test_a_given_unit_overrules_the_name(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "step"),
-    [("t_d", 864.0), ("Time (days)", 864.0), ("Zeit in Tagen", 864.0), ("Zeit in Stunden", 36.0)],
+    [
+        ("t_d", 864.0),
+        ("Time (days)", 864.0),
+        ("Zeit in Tagen", 864.0),
+        ("Zeit in Stunden", 36.0),
+        ("Elapsed hours", 36.0),
+        ("time min", 0.6),
+        ("timeMs", 1e-5),
+        ("elapsedMillis", 1e-5),
+        ("TimeSeconds", 0.01),
+        ("time_microseconds", 1e-8),
+        ("Time stamp", 0.01),
+        ("TimeStamp", 0.01),
+        ("TIME", 0.01),
+    ],
 )
-def test_days_and_hours_are_units_of_time(tmp_path, name, step):
+def test_units_of_time_are_symbols_and_words(tmp_path, name, step):
     assert read(tmp_path, name, 0.01 * K, 2).dt == pytest.approx(step)
     assert read(tmp_path, name, 0.01 * K, 2, time=name).dt == pytest.approx(step)
 
@@ -148,6 +162,21 @@ def test_a_date_written_as_one_number_is_a_date(tmp_path):
     record = read(tmp_path, "Time", stamps, 0)
     assert (record.dt, record.start) == (10.0, 0.0)
     assert "YYYYMMDDhhmmss: 20251126120000" in record.reading[0]
+
+
+@pytest.mark.parametrize("digits", [6, 10])
+def test_times_of_day_of_a_spreadsheet_are_fractions_of_a_day(tmp_path, digits):
+    record = read(tmp_path, "Time", 0.4375 + K / 1440, digits)
+    assert record.dt == 60.0
+    assert "read as fractions of a day: 0.4375 is 10:30:00 (Excel)" in record.reading[0]
+
+
+@pytest.mark.parametrize(
+    ("first", "step", "digits"), [(0.0, 1 / 1440, 9), (0.5, 0.001, 3), (0.1, 1 / 610.35, 9), (0.25, 0.005, 3)]
+)
+def test_a_short_time_in_seconds_is_no_time_of_day(tmp_path, first, step, digits):
+    record = read(tmp_path, "Time", first + step * K, digits)
+    assert (record.dt, record.reading) == (pytest.approx(step, rel=1e-4), ())
 
 
 def test_the_preview_states_the_unit(tmp_path):
