@@ -1,4 +1,4 @@
-"""The inputs to which an output responds within the sample, also where the response depends on another input."""
+"""Inputs to which an output responds within the sample, also where the response depends on another input."""
 
 import numpy as np
 import pytest
