@@ -16,6 +16,7 @@ from islands.data.split import Split
 from islands.estimation.structure_selection.certificate import Certificate
 from islands.evolution.fitness import FITNESS_MODES
 from islands.evolution.history import HistoryPoint
+from islands.expressions.printing import plain_factor
 from islands.models.equations import equation
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
@@ -206,5 +207,6 @@ def _ranking_key(entry: Assessment) -> tuple[bool, float, int, str]:
     errors = entry.metrics["validation"]
     diverged = bool(np.isnan(errors["free_run"].rmse))
     rmse = errors["one_step_ahead" if diverged else "free_run"].rmse
-    text = equation(entry.model, digits=17) if isinstance(entry.model, Model) else entry.model.equation().line
+    model = entry.model
+    text = equation(model, 17, plain_factor) if isinstance(model, Model) else model.equation().line
     return diverged, inf if np.isnan(rmse) else rmse, entry.model.size, text

@@ -14,6 +14,7 @@ from math import copysign
 from typing import ClassVar, NamedTuple
 
 from islands.errors import ModelError
+from islands.expressions.primitives import LARGEST_EXPONENT
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift, Symbol
 
 #: Largest exponent in text. A larger power is written as a product of powers. The limit prevents untrusted
@@ -226,6 +227,18 @@ class _PlainPrinter(_ModelPrinter):
         return inner is not None and inner.own == outer.own != QUOTIENT
 
 
+class _ReaderPrinter(_PlainPrinter):
+    """Printer of a model as text for readers: it states the protection of the functions."""
+
+    operators: Mapping[str, Operator] = {
+        name: operator for name, operator in _PlainPrinter.operators.items() if name != "div"
+    }
+
+    def call(self, primitive: Primitive, arguments: Sequence[str]) -> str:
+        form = primitive.protected_text
+        return form.format(*arguments) if form else super().call(primitive, arguments)
+
+
 def _powers(factors: Sequence[Expression]) -> Iterator[tuple[Expression, int]]:
     for factor, run in groupby(factors):
         left = len(list(run))
@@ -290,7 +303,8 @@ _ABSOLUTE = "<mrow><mo>|</mo>{0}<mo>|</mo></mrow>"
 
 #: Format strings of functions that are not written by name. They need brackets below an exponent.
 _MATHML = {
-    "div": "<mfrac>{0}{1}</mfrac>",
+    "exp": f"<mrow><mi>exp</mi>{_APPLY}<mo>(</mo><mi>min</mi>{_APPLY}<mo>(</mo>{{0}}<mo>,</mo>"
+    f"<mn>{LARGEST_EXPONENT:g}</mn><mo>)</mo><mo>)</mo></mrow>",
     "log": f"<mrow><mi>ln</mi>{_APPLY}{_ABSOLUTE}</mrow>",
     "sqrt": f"<msqrt>{_ABSOLUTE}</msqrt>",
 }
@@ -366,7 +380,7 @@ class SignalNames:
         return self._symbols.get(name, name)
 
 
-class PlainSignals(SignalNames, _PlainPrinter):
+class PlainSignals(SignalNames, _ReaderPrinter):
     """Printer of a block as plain text."""
 
 
@@ -428,13 +442,26 @@ def plain(expression: Expression, inputs: int = 1) -> str:
 
 
 def plain_factor(expression: Expression, inputs: int) -> str:
-    """Write an expression as a factor of a product, in brackets if necessary."""
+    """Write an expression as a factor of a product, in brackets if necessary; `parse` converts it back."""
     return _make_printer(_PlainPrinter, inputs == 1).write_operand(expression, PRODUCT)
 
 
+def reader_text(expression: Expression, inputs: int) -> str:
+    """Write an expression as text for readers, with the protection of its functions: ``sqrt(abs(u(k-1)))``.
+
+    `parse` reads an expression of equal values from it. `plain` identifies the expression.
+    """
+    return _make_printer(_ReaderPrinter, inputs == 1).write(expression)
+
+
+def reader_factor(expression: Expression, inputs: int) -> str:
+    """Write an expression as `reader_text` does, as a factor of a product."""
+    return _make_printer(_ReaderPrinter, inputs == 1).write_operand(expression, PRODUCT)
+
+
 def at_rest(expression: Expression, inputs: int = 1) -> str:
-    """Write a steady state (leaves of lag 0): ``y*u`` for ybar ubar, ``1`` for a constant."""
-    return plain(expression, inputs).replace("(k)", "")
+    """Write a steady state (leaves of lag 0) for readers: ``y*u`` for ybar ubar, ``1`` for a constant."""
+    return reader_text(expression, inputs).replace("(k)", "")
 
 
 def latex(expression: Expression, inputs: int = 1) -> str:

@@ -48,6 +48,9 @@ class Primitive:
     is_protected : bool
         Whether the function is finite everywhere, as a search needs. The functions of equations are not, but
         sums, differences and products are the same functions in both.
+    protected_text : str
+        Format string of the function in the text of an equation for readers: ``sqrt(abs({0}))`` of a square
+        root that is protected. If empty, the name and the arguments.
     """
 
     name: str
@@ -62,6 +65,7 @@ class Primitive:
     simplify: "Callable[..., Expression | None] | None" = field(default=None, compare=False)
     summary: str = field(default="", compare=False)
     is_protected: bool = True
+    protected_text: str = field(default="", compare=False)
 
 
 def _read_signal(*_: float) -> float:

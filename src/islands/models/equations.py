@@ -1,7 +1,7 @@
 """Equation of a model in plain text, LaTeX and MathML."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from html import escape, unescape
 from textwrap import wrap
 from typing import Protocol
@@ -17,8 +17,8 @@ from islands.expressions.printing import (
     mathml,
     mathml_factor,
     mathml_number,
-    plain,
-    plain_factor,
+    reader_factor,
+    reader_text,
 )
 from islands.expressions.tree import Constant, Expression, Lagged, replace_leaves
 from islands.models.regressor import Regressor
@@ -48,13 +48,16 @@ class NarxTerms(SignalReference, Protocol):
         """Number of samples that the output and each input are read early."""
 
 
-def equation(model: NarxTerms, digits: int = 6) -> str:
+def equation(
+    model: NarxTerms, digits: int = 6, write: Callable[[Expression, int], str] = reader_factor
+) -> str:
     """Write a model as one line: ``y(k) = 1*y(k-1) + 0.77*(u(k-1) - u(k-2))``.
 
     The parameters are rounded to ``digits`` significant digits. A model without parameters shows theta1 ...
     The input of a column that is read one sample early (``u_V+1``) is written as ``u(k)`` for its lag 1.
+    ``write`` writes an expression of a number of inputs as a factor.
     """
-    return f"y(k) = {_join_terms(_plain_terms(model, digits))}"
+    return f"y(k) = {_join_terms(_plain_terms(model, digits, write))}"
 
 
 def plain_text(model: NarxTerms) -> str:
@@ -63,12 +66,14 @@ def plain_text(model: NarxTerms) -> str:
     return f"{equation(model)}\nwhere {statement}" if statement else equation(model)
 
 
-def _plain_terms(model: NarxTerms, digits: int) -> list[str]:
+def _plain_terms(
+    model: NarxTerms, digits: int, write: Callable[[Expression, int], str] = reader_factor
+) -> list[str]:
     parts = []
     for position, expression in enumerate(expressions_of_record(model)):
         weight = f"theta{position + 1}" if model.theta is None else f"{model.theta[position]:.{digits}g}"
         constant = expression == Constant(1.0)
-        parts.append(weight if constant else f"{weight}*{plain_factor(expression, model.inputs)}")
+        parts.append(weight if constant else f"{weight}*{write(expression, model.inputs)}")
     return parts
 
 
@@ -110,7 +115,7 @@ def signal_names(model: SignalReference) -> tuple[str, ...]:
 
 def named_term(model: NarxTerms, position: int) -> str:
     """Write one regressor of a model with the column names of its record."""
-    return _name_signals(plain_factor(expressions_of_record(model)[position], model.inputs), model)
+    return _name_signals(reader_factor(expressions_of_record(model)[position], model.inputs), model)
 
 
 def named_statement(text: str, model: NarxTerms) -> str:
@@ -122,7 +127,7 @@ def named_statement(text: str, model: NarxTerms) -> str:
 
     def name_term(term: re.Match[str]) -> str:
         written = _delay(parse(term[1]), model.leads)
-        return f"[{_name_signals(plain(written, model.inputs), model)}]"
+        return f"[{_name_signals(reader_text(written, model.inputs), model)}]"
 
     def name_gain(gain: re.Match[str]) -> str:
         return f"gain({signal_names(model)[int(gain[1] or 1)]})"

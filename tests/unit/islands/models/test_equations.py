@@ -1,11 +1,14 @@
 """Equations of models in plain text, LaTeX and MathML."""
 
+import re
 from itertools import pairwise
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from hypothesis import given
 
+from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.printing import mathml
 from islands.expressions.tree import Apply, Lagged, Primitive
@@ -108,7 +111,7 @@ def test_named_equation_has_the_column_names_of_the_record():
     ]
     assert {named_term(model, position) for position in range(3)} >= {"T_out(k-1)"}
     single = make_model([(parse("u(k-1)"), 2.0), (parse("sqrt(u(k-2))"), 1.0)], ("u_V",), "y_um")
-    assert named_equation(single) == "y_um(k) = 2*u_V(k-1) + sqrt(u_V(k-2))"
+    assert named_equation(single) == "y_um(k) = 2*u_V(k-1) + sqrt(abs(u_V(k-2)))"
 
 
 def test_signals_are_named_by_their_columns_without_units_in_brackets():
@@ -125,9 +128,55 @@ def test_signals_are_named_by_their_columns_without_units_in_brackets():
     ]
 
 
-def test_quotient_keeps_its_brackets_after_its_parameter():
-    # 0.5*u/y would be parsed as (0.5*u)/y, which is a different regressor because division is protected.
-    assert equation(make_model([(parse("u(k-1)/y(k-1)"), 0.5)])) == "y(k) = 0.5*(u(k-1)/y(k-1))"
+#: Functions of an equation as NumPy has them; `div` is that of the page on expressions.
+_NUMPY = {name: getattr(np, name) for name in ("sqrt", "exp", "log", "abs", "sign", "tanh", "sin", "cos")} | {
+    "min": np.minimum,
+    "max": np.maximum,
+    "div": lambda a, b: np.divide(a, b, out=np.zeros(np.broadcast(a, b).shape), where=np.asarray(b) != 0.0),
+}
+
+
+@pytest.mark.parametrize(
+    "term",
+    [
+        "sqrt(u(k-1) - u(k-2))",
+        "log(u(k-1) - 0.5*u(k-3))",
+        "exp(90*u(k-1))",
+        "y(k-1)/(u(k-1) - u(k-2))",
+        "sqrt(log(u(k-1))*y(k-1))^3*(u(k-2)/y(k-1))^2",
+        "tanh(u(k-1)/y(k-2)) + sqrt(exp(u(k-1)))",
+    ],
+)
+def test_printed_equations_give_the_values_of_the_model(term):
+    model = make_model([(parse(term), 0.5), (parse("y(k-1)"), 0.25)], ("valve",), "level")
+    rng = np.random.default_rng(0)
+    levels, valves = (rng.uniform(-2.0, 2.0, (5, 40)) for _ in range(2))
+    valves[2, :10] = valves[1, :10]  # divisors of zero
+    expected = sum(
+        theta
+        * np.array(
+            [
+                value(item.expression, lambda channel, lag, at=at: (levels, valves)[channel][lag, at])
+                for at in range(40)
+            ]
+        )
+        for item, theta in zip(model.regressors, model.parameters, strict=True)
+    )
+    for text, output, excitation in (
+        (equation(model, 17), "y", "u"),
+        (named_equation(model, 17), "level", "valve"),
+    ):
+        line = re.sub(r"\(k-(\d)\)", r"[\1]", text.partition(" = ")[2]).replace("^", "**")
+        found = eval(line, dict(_NUMPY), {output: levels, excitation: valves})
+        np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_latex_and_mathml_of_protected_functions_state_their_protection():
+    model = make_model([(parse("exp(u(k-1))"), 1.0), (parse("u(k-1)/y(k-1)"), 1.0)])
+    assert r"\exp(\min(u_{k-1}, 50))" in latex_equation(model)
+    assert r"\operatorname{div}(u_{k-1}, y_{k-1})" in latex_equation(model)
+    assert "exp(min(u(k-1),50))" in visible_text(mathml_equation(model))
+    assert "div(u(k-1),y(k-1))" in visible_text(mathml_equation(model))
 
 
 @given(models(inputs=2))
@@ -169,14 +218,12 @@ def to_plain(element):
             return f"q{exponent.removeprefix(' - ')}"
         case "msup", [base, exponent]:
             return f"{base}^{exponent}"
-        case "mfrac", [first, second]:
-            return f"div({first}, {second})"
         case "msqrt", [inside]:
-            return inside.replace("abs", "sqrt", 1)
+            return f"sqrt({inside})"
         case "mrow", ["|", inside, "|"]:
             return f"abs({inside})"
         case "mrow", ["ln", "", inside]:
-            return inside.replace("abs", "log", 1)
+            return f"log({inside})"
         case (("math" | "mrow" | "mtable" | "mtr" | "mtd"), _):
             return "".join(parts)
     raise AssertionError(ElementTree.tostring(element))
@@ -201,10 +248,10 @@ def visible_text(mathml_text):
         ("u(k-1)^3*(y(k-1) - 1)^2", "u(k-1)^3*(y(k-1) - 1)^2"),
         ("(u(k-1)*y(k-1) + 1)^2", "(u(k-1)*y(k-1) + 1)^2"),
         ("sign(u(k-1))^2*abs(u(k-1))^2", "sign(u(k-1))^2*abs(u(k-1))^2"),
-        ("(u(k-1)/y(k-1))^2*(u(k-1)/y(k-2))", "(div(u(k-1), y(k-1)))^2*div(u(k-1), y(k-2))"),
-        ("sqrt(y(k-1) + 2*u(k-1))^2*sqrt(u(k-1))", "(sqrt(y(k-1) + 2*u(k-1)))^2*sqrt(u(k-1))"),
-        ("log(y(k-1))^2*log(u(k-1) - 1)", "(log(y(k-1)))^2*log(u(k-1) - 1)"),
-        ("max(u(k-1), exp(y(k-1)))", "max(u(k-1),exp(y(k-1)))"),
+        ("(u(k-1)/y(k-1))^2*(u(k-1)/y(k-2))", "div(u(k-1),y(k-1))^2*div(u(k-1),y(k-2))"),
+        ("sqrt(y(k-1) + 2*u(k-1))^2*sqrt(u(k-1))", "(sqrt(abs(y(k-1) + 2*u(k-1))))^2*sqrt(abs(u(k-1)))"),
+        ("log(y(k-1))^2*log(u(k-1) - 1)", "(log(abs(y(k-1))))^2*log(abs(u(k-1) - 1))"),
+        ("max(u(k-1), exp(y(k-1)))", "max(u(k-1),exp(min(y(k-1),50)))"),
         ("u(k-1) - (y(k-1) - 1)", "u(k-1) - (y(k-1) - 1)"),
         ("u(k-1) + (-1)", "u(k-1) + ( - 1)"),
         ("phi2(u(k-1), u(k-2))", "phi2(u(k-1),u(k-2))"),
@@ -222,10 +269,9 @@ def test_mathml_of_a_leaf():
     )
 
 
-def test_mathml_of_a_fraction_and_of_a_root():
+def test_mathml_of_a_root():
     past = "<mrow><mi>k</mi><mo>&#x2212;</mo><mn>1</mn></mrow>"
-    u, y = (f"<msub><mi>{name}</mi>{past}</msub>" for name in "uy")
-    assert mathml(parse("u(k-1)/y(k-1)")) == f"<mfrac>{u}{y}</mfrac>"
+    u = f"<msub><mi>u</mi>{past}</msub>"
     assert mathml(parse("sqrt(u(k-1))")) == f"<msqrt><mrow><mo>|</mo>{u}<mo>|</mo></mrow></msqrt>"
 
 
