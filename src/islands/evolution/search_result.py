@@ -172,7 +172,10 @@ def with_bands(
     """
     steps.report(BANDS, 1.0)
     skip = partial(steps.skip, BANDS)
-    ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed, skip)
+    ensemble = None
+    if not skip():
+        recommended = found.recommended.model
+        ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed, skip, recommended)
     if skip() or ensemble is None:
         return mark_stopped(found, steps)
     calibrated = calibrate_bands([entry.model for entry in found.models], ensemble, found.split, warm_up)

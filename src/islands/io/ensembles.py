@@ -23,7 +23,10 @@ from islands.validation.prediction_bands import PredictionBands
 
 
 class StructureDocument(BaseModel):
-    """A structure of an ensemble: its weight, its terms or its model, and the parameters of its members."""
+    """A structure of an ensemble: its weight, its terms or its model, and the parameters of its members.
+
+    ``law`` is the position of the shorter structure with the same free run, if there is one.
+    """
 
     model_config = ConfigDict(frozen=True)
 
@@ -31,6 +34,7 @@ class StructureDocument(BaseModel):
     regressors: tuple[str, ...] = ()
     model: dict[str, Any] | None = None
     parameters: Annotated[tuple[tuple[FiniteFloat, ...], ...], Field(min_length=1)]
+    law: Annotated[int, Field(ge=0)] | None = None
 
 
 class BandsDocument(BaseModel):
@@ -53,6 +57,7 @@ def ensemble_document(ensemble: Ensemble | None) -> list[dict[str, Any]] | None:
             "weight": each.weight,
             **_structure_document(each.model),
             "parameters": each.parameters.tolist(),
+            "law": each.law,
         }
         for each in ensemble.structures
     ]
@@ -87,6 +92,8 @@ def ensemble_from_document(
         return None
     try:
         structures = [StructureDocument.model_validate(each) for each in document]
+        if any(each.law is not None and each.law >= len(structures) for each in structures):
+            raise ValueError("a structure has the law of one that is missing")
         return Ensemble(tuple(_structure(each, model, primitives) for each in structures))
     except (ModelError, TypeError, ValueError) as error:
         raise ModelError(f"the ensemble of the result is damaged: {error}") from error
@@ -106,7 +113,7 @@ def _structure(
         found = model_from_json(json.dumps(document.model), "the ensemble")
     if parameters.shape[1] != found.size:
         raise ValueError(f"{parameters.shape[1]} parameters for {found.size} terms")
-    return EnsembleStructure(found, document.weight, parameters)
+    return EnsembleStructure(found, document.weight, parameters, document.law)
 
 
 def _regressor(text: str, primitives: Mapping[str, Primitive]) -> Regressor:

@@ -7,6 +7,9 @@ the effective number ``n`` of validation samples, which accounts for the correla
 penalty of the size is necessary for inclusion probabilities. Without it the larger of two structures with
 equal errors has the same weight, and terms that are not in the law of the system have probabilities of up to
 one half.
+
+Structures with equal free runs state one law: ``y(k) = 0.9 y(k-1) + u(k-1)`` is also ``y(k) = 0.81 y(k-2) +
+u(k-1) + 0.9 u(k-2)``. In inclusion probabilities, the longer one counts as the shorter one.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,6 +38,10 @@ _MIN_WEIGHT = 0.5 / MEMBERS
 #: A member is left out if the squared error of its free run on the validation data exceeds that of its
 #: structure by this factor: a replicate is a linear step, which may leave the stable models.
 _IMPLAUSIBLE = 4.0
+
+#: Two free runs are equal if the mean square of their difference is at most this fraction of that of the
+#: residual: the limit below which the predictable part of a residual is negligible.
+_EQUAL_SHARE = 0.1
 
 #: Errors below this fraction of the output range are rounding errors and are equal.
 _ROUNDING = 1e-9
@@ -88,28 +95,37 @@ class EnsembleStructure:
         Weight of the structure. Its members have equal weights.
     parameters : ndarray, shape (members, terms)
         Parameters of the members.
+    law : int or None
+        Position in the ensemble of a shorter structure with the same free run, whose terms count in place of
+        those of this one. None if there is none.
     """
 
     model: AnyModel
     weight: float
     parameters: NDArray[np.float64]
+    law: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ensemble:
-    """Structures in the order of their weights, which sum to 1."""
+    """Structures in the order of their weights, which sum to 1.
+
+    The last one is the recommended structure if its weight is too small for the others.
+    """
 
     structures: tuple[EnsembleStructure, ...]
 
     def inclusion(self, term: str) -> float:
-        """Return the inclusion probability of a term: the weight of the structures that contain it.
+        """Return the inclusion probability of a term: the weight of the structures whose law contains it.
 
         Parameters
         ----------
         term : str
             One of the ``parameter_names`` of a model.
         """
-        return min(1.0, sum(each.weight for each in self.structures if term in each.model.parameter_names))
+        laws = [each if each.law is None else self.structures[each.law] for each in self.structures]
+        pairs = zip(self.structures, laws, strict=True)
+        return min(1.0, sum(each.weight for each, law in pairs if term in law.model.parameter_names))
 
     @property
     def weights(self) -> NDArray[np.float64]:
@@ -174,6 +190,7 @@ def make_ensemble(
     warm_up: int,
     seed: int,
     skip: Callable[[], bool] = lambda: False,
+    recommended: AnyModel | None = None,
 ) -> Ensemble | None:
     """Make the ensemble of the candidates.
 
@@ -193,6 +210,8 @@ def make_ensemble(
         Seed of the random generator.
     skip : callable
         Called before each structure. Once it returns true, there is no ensemble.
+    recommended : DynamicModel or CoupledModel, optional
+        One of the candidates, whose structure is part of the ensemble however small its weight is.
 
     Returns
     -------
@@ -201,8 +220,10 @@ def make_ensemble(
     """
     structures = []
     floor = _error_floor(split.validation)
-    kept = _weigh(_best_of_each_structure(candidates), split.validation, floor, warm_up)
-    for position, (candidate, weight) in enumerate(kept):
+    best = _best_of_each_structure(candidates)
+    kept = _weigh(best, split.validation, floor, warm_up, recommended)
+    laws = _find_laws([candidate.model for candidate, _ in kept], split.validation, warm_up)
+    for position, ((candidate, weight), law) in enumerate(zip(kept, laws, strict=True)):
         if skip():
             return None
         model, count = candidate.model, max(1, round(MEMBERS * weight))
@@ -217,7 +238,7 @@ def make_ensemble(
         structure = model
         if isinstance(model, Model):
             structure = replace(model, theta=None, standard_errors=None)
-        structures.append(EnsembleStructure(structure, weight, members))
+        structures.append(EnsembleStructure(structure, weight, members, law))
     return Ensemble(tuple(structures)) if structures else None
 
 
@@ -268,10 +289,51 @@ def _best_of_each_structure(candidates: Sequence[ValidatedModel[M]]) -> list[Val
     return list(found.values())
 
 
+def _find_laws(models: Sequence[AnyModel], record: AnyRecord, warm_up: int) -> list[int | None]:
+    """Return the position of a shorter model with the same free run for every model; None if there is none.
+
+    A model that contains all terms of the shorter one is another law: it states a further effect.
+    """
+    runs = [free_run(model, record, warm_up).y for model in models]
+    ranges = (
+        np.array(record.output_range)
+        if isinstance(record, Dataset)
+        else np.array([each.output_range for each in record.records])
+    )
+
+    def compare(at: int, shorter: int) -> float:
+        """Return the largest mean square of the difference, as a fraction of that of a residual."""
+        known = find_predicted(runs[at]) & find_predicted(runs[shorter])
+        residual = np.mean((record.y - runs[shorter])[known] ** 2, axis=0)
+        difference = np.mean((runs[at] - runs[shorter])[known] ** 2, axis=0)
+        return float(np.max(difference / (residual + (_ROUNDING * ranges) ** 2 + np.finfo(float).tiny)))
+
+    laws: list[int | None] = [None] * len(models)
+    for at in sorted(range(len(models)), key=lambda each: models[each].size):
+        terms = set(models[at].parameter_names)
+        compared = [
+            (compare(at, other), other)
+            for other, law in enumerate(laws)
+            if law is None
+            and models[other].size < models[at].size
+            and not terms.issuperset(models[other].parameter_names)
+        ]
+        nearest, shorter = min(compared, default=(np.inf, None))
+        laws[at] = shorter if nearest <= _EQUAL_SHARE else None
+    return laws
+
+
 def _weigh(
-    candidates: list[ValidatedModel[M]], validation: AnyRecord, floor: float, warm_up: int
+    candidates: list[ValidatedModel[M]],
+    validation: AnyRecord,
+    floor: float,
+    warm_up: int,
+    recommended: AnyModel | None,
 ) -> list[tuple[ValidatedModel[M], float]]:
-    """Return the candidates of relevant weight with their weights, largest weight first."""
+    """Return the candidates of relevant weight with their weights, largest weight first.
+
+    The recommended one is the last if its weight is smaller.
+    """
     if not candidates:
         return []
     best = free_run(candidates[0].model, validation, warm_up).y
@@ -285,6 +347,14 @@ def _weigh(
     weights = np.exp(scores - scores.max())
     weights /= weights.sum()
     order = [int(index) for index in np.argsort(-weights, kind="stable") if weights[index] >= _MIN_WEIGHT]
+    if recommended is not None:
+        names = recommended.parameter_names
+        order += [
+            index
+            for index, each in enumerate(candidates)
+            if each.model.parameter_names == names and index not in order
+        ]
+        weights = np.maximum(weights, np.finfo(float).tiny)
     kept = weights[order] / weights[order].sum()
     return [(candidates[index], float(weight)) for index, weight in zip(order, kept, strict=True)]
 

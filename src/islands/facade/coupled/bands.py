@@ -57,7 +57,7 @@ def make_bands(
         ValidatedModel(each, None, _validate(each, data, warm_up))
         for each in _list_rivals(model, ranked, ranks)
     ]
-    ensemble = make_ensemble(candidates, data, constraints, warm_up, seed, skip)
+    ensemble = make_ensemble(candidates, data, constraints, warm_up, seed, skip, model)
     if ensemble is None or skip():
         return ()
     return calibrate_output_bands(model, ensemble, data, warm_up)

@@ -10,6 +10,7 @@ from islands.data.dataset import Dataset
 from islands.data.split import split
 from islands.estimation.estimate import estimate
 from islands.expressions.parsing import parse
+from islands.facade.fit import fit
 from islands.models.regressor import regressor
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import Ensemble, ValidatedModel, effective_samples, make_ensemble
@@ -147,3 +148,69 @@ def test_errors_on_a_constant_output_of_zero_are_weighed() -> None:
         [ValidatedModel(exact, 1, 0.0), ValidatedModel(other, 1, 5.0)], resting, "none", 2, seed=0
     )
     assert [structure.weight for structure in made.structures] == [1.0]
+
+
+def first_order(noise, seed, samples=1200):
+    """Return a record of ``y(k) = 0.9 y(k-1) + 0.2 u(k-1)`` with white noise of the measurement."""
+    rng = np.random.default_rng(seed)
+    u = rng.uniform(-1.0, 1.0, samples)
+    y = np.zeros(samples)
+    for k in range(1, samples):
+        y[k] = 0.9 * y[k - 1] + 0.2 * u[k - 1]
+    return Dataset(u, y + noise * rng.standard_normal(samples), 0.1)
+
+
+LAW = ("y(k-1)", "u(k-1)")
+SUBSTITUTED = ("y(k-2)", "u(k-1)", "u(k-2)")
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-3, 0.02])
+def test_a_longer_form_of_a_law_counts_as_the_law(noise):
+    """The law substituted in itself, y(k) = 0.81 y(k-2) + ..., lacks y(k-1), and was a rival of it."""
+    data = split(first_order(noise, 1), 0.3)
+    # Equal errors: only the number of terms and chance decide between the two forms.
+    entries = [candidate(LAW, data), replace(candidate(SUBSTITUTED, data), error=0.0)]
+    entries[1] = replace(entries[1], error=0.97 * entries[0].error)
+    found = make_ensemble(entries, data, "none", 2, 0)
+    assert found.structures[0].weight < 0.9
+    assert [found.inclusion(term(text).text) for text in LAW] == [1.0, 1.0]
+    assert found.inclusion(term("y(k-2)").text) == 0.0
+
+
+def test_a_structure_with_a_further_term_is_another_law():
+    data = split(first_order(0.02, 1), 0.3)
+    longer = (*LAW, "u(k-2)")
+    law = candidate(LAW, data)
+    rival = replace(candidate(longer, data), error=0.99 * law.error)
+    found = make_ensemble([law, rival], data, "none", 2, 0)
+    assert [each.law for each in found.structures] == [None, None]
+    assert found.inclusion(term("u(k-2)").text) == pytest.approx(found.structures[1].weight)
+
+
+def test_a_rival_with_another_free_run_keeps_its_terms():
+    data = parts(0.001)
+    rival = ("y(k-2)", "u(k-1)", "u(k-2)", "u(k-1)*u(k-2)")
+    entries = [candidate(TRUE, data), replace(candidate(rival, data), error=candidate(TRUE, data).error)]
+    found = make_ensemble(entries, data, "none", 2, 0)
+    assert [each.law for each in found.structures] == [None, None]
+    assert found.inclusion(term("y(k-1)").text) == pytest.approx(found.structures[0].weight)
+
+
+def test_the_recommended_structure_is_in_the_ensemble():
+    data = parts(0.02)
+    entries = [candidate(texts, data) for texts in STRUCTURES]
+    poor = entries[1].model
+    assert poor.parameter_names not in [each.model.parameter_names for each in ensemble(data).structures]
+    found = make_ensemble(entries, data, "none", 2, 0, recommended=poor)
+    assert found.structures[-1].model.parameter_names == poor.parameter_names
+    assert 0.0 < found.structures[-1].weight < 1e-3
+    assert sum(each.weight for each in found.structures) == pytest.approx(1.0)
+
+
+@pytest.mark.ci
+def test_the_terms_of_a_recommended_law_are_certain():
+    """y(k-1) had a probability of 0.50, because y(k) = 0.73 y(k-3) + ... is the same law."""
+    found = fit(first_order(0.02, 1))
+    assert found.best.model.parameter_names == ("y(k-1)", "u1(k-1)")
+    assert min(found.best.inclusion) > 0.95
+    assert "doubtful" not in str(found)
