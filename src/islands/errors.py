@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from math import isfinite, nan
+from numbers import Integral, Real
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -68,6 +70,33 @@ def check_at_least(least: int, **values: int) -> None:
     for name, value in values.items():
         if value < least:
             raise SettingsError(f"{name} is at least {least}, got {value}")
+
+
+def check_seconds(value: object, name: str, kind: type[IslandsError] = SettingsError) -> float:
+    """Return a time in seconds, after a check that it is a positive number.
+
+    Raises
+    ------
+    IslandsError
+        It is not. The message has the name of the argument; ``kind`` is the class of the error.
+    """
+    seconds = float(value) if isinstance(value, Real) and not isinstance(value, bool) else nan
+    if not (isfinite(seconds) and seconds > 0):
+        raise kind(f"{name} must be a positive number of seconds, got {value!r}")
+    return seconds
+
+
+def check_integers(**values: object) -> None:
+    """Check that settings, which are given by name, are integers or None.
+
+    Raises
+    ------
+    SettingsError
+        A value is not.
+    """
+    for name, value in values.items():
+        if value is not None and (isinstance(value, bool) or not isinstance(value, Integral)):
+            raise SettingsError(f"{name} is an integer, got {value!r}")
 
 
 def check_probabilities(**values: float) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.preprocessing_steps import Preprocessing
-from islands.errors import RecordError
+from islands.errors import RecordError, SettingsError, check_seconds
 
 #: Largest relative difference between equal sampling times. A printed time column is not more precise.
 SAME_DT = 1e-3
@@ -87,8 +87,7 @@ class Dataset:
         if len(units) != inputs:
             raise RecordError(f"{inputs} inputs need {inputs} units, got {units}")
         segments = tuple(int(length) for length in self.segments) or (len(y),)
-        if not (np.isfinite(self.dt) and self.dt > 0):
-            raise RecordError(f"the sampling time must be a positive number of seconds, got {self.dt}")
+        check_seconds(self.dt, "the sampling time dt", RecordError)
         _check_segments(segments, len(y), self.held_out)
         recordings = tuple(self.recordings) or ("",)
         recordings *= len(segments) if len(recordings) == 1 else 1
@@ -234,9 +233,17 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
     ------
     RecordError
         There is no recording, or the recordings differ in names, units or sampling time.
+    SettingsError
+        A recording is not a Dataset.
     """
     if not recordings:
         raise RecordError("there is no recording to join: give at least one")
+    for each in recordings:
+        if not isinstance(each, Dataset):
+            raise SettingsError(
+                f"join takes Datasets, got a {type(each).__name__}: make each by as_record(data, inputs=..., "
+                "output=...), or give the list of data frames in place of one"
+            )
     first = recordings[0]
     if len(recordings) == 1:
         return first

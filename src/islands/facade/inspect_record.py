@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
-from islands.errors import RecordError
+from islands.errors import RecordError, SettingsError
 from islands.inspection.channel import channels
 from islands.inspection.column_roles import ColumnChoice, choose_columns
 from islands.inspection.findings import (
@@ -83,9 +83,16 @@ def inspect_record(
     ------
     RecordError
         The file cannot be read, or a column does not exist. The messages are those of `read_record`.
+    SettingsError
+        The record is neither a file nor a Dataset.
     """
     if isinstance(record, Dataset):
         return _inspect_dataset(record if rows is None else record[rows])
+    if not isinstance(record, str | Path):
+        raise SettingsError(
+            f"inspect_record takes a file or a Dataset, got a {type(record).__name__}: make a Dataset by "
+            "as_record(data, inputs=..., output=...)"
+        )
     # The file is parsed once: parsing takes most of the time.
     table = open_record(record, reading)
     found = preview_table(table, Path(record).name, reading)

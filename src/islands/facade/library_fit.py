@@ -1,7 +1,7 @@
 """Subset selection over one candidate library, (constrained) least squares, assessment."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial, reduce
@@ -10,7 +10,7 @@ from islands.available_cpus import count_cpus
 from islands.data.averaging import AUTO, count_means
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.errors import SettingsError, lookup
+from islands.errors import SettingsError, check_integers, lookup
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.estimators import estimate_with
 from islands.estimation.forward_selection import (
@@ -82,6 +82,7 @@ class FitSettings:
 
     def __post_init__(self) -> None:
         lookup(ESTIMATORS, self.estimator, "estimator")
+        check_integers(max_terms=self.max_terms, certificate=self.certificate, shooting=self.shooting)
         if self.max_terms < 1:
             raise SettingsError(f"a model has at least one term, got max_terms = {self.max_terms}")
         if self.certificate < 0:
@@ -293,9 +294,20 @@ def _estimate(
     )
     if not models:
         raise SettingsError(
-            f"no model could be estimated: {dict(outcomes)}; take another library or a longer record"
+            f"no model could be estimated: {_describe_outcomes(outcomes)}; take another library or a longer "
+            "record"
         )
     return models, outcomes
+
+
+def _describe_outcomes(outcomes: Mapping[str, int]) -> str:
+    """Return why no structure has a model: ``singular (2 structures)``."""
+    if not outcomes:
+        return "no term of the library reduces the error on the estimation data"
+    return ", ".join(
+        f"{name.replace('_', ' ')} ({count} structure{'s' if count > 1 else ''})"
+        for name, count in outcomes.items()
+    )
 
 
 def _select(

@@ -16,7 +16,13 @@ from numpy.typing import ArrayLike
 from islands.data.dataset import Dataset, join
 from islands.errors import RecordError, SettingsError
 from islands.io.memory_columns import MemoryColumns, read_columns_in_memory
-from islands.io.records.column_names import find_column, looks_like_time, seconds_per_unit
+from islands.io.records.column_names import (
+    find_column,
+    list_inputs,
+    looks_like_time,
+    seconds_per_unit,
+    take_output,
+)
 from islands.io.records.formats.columnar import ColumnarFile
 from islands.io.records.reading_options import EXCLUDE, ReadingOptions
 from islands.io.records.table_reading import read_table
@@ -50,7 +56,7 @@ def as_record(
 
     Parameters
     ----------
-    data : Dataset, data frame, xarray Dataset, mapping, array, or list of them
+    data : Dataset, data frame, xarray Dataset or DataArray, mapping, array, or list of them
         Columns by name (pandas, polars or another frame that narwhals reads, xarray, or a mapping of names to
         arrays); or the inputs alone, of shape (samples,) or (samples, inputs), if ``y`` is given. A `Dataset`
         is returned as it is. A list of frames or of Datasets is one record of several recordings.
@@ -58,7 +64,7 @@ def as_record(
         The output, of shape (samples,).
     dt : float, optional
         Sampling time in seconds. It may be left out if the data have a time: an index of times or of
-        fractions of a second, the coordinate of an xarray Dataset, or a column that `read_record` would take
+        fractions of a second, the time coordinate of xarray data, or a column that `read_record` would take
         as the time.
     inputs : str or sequence of str
         Names of the input columns, in the order of the model's inputs; ``u_V+1`` reads the column u_V one
@@ -85,6 +91,8 @@ def as_record(
         The arguments do not describe a record.
     """
     _check_kinds(data, y)
+    output = take_output(output)
+    inputs = inputs if isinstance(inputs, str) else list_inputs(inputs)
     if isinstance(data, Dataset):
         if y is not None or dt is not None or inputs or output is not None:
             raise SettingsError(
@@ -110,7 +118,7 @@ def as_record(
         raise SettingsError(
             "an array holds the inputs only: give the output and the sampling time as well, (u, y, dt)"
         )
-    table = _make_table(columns, (*([inputs] if isinstance(inputs, str) else inputs), output))
+    table = _make_table(columns, (*list_inputs(inputs), output))
     if output is None:
         raise SettingsError(
             f"no output is given: take one of the columns {', '.join(table.names)} as output=..."
@@ -130,6 +138,8 @@ def as_record(
 
 
 def _check_kinds(data: Any, y: Any) -> None:
+    if data is None:
+        raise SettingsError("no record is given: give a data frame, a Dataset, or the arrays u and y")
     if isinstance(y, str):
         raise SettingsError("name the columns of a data frame: inputs=..., output=...")
     if isinstance(data, str | Path):
@@ -188,6 +198,8 @@ def _join_output(
     """Return the names of the inputs and of the output, and the columns of both."""
     if columns is None:
         u = np.asarray(data)
+        if not u.ndim:
+            raise SettingsError(f"the inputs are an array of numbers, got {type(data).__name__}")
         names = ("u",) if u.ndim < 2 else tuple(f"u{place + 1}" for place in range(u.shape[1]))
         channels = u.reshape(len(u), -1).T
         columns = MemoryColumns(

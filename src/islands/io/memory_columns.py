@@ -4,7 +4,7 @@ Frames are read through narwhals, which imports none of their libraries.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,9 @@ from islands.io.records.column_names import looks_like_time, seconds_per_unit
 
 if TYPE_CHECKING:
     import xarray
+
+#: Name of a DataArray without a name, while it is a variable.
+_CHANNEL = "islands: channel"
 
 #: Column that a time index without a name becomes.
 _TIME = "time"
@@ -55,6 +58,8 @@ def read_columns_in_memory(data: Any) -> MemoryColumns | None:
         data = {name: data[name] for name in data.dtype.names}
     if hasattr(data, "data_vars"):
         return _read_xarray(data)
+    if hasattr(data, "to_dataset"):
+        return _read_data_array(data)
     if isinstance(data, Mapping):
         return MemoryColumns({str(name): partial(np.asarray, values) for name, values in data.items()})
     # Importing narwhals takes some milliseconds, and arrays do not need it.
@@ -142,6 +147,24 @@ def _read_xarray(data: "xarray.Dataset") -> MemoryColumns:
     if time is not None:
         loads = {name: load for name, load in loads.items() if data[name].dims != (name,)}
     return MemoryColumns(loads, time, units)
+
+
+def _read_data_array(data: "xarray.DataArray") -> MemoryColumns | None:
+    """Return a DataArray as columns: a channel, or one for each label along its second dimension.
+
+    None for an array without a coordinate, or of more dimensions.
+    """
+    if data.ndim == 1 and data.coords:
+        name = str(data.name or "")
+        found = _read_xarray(data.to_dataset(name=name or _CHANNEL))
+        loads = {name if column == _CHANNEL else column: load for column, load in found.load.items()}
+        return replace(found, load=loads)
+    labelled = [dim for dim in data.dims if dim in data.coords]
+    # The dimension of the time has more labels than there are channels.
+    if data.ndim == 2 and len(labelled) == 2:
+        channels = min(data.dims, key=lambda dim: data.sizes[dim])
+        return _read_xarray(data.to_dataset(dim=channels))
+    return None
 
 
 def _load_variable(variable: "xarray.Variable") -> NDArray[Any]:

@@ -92,18 +92,18 @@ def diagnose(
         if validation:
             raise SettingsError("--validation is for a diagnosis: leave it out of a plan")
         check_folder(out, force, PLAN)
-        compile_kernels()
         columns_of_input = [simulation_options.single_input(options.columns(inputs)), *(channels or [])]
         data = read_input(records or [], columns_of_input, output_column, dt, rows, reading, planning)
         tolerances = simulation_options.tolerances(tolerance or [])
+        compile_kernels()
         _plan(data, simulated, tolerances, planning, out, seed, workers)
         return
     planning.check_unused()
     if not records or output_column is None:
         raise SettingsError("a diagnosis needs a record and --output: give both, or --plan before any data")
     check_folder(out, force, DIAGNOSIS_FILE)
-    compile_kernels()
-    with progress("diagnose", BEFORE_FORMULA * LEAST_FRACTION) as show:
+    # Read first: an error in a file is shown before the kernels are compiled, which takes a minute.
+    with progress("diagnose") as show:
         show("reading", 0.0)
         spec = parse_spec(simulated)
         inner = innermost(spec)
@@ -112,6 +112,8 @@ def diagnose(
             *(records, validation, options.columns(inputs), channels or [], column),
             *(output_column, dt, rows, reading),
         )
+    compile_kernels()
+    with progress("diagnose", BEFORE_FORMULA * LEAST_FRACTION) as show:
         simulator = make_simulator(spec, data, columns)
         tolerances = simulation_options.tolerances(tolerance or [])
         began = perf_counter()

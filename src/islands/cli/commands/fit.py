@@ -108,11 +108,12 @@ def fit(
         recordings = Recordings(records, names, output_column, dt, reading, steps)
     else:
         recordings = Recordings(records, measured_names(names, steps), output_column, dt, reading)
-    compile_kernels()
+    # Read first: an error in a file is shown before the kernels are compiled, which takes a minute.
     with progress("fit") as show:
         show("reading", 0.0)
         data = recordings.read(rows)
         held_out = recordings.read_held_out(validation, rows)
+    compile_kernels()
     with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()
         phases = fit_phases(library, outputs if len(outputs) > 1 else ()) if model == NARX else CLASS_PHASES

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 from islands.data.channel_names import AT_ONCE, is_unit, normalise_unit, parse_unit, spell_unit
-from islands.errors import RecordError
+from islands.errors import RecordError, SettingsError
 
 #: Units of time columns in seconds. A column without a unit is in seconds.
 TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86_400.0}
@@ -61,6 +61,34 @@ def find_column(name: str, columns: Iterable[str]) -> str:
         if _BRACKETED_UNIT.fullmatch(column, len(base)) and column.startswith(base)
     ]
     return fitting[0] if len(fitting) == 1 else base
+
+
+def list_inputs(inputs: object) -> tuple[str, ...]:
+    """Return the names of inputs that are given as one name or as a sequence; numbers become texts."""
+    if isinstance(inputs, str) or not isinstance(inputs, Iterable):
+        return (str(inputs),)
+    return tuple(map(str, inputs))
+
+
+def take_output(output: object) -> str | None:
+    """Return the name of the output; a number becomes a text.
+
+    Raises
+    ------
+    SettingsError
+        Several outputs are given.
+    """
+    if output is None or isinstance(output, str):
+        return output
+    if isinstance(output, Iterable):
+        names = tuple(map(str, output))
+        if len(names) == 1:
+            return names[0]
+        raise SettingsError(
+            f"output names one column, got {', '.join(names) or 'none'}: name one, or take fit_coupled or "
+            "identify_coupled for all"
+        )
+    return str(output)
 
 
 def append_unit(name: str, unit: str) -> str:

@@ -18,7 +18,7 @@ from islands.io.records.formats.packed import PACKED, open_packed
 from islands.io.records.formats.parquet import read_parquet
 from islands.io.records.formats.tdms import read_tdms
 from islands.io.records.formats.text.table import DelimitedText, read_delimited
-from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, ReadingOptions
+from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, ReadingOptions, split_words
 from islands.io.records.table import Table
 from islands.io.records.table_reading import read_table
 
@@ -154,7 +154,7 @@ def read_record(
         An option is invalid.
     """
     options = ReadingOptions(
-        names=tuple(names),
+        names=split_words(names),
         header=header,
         time=time,
         time_unit=time_unit,
@@ -163,7 +163,7 @@ def read_record(
         dates=dates,
         timezone=timezone,
         resample=resample,
-        missing=(missing,) if isinstance(missing, str) else tuple(missing),
+        missing=split_words(missing),
         gaps=gaps,
         outliers=outliers,
         rates=rates,

@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from math import isfinite
 from typing import Any
 from zoneinfo import ZoneInfo
 
-from islands.errors import SettingsError, suggest
+from islands.errors import SettingsError, check_seconds, suggest
 from islands.io.records.column_names import TIME_UNITS
 
 #: Characters of the decimal marks by the values of ``decimal``.
@@ -99,11 +98,11 @@ class ReadingOptions:
     rates: str | None = _option("Columns of different rates: mean or sample of the faster inputs, or rows.")
 
     def __post_init__(self) -> None:
-        names = tuple(name.strip() for name in self.names)
+        names = split_words(self.names)
         if not all(names) or len(set(names)) < len(names):
             raise SettingsError(f"--names {','.join(names)}: give every column another name")
         object.__setattr__(self, "names", names)
-        words = tuple(word.strip() for word in self.missing)
+        words = split_words(self.missing)
         if not all(words):
             raise SettingsError("--missing: a word is empty; empty cells are missing values without it")
         object.__setattr__(self, "missing", words)
@@ -113,8 +112,8 @@ class ReadingOptions:
         _check_choice("gaps", self.gaps, GAPS)
         _check_choice("outliers", self.outliers, (EXCLUDE, KEEP))
         _check_choice("rates", self.rates, RATES)
-        if self.resample is not None and not (isfinite(self.resample) and self.resample > 0):
-            raise SettingsError(f"--resample is a number of seconds above 0, got {self.resample}")
+        if self.resample is not None:
+            check_seconds(self.resample, "resample")
         _check_timezone(self.timezone)
 
     @staticmethod
@@ -159,6 +158,12 @@ class ReadingOptions:
             for name, value in given.items()
             if value != getattr(DEFAULT_READING, name)
         }
+
+
+def split_words(words: Sequence[str]) -> tuple[str, ...]:
+    """Return words without blanks around them; a single text has commas between them."""
+    listed = words.split(",") if isinstance(words, str) else words
+    return tuple(str(word).strip() for word in listed)
 
 
 def _check_choice(option: str, value: str | None, choices: Sequence[str] | Mapping[str, str]) -> None:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError
+from islands.errors import RecordError, SettingsError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,9 +162,13 @@ def select(rows: slice | None, samples: int, file: str) -> range:
     ------
     RecordError
         The selection is empty, extends past the samples, or has a step.
+    SettingsError
+        It is not a slice.
     """
     if rows is None:
         return range(samples)
+    if not isinstance(rows, slice):
+        raise SettingsError(f"rows is a slice such as slice(0, {samples}), got {rows!r}")
     first, last = (
         default if bound is None else bound + samples * (bound < 0)
         for bound, default in ((rows.start, 0), (rows.stop, samples))

@@ -11,7 +11,13 @@ from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_inputs
 from islands.errors import RecordError
 from islands.inspection.gross_errors import find_gross_errors, find_input_codes
-from islands.io.records.column_names import find_column, split_structures, time_column
+from islands.io.records.column_names import (
+    find_column,
+    list_inputs,
+    split_structures,
+    take_output,
+    time_column,
+)
 from islands.io.records.reading_options import DEFAULT_READING, KEEP, MEAN, ROWS, ReadingOptions
 from islands.io.records.sampling.column_clocks import ColumnClock, find_clocks, may_differ
 from islands.io.records.sampling.common_clock import (
@@ -65,7 +71,7 @@ def read_table(
     RecordError
         The record cannot be used as it is.
     """
-    inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
+    inputs, output = list_inputs(inputs), take_output(output)
     sources = [find_column(name, table.names) for name in inputs]
     output = None if output is None else find_column(output, table.names)
     outputs = () if output is None else (output,)

@@ -361,7 +361,7 @@ def test_setting_out_of_range_raises_settings_error(settings, message):
     [
         (1, SettingsError, "leaves a part empty"),
         (4, RecordError, "has 3 samples and 3 are needed before the first row: take a longer recording"),
-        (5, SettingsError, "no model could be estimated: {'too_few_rows': 1}; take another library"),
+        (5, SettingsError, "no model could be estimated: too few rows (1 structure); take another library"),
         (10, RecordError, "has 2 samples and the warm-up takes 3: take a longer recording"),
         (20, RecordError, "has 5 samples, of which the warm-up takes 3: testing the residual takes 3 more"),
     ],
@@ -379,5 +379,7 @@ def test_shortest_possible_record_is_fitted():
 
 def test_output_of_zeros_raises_settings_error():
     zeros = with_output(tank(), np.zeros(400))
-    with pytest.raises(SettingsError, match=r"no model could be estimated: \{\}; take another library"):
+    with pytest.raises(
+        SettingsError, match=r"no model could be estimated: no term of the library reduces the error"
+    ):
         islands.fit(zeros, library="polynomial")

@@ -43,6 +43,14 @@ SAME = {
         {name: ("t", values) for name, values in COLUMNS.items()},
         coords={"t": ("t", 1000 * TIME, {"units": "ms"})},
     ),
+    "a labelled array": xr.DataArray(
+        np.column_stack(list(COLUMNS.values())),
+        {"time": TIME, "channel": list(COLUMNS)},
+        dims=("time", "channel"),
+    ),
+    "a labelled array of rows": xr.DataArray(
+        np.stack(list(COLUMNS.values())), {"channel": list(COLUMNS), "t": TIME}, dims=("channel", "t")
+    ),
 }
 
 
@@ -84,6 +92,45 @@ def test_units_of_an_xarray_data_set_are_those_of_the_record():
     data = SAME["xarray"].assign(y=("t", RECORD.y, {"units": "um"}))
     made = islands.as_record(data, **CHOICE)
     assert (made.input_units, made.output_unit) == (("V",), "um")
+
+
+@pytest.mark.parametrize("name", ["u_V", None])
+def test_the_time_of_a_labelled_array_is_that_of_the_record(name):
+    u, y = (xr.DataArray(values, {"time": TIME}, "time", name) for values in COLUMNS.values())
+    for data in (y, RECORD.y):
+        made = islands.as_record(u, data)
+        assert made.dt == pytest.approx(0.04)
+        assert made.input_names == (name or "u",)
+        assert np.array_equal(made.y, RECORD.y)
+
+
+@pytest.mark.parametrize("inputs", [0, [0], (0,), np.array([0])])
+def test_columns_may_have_numbers_as_names(inputs):
+    made = islands.as_record(pd.DataFrame({0: RECORD.u[:, 0], 1: RECORD.y}), dt=0.04, inputs=inputs, output=1)
+    assert (made.input_names, made.output_name) == (("0",), "1")
+
+
+def test_a_list_of_one_output_is_this_output():
+    assert islands.as_record(FRAME, dt=0.04, inputs=("u_V",), output=["y"]).output_name == "y"
+
+
+#: Natural calls that raised an exception of Python, and what the message says.
+UNUSUAL = [
+    (lambda: islands.fit(FRAME, inputs="u_V", output=["y", "u_V"], dt=0.04), "got y, u_V: .* fit_coupled"),
+    (lambda: islands.join((FRAME, FRAME)), "join takes Datasets, got a DataFrame"),
+    (lambda: islands.as_record(FRAME, dt="0.04", **CHOICE), "dt must be a positive number .* got '0.04'"),
+    (lambda: islands.as_record(FRAME, dt=True, **CHOICE), "dt must be a positive number .* got True"),
+    (lambda: islands.fit(RECORD, max_terms="3"), "max_terms is an integer, got '3'"),
+    (lambda: islands.as_record(None, RECORD.y, 0.04), "no record is given"),
+    (lambda: islands.as_record(3.0, RECORD.y, 0.04), "an array of numbers, got float"),
+    (lambda: islands.inspect_record(FRAME), "takes a file or a Dataset, got a DataFrame"),
+]
+
+
+@pytest.mark.parametrize(("call", "words"), UNUSUAL)
+def test_an_unusual_argument_is_refused_with_the_usual_one(call, words):
+    with pytest.raises(islands.IslandsError, match=words):
+        call()
 
 
 def test_a_list_of_frames_is_a_record_of_recordings():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError
+from islands.errors import RecordError, check_seconds
 from islands.io.records.column_names import TIME_UNITS, looks_like_time, seconds_per_unit
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.sampling.recording import Recording
@@ -56,10 +56,8 @@ def find_sampling(
             f"{file} has no time column that --time-unit could describe: name the column by --time, or leave "
             "--time-unit out (library: time=, time_unit=)"
         )
-    if dt is not None and not (np.isfinite(dt) and dt > 0):
-        raise RecordError(
-            f"the sampling time --dt (library: dt=) must be a positive number of seconds, got {dt}"
-        )
+    if dt is not None:
+        dt = check_seconds(dt, "the sampling time dt", RecordError)
     if time is not None:
         scale = find_time_scale(table, columns, time, structure, options)
         stamps, seconds = scale.stamps, scale.seconds

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from islands.data.channel_names import parse_unit
-from islands.errors import RecordError
+from islands.errors import IslandsError, RecordError
 from islands.io.records import READERS, fingerprint, read_columns, read_record
 from islands.io.records.column_names import looks_like_time, time_column
 from support.bad_records import refusal
@@ -377,6 +377,23 @@ def test_a_file_that_cannot_be_opened_is_refused_with_the_reason(tmp_path):
     (tmp_path / "file.csv").write_text("t,u,y")
     with pytest.raises(RecordError, match=r"cannot be opened \(Not a directory\): check path"):
         read_record(tmp_path / "file.csv" / "bad.csv", ["u"], "y")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"dt": "0.1"}, "the sampling time dt must be a positive number of seconds, got '0.1'"),
+        ({"resample": "0.1"}, "resample must be a positive number of seconds, got '0.1'"),
+        ({"rows": (0, 30)}, r"rows is a slice such as slice\(0, 50\), got \(0, 30\)"),
+    ],
+)
+def test_an_argument_of_another_type_is_refused(tmp_path, given, words):
+    with pytest.raises(IslandsError, match=words):
+        read_record(written(tmp_path), ["u_V"], "y_um", **given)
+
+
+def test_names_may_be_one_text_as_on_the_command_line(tmp_path):
+    assert read_record(written(tmp_path), "a", ["b"], names="t, a, b").input_names == ("a",)
 
 
 def test_an_unknown_suffix_is_refused_with_the_known_ones(tmp_path):
