@@ -58,7 +58,7 @@ class StrictRoute(APIRoute):
 
 
 def _list_query_parameters(dependant: Dependant) -> tuple[str, ...]:
-    """Return the query parameters of a route and of what it depends on."""
+    """Return the query parameters of a route and of its dependencies."""
     own = [parameter.alias for parameter in dependant.query_params]
     return (*own, *(name for each in dependant.dependencies for name in _list_query_parameters(each)))
 

@@ -1,6 +1,5 @@
 """MDF files of test benches and loggers (.mf4, .mdf), read by asammdf (extra `mdf`)."""
 
-import logging
 import textwrap
 import weakref
 from collections.abc import Iterator
@@ -67,11 +66,12 @@ def _open(path: Path) -> Any:
     from asammdf import MDF  # noqa: PLC0415
     from asammdf.blocks.mdf_v3 import MDF3  # noqa: PLC0415
     from asammdf.blocks.mdf_v4 import MDF4  # noqa: PLC0415
+    from asammdf.blocks.utils import logger  # noqa: PLC0415
 
     # The destructor of a reader that has not opened its file raises, and Python prints the traceback.
     MDF3.__del__ = MDF4.__del__ = _close  # type: ignore[method-assign]
-    # It also logs what it finds in a damaged file, and then raises or reads it.
-    logging.getLogger("asammdf").setLevel(logging.CRITICAL)
+    # It also logs damages, before it raises or reads on.
+    logger.setLevel("CRITICAL")
     return MDF(path)
 
 
