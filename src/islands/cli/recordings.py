@@ -4,11 +4,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from islands.cli.console import print_message
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset, join
 from islands.data.input_lead import advance_inputs
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
+from islands.data.split import describe_extrapolation, split_data
 from islands.errors import SettingsError
 from islands.io.records import read_dataset
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
@@ -28,6 +30,12 @@ def advance_as_named(record: Dataset, inputs: Sequence[str]) -> Dataset:
     pairs = zip(inputs, record.input_names, strict=False)
     early = [(parse_channel_name(name).at_once, parse_channel_name(own).at_once) for name, own in pairs]
     return advance_inputs(record, [place for place, (given, own) in enumerate(early) if given and not own])
+
+
+def state_extrapolation(data: Dataset, held_out: Dataset | float) -> None:
+    """Print, before a search, which inputs of the validation data leave the range of the estimation data."""
+    for statement in describe_extrapolation(split_data(data, held_out)):
+        print_message(f"Validation extrapolates: {statement}.")
 
 
 @dataclass(frozen=True, slots=True)

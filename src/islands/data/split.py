@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 
 from islands.data.averaging import average_samples
+from islands.data.channel_names import parse_channel_name
 from islands.data.compatibility import Reference, match_record
 from islands.data.dataset import Dataset, join
 from islands.data.magnitudes import check_magnitudes
@@ -18,6 +19,10 @@ HOLDOUT_FRACTION = 0.25
 #: Minimum number of samples of each of several recordings, and of each part of one that the hold-out part
 #: divides: its initial state is estimated from them.
 MIN_RECORDING_SAMPLES = 20
+
+
+#: Excess over a range, as a fraction of it, that is no extrapolation.
+_NEGLIGIBLE_EXCESS = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +103,29 @@ def split_data(record: Dataset, validation: Dataset | float) -> Split:
             "rows, or a fraction of the record"
         )
     return parts
+
+
+def describe_extrapolation(parts: Split) -> list[str]:
+    """State every input of the validation data that leaves the range of the estimation data.
+
+    An excess of at most 5 % of the range does not count.
+    """
+    found = []
+    for place, name in enumerate(parts.estimation.input_names):
+        (low, high), (lowest, highest) = (
+            (float(part.u[:, place].min()), float(part.u[:, place].max()))
+            for part in (parts.estimation, parts.validation)
+        )
+        allowed = _NEGLIGIBLE_EXCESS * (high - low)
+        if lowest < low - allowed or highest > high + allowed:
+            channel = parse_channel_name(name).base
+            unit = parts.estimation.input_units[place]
+            found.append(
+                f"{channel} is {lowest:.4g} to {highest:.4g} {unit}".rstrip()
+                + f" in the validation data and {low:.4g} to {high:.4g} {unit}".rstrip()
+                + " in the estimation data"
+            )
+    return found
 
 
 def hold_out(record: Dataset, validation: Dataset) -> Dataset:

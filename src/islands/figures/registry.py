@@ -121,14 +121,14 @@ def _hold(entry: Assessment, split: Split) -> Figure:
 
 
 def _residuals(entry: Assessment, _split: Split) -> Figure:
-    """Draw the correlation functions of the residual with their 95 % band, and its verdict."""
+    """Draw the correlation functions of the residual with their 95 % band, and its predictable part."""
     return _draw_residuals(entry.residual_tests, entry.residual_structure)
 
 
 def _draw_residuals(tests: ResidualTests, structure: ResidualStructure) -> Figure:
     shares = ((structure.one_step_share, "one step ahead"), (structure.free_run_share, "in free run"))
     parts = ", ".join(f"{100 * share:.0f} % {mode}" for share, mode in shares if isfinite(share))
-    title = f"residual {structure.verdict}" + (f": predictable part {parts}" if parts else "")
+    title = f"predictable part of the residual: {parts}" if parts else ""
     return draw_residual_correlations(tests, title)
 
 

@@ -46,6 +46,7 @@ class BandsDocument(BaseModel):
     width: Annotated[FiniteFloat, Field(ge=0)]
     levels: Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]
     factors: Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]
+    coverage: Annotated[FiniteFloat, Field(ge=0, le=1)] | None = None
 
 
 def ensemble_document(ensemble: Ensemble | None) -> list[dict[str, Any]] | None:
@@ -132,6 +133,7 @@ def bands_document(bands: PredictionBands | None) -> dict[str, Any] | None:
         "width": bands.width,
         "levels": list(bands.factors),
         "factors": list(bands.factors.values()),
+        "coverage": bands.coverage,
     }
 
 
@@ -148,6 +150,6 @@ def bands_from_document(document: Any, ensemble: Ensemble | None) -> PredictionB
     try:
         found = BandsDocument.model_validate(document)
         factors = dict(zip(found.levels, found.factors, strict=True))
-        return PredictionBands(ensemble, found.noise, found.width, factors)
+        return PredictionBands(ensemble, found.noise, found.width, factors, found.coverage)
     except ValueError as error:
         raise ModelError(f"the bands of the result are damaged: {error}") from error

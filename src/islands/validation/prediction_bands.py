@@ -14,7 +14,7 @@ outside together.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,12 +72,16 @@ class PredictionBands:
         Median of ``sqrt(noise^2 + spread^2)`` over the data, in the unit of the output.
     factors : mapping
         Half-width of a band in units of ``sqrt(noise^2 + spread^2)``, by level.
+    coverage : float or None
+        Fraction of the validation samples within the band of the default level. None for results of earlier
+        versions.
     """
 
     ensemble: Ensemble
     noise: float
     width: float
     factors: Mapping[float, float]
+    coverage: float | None = None
 
     def predict(
         self, model: DynamicModel, record: Dataset, level: float = LEVEL, warm_up: int | None = None
@@ -127,6 +131,11 @@ class PredictionBands:
     def typical_half_width(self, level: float = LEVEL) -> float:
         """Return the median half-width of a band on the data, in the unit of the output."""
         return self._factor(level) * self.width
+
+    @property
+    def typical_factor(self) -> float:
+        """Half-width of the band of the default level in units of ``sqrt(noise^2 + spread^2)``."""
+        return self._factor(LEVEL)
 
     def _factor(self, level: float) -> float:
         if not LEVELS[0] <= level <= LEVELS[-1]:
@@ -241,4 +250,9 @@ def _calibrate(ensemble: Ensemble, parts: Sequence[_Output]) -> PredictionBands 
     # The correction of a conformal prediction for a finite number of residuals.
     ranks = [int(len(scores) * level * (1.0 + 1.0 / count)) for level in LEVELS]
     factors = [float(scores[min(len(scores) - 1, rank)]) for rank in ranks]
-    return PredictionBands(ensemble, noise, float(np.median(width)), dict(zip(LEVELS, factors, strict=True)))
+    bands = PredictionBands(ensemble, noise, float(np.median(width)), dict(zip(LEVELS, factors, strict=True)))
+    validated = len(residuals[-1])
+    if not validated:
+        return bands
+    inside = residual[-validated:] <= bands.typical_factor * width[-validated:]
+    return replace(bands, coverage=float(inside.mean()))

@@ -13,7 +13,7 @@ from islands.cli.output_folder import check_folder, show_result
 from islands.cli.preprocessing_options import with_preprocessing_options
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.record_options import with_reading_options
-from islands.cli.recordings import Recordings, measured_names
+from islands.cli.recordings import Recordings, measured_names, state_extrapolation
 from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
 from islands.cli.search_options import ModelClass
 from islands.cli.stop_requests import REPEAT, stop_requests
@@ -113,6 +113,8 @@ def fit(
         show("reading", 0.0)
         data = recordings.read(rows)
         held_out = recordings.read_held_out(validation, rows)
+    if len(outputs) == 1:
+        state_extrapolation(data, held_out)
     compile_kernels()
     with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()

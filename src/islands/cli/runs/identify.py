@@ -14,7 +14,7 @@ from islands.cli.console import errors, output, print_message
 from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
 from islands.cli.output_folder import show_result
 from islands.cli.progress_display import Display, compile_kernels, progress
-from islands.cli.recordings import Recordings, measured_names
+from islands.cli.recordings import Recordings, measured_names, state_extrapolation
 from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
 from islands.cli.runs.held_out_test import TEST, evaluate_test
 from islands.cli.runs.timed_engine import TimedEngine
@@ -256,7 +256,9 @@ def _read_data(job: dict[str, Any], lag: int) -> tuple[Any, Any, Any]:
     outputs = job.get("outputs", 1)
     if outputs == 1:
         recordings = Recordings(paths, job["inputs"], job["output"], job["dt"], reading, steps)
-        return _read_parts(recordings, job, lag)
+        record, held_out, test_data = _read_parts(recordings, job, lag)
+        state_extrapolation(record, held_out)
+        return record, held_out, test_data
     names = measured_names(job["inputs"], steps)
     recordings = Recordings(paths, names, job["output"], job["dt"], reading)
     data, *others = _read_parts(recordings, job, lag)

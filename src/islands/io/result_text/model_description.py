@@ -5,6 +5,7 @@ from math import floor, isfinite
 
 import numpy as np
 
+from islands.data.split import describe_extrapolation
 from islands.estimation.constraints.checks import ConstraintCheck
 from islands.evolution.search_result import SearchResult
 from islands.models.equations import (
@@ -23,6 +24,12 @@ _GOOD_R2 = 0.9
 
 #: Ratio of the errors on validation data and estimation data above which a model does not generalise.
 _LARGE_RATIO = 2.0
+
+#: RMSE as a fraction of the output range that is a rounding error: its ratio to another one says nothing.
+_ROUNDING = 1e-6
+
+#: Least fraction of the validation samples inside a band of 90 %: two standard errors of 20 independent ones.
+_LEAST_COVERAGE = 0.75
 
 #: Standard errors below which a parameter is not significant.
 _SIGNIFICANT = 2.0
@@ -83,15 +90,18 @@ def describe_findings(found: SearchResult) -> list[str]:
     """Describe errors, uncertainty, uses, failures and next steps of the recommended model."""
     entry = found.recommended
     physics = (*found.recommendation.reasons, "")[1]
-    good = [*_list_uses(entry), *([physics] if physics and not physics.startswith("no model") else [])]
-    bad = [*([physics] if physics.startswith("no model") else []), *_list_failures(found, entry)]
+    failures = list(_list_failures(found, entry))
+    good = [*([physics] if physics and not physics.startswith("no model") else [])]
+    bad = [*([physics] if physics.startswith("no model") else []), *failures]
+    good = [*_list_uses(entry, bool(bad)), *good]
     return [
         _describe_error(found, entry),
         *_describe_recordings(found, entry),
         *_describe_uncertainty(found, entry),
         *_describe_constraints(entry),
         *_describe_preset(found),
-        f"Good for: {'; '.join(good) or 'no use: every check failed'}.",
+        _describe_verdict(entry, bool(bad)),
+        f"Good for: {'; '.join(good) or 'no use that the checks confirm'}.",
         f"Fails at: {'; '.join(bad) or 'none of the checks'}.",
         f"Next: {'; '.join(_list_next_steps(found, entry))}.",
     ]
@@ -191,10 +201,34 @@ def _unit(found: SearchResult, value: float) -> str:
     return f"{value:.4g} {found.record.output_unit}".rstrip()
 
 
-def _list_uses(entry: Assessment) -> Iterator[str]:
-    free, one = (entry.metrics["validation"][mode] for mode in ("free_run", "one_step_ahead"))
-    if free.r2 >= _GOOD_R2:
-        yield "simulation from the inputs alone"
+def _simulates(entry: Assessment) -> bool:
+    """Return whether the free run on the validation data is finite and follows the output."""
+    free = entry.metrics["validation"]["free_run"]
+    # R2 is undefined for a constant output.
+    return isfinite(free.rmse) and not free.r2 < _GOOD_R2
+
+
+def _describe_verdict(entry: Assessment, has_limits: bool) -> str:
+    """State the verdict on the use as a simulation, from the free run, and one step ahead as a detail."""
+    word = "unsuitable" if not _simulates(entry) else "usable, with limits" if has_limits else "good"
+    structure, bands = entry.residual_structure, entry.bands
+    parts = []
+    if isfinite(structure.free_run_share):
+        parts.append(f"{100 * structure.free_run_share:.0f} % of the residual of the free run is predictable")
+    if bands is not None and bands.coverage is not None:
+        parts.append(
+            f"{100 * bands.coverage:.0f} % of the validation samples are in the {100 * LEVEL:g} % band"
+        )
+    if isfinite(structure.one_step_share):
+        parts.append(f"one step ahead, {100 * structure.one_step_share:.0f} % is predictable")
+    measured = "; ".join(parts)
+    return f"As a simulation: {word} ({measured})." if parts else f"As a simulation: {word}."
+
+
+def _list_uses(entry: Assessment, has_limits: bool) -> Iterator[str]:
+    one = entry.metrics["validation"]["one_step_ahead"]
+    if _simulates(entry):
+        yield "simulation from the inputs alone" + (", within the limits below" if has_limits else "")
     elif one.r2 >= _GOOD_R2:
         yield "prediction one step ahead"
     if entry.residual_structure.verdict == ADEQUATE:
@@ -202,15 +236,11 @@ def _list_uses(entry: Assessment) -> Iterator[str]:
 
 
 def _describe_adequate_residual(structure: ResidualStructure) -> str:
-    shares = {
-        "free-run residual, as with noise of the measurement": structure.free_run_share,
-        "one-step-ahead residual, as with noise within the system": structure.one_step_share,
-    }
-    white = [name for name, share in shares.items() if share <= LARGEST_SHARE]
-    if not white:
+    if not structure.free_run_share <= LARGEST_SHARE:
         return "the residual is a rounding error"
-    name = "residual" if len(white) == len(shares) else white[0]
-    return f"no structure is left in the {name} (at most {100 * LARGEST_SHARE:.0f} % is predictable)"
+    return (
+        f"no structure is left in the free-run residual (at most {100 * LARGEST_SHARE:.0f} % is predictable)"
+    )
 
 
 def _list_failures(found: SearchResult, entry: Assessment) -> Iterator[str]:
@@ -219,7 +249,9 @@ def _list_failures(found: SearchResult, entry: Assessment) -> Iterator[str]:
         if not check.met:
             value = f"{check.value:.6g}" if isfinite(check.value) else "undefined"
             yield f"the constraint {named_statement(check.text, require_narx(entry.model))} (value {value})"
-    if errors["validation"].r2 < _GOOD_R2:
+    if not isfinite(errors["validation"].rmse):
+        yield "simulation from the inputs alone: the free run diverges"
+    elif not _simulates(entry):
         yield f"simulation from the inputs alone: R2 {errors['validation'].r2:.3f}"
     yield from _list_physical_failures(found, entry)
     structure = entry.residual_structure
@@ -228,9 +260,23 @@ def _list_failures(found: SearchResult, entry: Assessment) -> Iterator[str]:
             f"{100 * structure.free_run_share:.0f} % of the free-run residual is predictable "
             f"(RMS {structure.percent:.2g} % of the output range)"
         )
-    ratio = errors["validation"].rmse / errors["estimation"].rmse if errors["estimation"].rmse > 0 else 0.0
-    if ratio > _LARGE_RATIO:
+    coverage = 1.0 if entry.bands is None or entry.bands.coverage is None else entry.bands.coverage
+    if coverage < _LEAST_COVERAGE:
+        yield (
+            f"the {100 * LEVEL:g} % prediction band contains {100 * coverage:.0f} % of the validation samples"
+        )
+    if _generalises_poorly(found, entry):
+        ratio = errors["validation"].rmse / errors["estimation"].rmse
         yield f"the free-run error on the validation data is {ratio:.2g} times that on the estimation data"
+    for statement in describe_extrapolation(found.split):
+        yield f"extrapolation: {statement}"
+
+
+def _generalises_poorly(found: SearchResult, entry: Assessment) -> bool:
+    """Return whether the error on the validation data is much larger than that on the estimation data."""
+    estimation, validation = (entry.metrics[part]["free_run"].rmse for part in ("estimation", "validation"))
+    visible = validation > _ROUNDING * found.record.output_range
+    return visible and validation > _LARGE_RATIO * estimation > 0.0
 
 
 def _list_physical_failures(found: SearchResult, entry: Assessment) -> Iterator[str]:
@@ -269,9 +315,8 @@ def _list_next_steps(found: SearchResult, entry: Assessment) -> list[str]:
         largest = max(found.models, key=lambda other: other.model.size).model.size
         if entry.model.size == largest and "max_terms" in found.settings:
             steps.append(f"allow more than {largest} terms")
-        steps.append(f"try {_suggest_terms(entry)}")
-    errors = [entry.metrics[part]["free_run"].rmse for part in ("estimation", "validation")]
-    if errors[1] > _LARGE_RATIO * errors[0] > 0:
+        steps.append(_suggest_remedy(entry))
+    if _generalises_poorly(found, entry) or describe_extrapolation(found.split):
         steps.append("estimate from a record that covers the amplitudes and rates of the validation data")
     weak = _list_insignificant(entry)
     if weak:
@@ -288,6 +333,15 @@ def _list_next_steps(found: SearchResult, entry: Assessment) -> list[str]:
         )
     steps.append("check the model on a record that was not used (islands simulate)")
     return steps
+
+
+def _suggest_remedy(entry: Assessment) -> str:
+    if entry.residual_structure.one_step_share <= LARGEST_SHARE:
+        return (
+            "try an estimate that minimises the error of the free run (--estimator free-run), or measure the "
+            "disturbance: one step ahead, no structure is left"
+        )
+    return f"try {_suggest_terms(entry)}"
 
 
 def _suggest_terms(entry: Assessment) -> str:

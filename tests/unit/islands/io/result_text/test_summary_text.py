@@ -7,6 +7,7 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
+from islands.data.split import Split
 from islands.expressions.parsing import parse
 from islands.io.result_text.model_description import describe
 from islands.io.result_text.model_table import table
@@ -134,9 +135,9 @@ def test_structure_in_the_residual_is_a_failure_with_a_hint(findings):
 @pytest.mark.parametrize(
     ("shares", "expected"),
     [
-        ((0.02, 0.5), "no structure is left in the one-step-ahead residual, as with noise within"),
-        ((0.5, 0.02), "no structure is left in the free-run residual, as with noise of the measurement"),
-        ((0.02, 0.02), "no structure is left in the residual (at most 10 % is predictable)"),
+        ((0.5, 0.02), "no structure is left in the free-run residual (at most 10 % is predictable)"),
+        ((0.02, 0.02), "no structure is left in the free-run residual (at most 10 % is predictable)"),
+        ((0.02, 0.5), "the residual is a rounding error"),
         ((0.5, 0.5), "the residual is a rounding error"),
     ],
 )
@@ -144,6 +145,54 @@ def test_the_unpredictable_residual_is_named(findings, shares, expected):
     found = said(findings, residual_structure=ResidualStructure(*shares, 0.7, "adequate"))
     assert expected in found["Good for"]
     assert "terms in" not in found["Next"]
+
+
+def test_the_verdict_is_that_of_the_free_run(findings):
+    """A white one-step-ahead residual passed all checks, with a predictable error of the free run."""
+    drifting = ResidualStructure(0.02, 0.939, 5.0, "inadequate")
+    found = said(findings, residual_structure=drifting)
+    assert found["As a simulation"].startswith(
+        "As a simulation: usable, with limits (94 % of the residual of"
+    )
+    assert found["As a simulation"].endswith("one step ahead, 2 % is predictable).")
+    assert "94 % of the free-run residual is predictable (RMS 5 % of the output range)" in found["Fails at"]
+    assert "within the limits below" in found["Good for"]
+    assert "--estimator free-run" in found["Next"]
+    fine = ResidualStructure(0.02, 0.03, 0.1, "adequate")
+    physics = findings.recommended.physics
+    closed = replace(
+        physics, excursions=tuple(replace(test, closure_percent=0.0) for test in physics.excursions)
+    )
+    found = said(findings, residual_structure=fine, physics=closed)
+    assert found["As a simulation"].startswith("As a simulation: good (3 % of")
+    assert found["Fails at"] == "Fails at: none of the checks."
+    poor = said(findings, metrics=errors(findings, Metrics(20.0, 0.3, 2.0, 10.0)), residual_structure=fine)
+    assert poor["As a simulation"].startswith("As a simulation: unsuitable")
+
+
+def test_a_band_that_misses_the_validation_data_is_a_failure(findings):
+    bands = findings.recommended.bands
+    assert 0.75 <= bands.coverage <= 1.0
+    found = said(findings, bands=replace(bands, coverage=0.5))
+    assert "the 90 % prediction band contains 50 % of the validation samples" in found["Fails at"]
+    assert "prediction band" not in said(findings)["Fails at"]
+
+
+def test_an_extrapolating_validation_is_a_failure(findings):
+    parts = findings.split
+    wide = replace(parts.validation, u=3.0 * parts.validation.u)
+    changed = replace(findings, split=Split(parts.estimation, wide))
+    low, high = wide.u.min(), wide.u.max()
+    assert (
+        f"extrapolation: u_V is {low:.4g} to {high:.4g} V in the validation data" in said(changed)["Fails at"]
+    )
+    assert "extrapolation" not in said(findings)["Fails at"]
+
+
+def test_the_ratio_of_two_rounding_errors_is_not_a_failure(findings):
+    small, large = Metrics(1e-14, 1.0, 1e-16, 100.0), Metrics(3e-14, 1.0, 3e-16, 100.0)
+    assert "times that" not in said(findings, metrics=errors(findings, large, free_run=small))["Fails at"]
+    assert "covers" not in said(findings, metrics=errors(findings, large, free_run=small))["Next"]
 
 
 def test_a_parameter_below_two_standard_errors_is_named(findings):
