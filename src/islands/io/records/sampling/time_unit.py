@@ -86,6 +86,9 @@ _CLOCK_STEPS = (1, 2, 2.5, 3, 4, 5, 6, 7, 7.5, 8, 9, 10, 12, 15, 20, 24, 30, 40,
 #: Times of day are less than this many days, and begin as many steps after midnight, to be read as such.
 _MOST_DAYS_OF_TIME, _LATE = 2.0, 20.0
 
+#: Numbers whose digits are counted, at most about.
+_MOST_DIGITS = 5000
+
 #: Tolerance of a usual step, and steps of whole seconds and milliseconds in which stamps with jitter count.
 _STEP_TOLERANCE, _GRIDS = 2e-3, (1.0, 1e-3)
 
@@ -180,7 +183,7 @@ def _read_days(
     step, is_date = _usual_step(known), not _DATE_WORDS.isdisjoint(re.split(r"[\W_]+", name.lower()))
     in_seconds, in_days = _is_decimal_step(step), _is_clock_step(step * _DAY)
     if not (in_seconds or in_days):
-        in_days = _counts_time(known * _DAY, _DAY * rounding_error(known)) and not _counts_time(known)
+        in_days = _counts_time(known * _DAY, _DAY * _measure_rounding(known)) and not _counts_time(known)
     number = f"{known[0]:.15g} is {count.date(float(known[0]))} ({count.name})"
     if is_date or (in_days and not in_seconds):
         return _elapse(
@@ -224,16 +227,21 @@ def _elapse(numbers: NDArray[np.float64], note: str) -> TimeScale:
     """
     known = numbers[np.isfinite(numbers)]
     first = float(known[0]) if known.size else 0.0
-    digits = -ceil(log10(2.0 * _DAY * float(rounding_error(known).max()) * (1.0 - 1e-9))) if known.size else 0
+    digits = -ceil(log10(2.0 * _DAY * _measure_rounding(known) * (1.0 - 1e-9))) if known.size else 0
     stamps: NDArray[np.float64] = np.round((numbers - first) * _DAY, min(max(digits, 0), 6))
     return TimeScale(stamps, 1.0, True, note)
+
+
+def _measure_rounding(known: NDArray[np.float64]) -> float:
+    """Return half a unit of the last digit of numbers of similar size, by some of them."""
+    return float(rounding_error(known[:: 1 + len(known) // _MOST_DIGITS]).max())
 
 
 def _usual_step(known: NDArray[np.float64]) -> float:
     """Return the mean of the steps that are not gaps: the median has the rounding errors of two stamps."""
     steps = np.diff(known)
     steps = steps[steps >= 0.0]
-    longest = GAP * np.median(steps) + 2.1 * rounding_error(known).max() if steps.size else 0.0
+    longest = GAP * np.median(steps) + 2.1 * _measure_rounding(known) if steps.size else 0.0
     return float(steps[steps <= longest].mean()) if steps.size else 0.0
 
 
@@ -254,9 +262,9 @@ def _is_clock_step(seconds: float) -> bool:
     )
 
 
-def _counts_time(seconds: NDArray[np.float64], errors: NDArray[np.float64] | float = 1e-9) -> bool:
-    """Return whether all times are whole seconds or milliseconds, within errors that are smaller."""
-    allowed = np.maximum(errors, np.spacing(np.abs(seconds)))
+def _counts_time(seconds: NDArray[np.float64], error: float = 1e-9) -> bool:
+    """Return whether all times are whole seconds or milliseconds, within an error that is smaller."""
+    allowed = np.maximum(error, np.spacing(np.abs(seconds)))
     return any(
         bool(
             (allowed < 0.05 * grid).all()
