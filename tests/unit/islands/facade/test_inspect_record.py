@@ -56,6 +56,48 @@ def test_gaps_are_repaired_as_for_identify(tmp_path):
     assert "--gaps interpolate" in found.command
 
 
+@pytest.mark.parametrize("rows_between", [False, True])
+def test_columns_of_different_rates_are_described_at_their_common_clock(tmp_path, rows_between):
+    """The input has five samples for one of the output, at the same times or between them."""
+    u = steps(7500, 0, 50)
+    y = measure(u, delay(lag(u, 25.0), 15), 0.02).y
+    late = 0.007 if rows_between else 0.0
+    one = [(0.02 * k, f"{0.02 * k:.3f},{value:.6f},") for k, value in enumerate(u)]
+    two = [(0.1 * k + late, f"{0.1 * k + late:.3f},,{y[5 * k]:.6f}") for k in range(1500)]
+    rows = [text for _, text in sorted(one + two)]
+    if not rows_between:
+        rows = [f"{0.02 * k:.3f},{u[k]:.6f},{y[k] if k % 5 == 0 else ''}" for k in range(7500)]
+    file = tmp_path / "r.csv"
+    file.write_text("\n".join(["t_s,a,b", *rows]) + "\n")
+    found = islands.inspect_record(file)
+    assert (found.sampling.samples, found.sampling.dt) == (1500, 0.1)
+    assert (found.choice.inputs, found.choice.output) == (("a",), "b")
+    # The mean of an input that changes between two samples of the record precedes its next value.
+    assert found.find("dead-time").value in ((3, 4) if rows_between else (4,))
+    (note,) = found.warnings
+    assert note.startswith("columns have samples at different times: a ")
+    assert found.command == f"islands identify {file} --input a --output b --out result"
+    read = islands.read_record(file, found.choice.inputs, found.choice.output)
+    assert (read.samples, read.reading) == (1500, (note,))
+
+
+@pytest.mark.parametrize(
+    ("change", "option"),
+    [
+        ({"blank": range(700, 705)}, "--gaps split"),
+        ({"time": np.round(0.1 * np.arange(1500) + 0.04 * np.sin(np.arange(1500)), 3)}, "--resample 0.1"),
+    ],
+)
+def test_the_suggested_command_can_read_the_record(tmp_path, change, option):
+    file = write(tmp_path / "r.csv", **change)
+    found = islands.inspect_record(file)
+    name, value = found.command.split(option.split()[0])[1].split()[0], option.split()[1]
+    assert option.split()[0] in found.command
+    assert name.startswith(value[:2]) or float(name) == pytest.approx(float(value), rel=0.05)
+    repair = {option.split()[0].removeprefix("--"): name if name == "split" else float(name)}
+    assert islands.read_record(file, ["u_V"], "y_um", **repair).samples > 1400
+
+
 def test_missing_inputs_cut_the_record(tmp_path):
     found = islands.inspect_record(write(tmp_path / "r.csv", blank=range(700, 705)))
     assert found.columns[1].missing == 5

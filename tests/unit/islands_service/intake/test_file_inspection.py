@@ -95,6 +95,20 @@ def test_record_is_described(record):
     assert (found["samples"], found["dt"], found["time"]) == (200, 0.01, "t_s")
 
 
+@pytest.mark.parametrize("asked", [InspectionRequest(), InspectionRequest(("u",), "y")])
+def test_assumptions_about_the_time_are_warnings(tmp_path, asked):
+    """Days are read as days, and an output that is held for five rows has a clock of five rows."""
+    u = np.repeat(np.random.default_rng(1).normal(size=100), 7)
+    y = np.repeat(np.convolve(u, np.ones(9) / 9, "same")[::5], 5)
+    rows = (f"{45987.5 + k / 1440:.9f},{u[k]},{y[k]}" for k in range(700))
+    (tmp_path / "a.csv").write_text("\n".join(["Date,u,y", *rows]))
+    found = describe_file(tmp_path / "a.csv", asked)
+    assert found["dt"] == 60.0
+    days, clocks = found["warnings"]
+    assert "column Date is read as days: 45987.5 is 2025-11-26 12:00:00" in days
+    assert "y every 300 s (held between them)" in clocks
+
+
 @pytest.mark.parametrize("asked", [InspectionRequest(), InspectionRequest(("u_V",), "y_um", rows="0:100")])
 def test_a_file_is_parsed_once(record, monkeypatch, asked):
     parsed = list_parsed(monkeypatch)

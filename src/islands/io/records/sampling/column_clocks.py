@@ -73,8 +73,8 @@ def find_clocks(
 ) -> tuple[ColumnClock, ...]:
     """Return the clocks of all columns; empty if all have the clock of the rows.
 
-    Held values are a clock if an output has them and no input has the same period: an output that changes
-    whenever its input does may follow it at once. If all columns are held for the same period, all are held.
+    Held values are those of a sensor if an output has them. An input is held if it changes in the rows of
+    such an output, and is a command otherwise.
 
     Parameters
     ----------
@@ -144,19 +144,21 @@ def _without_gaps(own: ColumnClock) -> ColumnClock:
 
 def _choose_held(
     held: Sequence[ColumnClock | None], outputs: Sequence[int], is_uniform: bool
-) -> Sequence[int]:
-    """Return the columns whose held values are those of a sensor and not of a command."""
-    found = [each for each in held if each is not None]
-    if is_uniform and found and len(found) == len(held) and _are_equal(found):
-        return range(len(held))
-    # An input may change when the output does without being its cause if the rows are those of both clocks.
-    inputs = [each for place, each in enumerate(held) if place not in outputs and each is not None]
-    return [
-        place
-        for place in outputs
-        if (own := held[place]) is not None
-        and not any(_are_equal([own, each]) for each in (inputs if is_uniform else []))
-    ]
+) -> frozenset[int]:
+    """Return the columns whose held values are those of a sensor and not of a command.
+
+    An input that changes in the same rows as an output has its clock: both are samples of one logger, or the
+    output follows the input at once, and the rows between repeat both. In an outer join, an input may change
+    in the rows of the output by chance.
+    """
+    found = {place: own for place in outputs if (own := held[place]) is not None}
+    if not outputs and held and all(held) and _are_equal([own for own in held if own is not None]):
+        return frozenset(range(len(held)))
+    if is_uniform:
+        for place, each in enumerate(held):
+            if each is not None and any(_are_equal([own, each]) for own in found.values()):
+                found.setdefault(place, each)
+    return frozenset(found)
 
 
 def _are_equal(clocks: Sequence[ColumnClock]) -> bool:
