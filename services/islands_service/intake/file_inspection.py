@@ -154,6 +154,7 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
     from islands.io.records.reader import open_record  # noqa: PLC0415
     from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
     from islands.io.records.row_range import parse_rows  # noqa: PLC0415
+    from islands.io.records.sampling.common_clock import merge_notes  # noqa: PLC0415
     from islands.io.records.table_reading import read_table  # noqa: PLC0415
 
     options = ReadingOptions(**request.reading)
@@ -180,8 +181,7 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
         _check_usable({column.name: column.problem for column in found.columns}, request)
     measured, inspected = _measure(table, found, path, request, options)
     assumed = assumed or inspected
-    warnings = [each for each in found.warnings if not any(step.startswith(each) for step in assumed)]
-    found = replace(found, warnings=(*warnings, *assumed))
+    found = replace(found, warnings=merge_notes(found.warnings, assumed))
     if options.resample is not None:
         found = replace(found, dt=options.resample)
     return {**asdict(found), "inspection": measured, "reading": options.changes()}

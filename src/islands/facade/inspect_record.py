@@ -27,7 +27,7 @@ from islands.io.records.preview import ColumnPreview, Preview, preview_table
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, KEEP, ROWS, SAMPLE, ReadingOptions
 from islands.io.records.sampling.column_clocks import find_clocks, may_differ
-from islands.io.records.sampling.common_clock import ColumnUse, align_columns
+from islands.io.records.sampling.common_clock import ColumnUse, align_columns, merge_notes
 from islands.io.records.sampling.recording import Recording
 from islands.io.records.sampling.time_step import find_time_scale
 from islands.io.records.sampling.time_unit import TimeScale
@@ -192,9 +192,7 @@ class _FileInspection:
             is_aligned = repaired is not None and not is_repaired and repaired.samples != size
             if repaired is not None and is_aligned:
                 sampling = _describe_aligned(repaired, sampling)
-                steps = repaired.reading
-                warnings = [each for each in warnings if not any(step.startswith(each) for step in steps)]
-                warnings += steps
+                warnings = list(merge_notes(warnings, repaired.reading))
             if is_repaired or is_aligned:
                 record = repaired
             else:

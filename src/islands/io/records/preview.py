@@ -15,7 +15,6 @@ from islands.io.records.reading_options import DEFAULT_READING, ROWS, ReadingOpt
 from islands.io.records.sampling.column_clocks import ColumnClock, find_clocks, may_differ
 from islands.io.records.sampling.common_clock import common_step, describe_clocks
 from islands.io.records.sampling.time_step import find_sampling, find_time_scale
-from islands.io.records.sampling.time_unit import TimeScale
 from islands.io.records.table import Columns, RowRange, Table
 from islands.io.records.validation import (
     MIN_SAMPLES,
@@ -99,11 +98,11 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
     unmatched, unequal = _check_lengths(groups, columns, file)
     problems = unread | unmatched
     time, dt, sampling_problem = _preview_sampling(table, columns, problems, main, file, options)
-    names, clocks, row_times = _find_clocks(table, columns, groups, time, dt, options)
+    names, clocks, seconds = _find_clocks(table, columns, groups, time, dt, options)
     own = {name: each for name, each in zip(names, clocks, strict=True) if each.kind == "cells"}
-    if own and dt is None and (common := common_step(clocks)) is not None:
+    if own and dt is None and seconds is not None and (common := common_step(clocks)) is not None:
         # The rows are those of several clocks, and irregular for this reason.
-        dt, sampling_problem = float(f"{common * row_times.seconds:.12g}"), ""
+        dt, sampling_problem = float(f"{common * seconds:.12g}"), ""
     for name, column in columns.items():
         problems.setdefault(name, _find_problem(column, name, name == time, name in own))
     warnings = (
@@ -111,7 +110,7 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
         *unequal,
         _error_message(check_length, columns[main]) if main else "",
         sampling_problem,
-        describe_clocks(names, clocks, row_times.seconds) if own else "",
+        describe_clocks(names, clocks, seconds) if own else "",
         _describe_time_unit(table, columns, time, options),
         *table.remarks(tuple(columns)),
         *dict.fromkeys(note for column in columns.values() for note in column.notes),
@@ -227,28 +226,28 @@ def _find_clocks(
     time: str | None,
     dt: float | None,
     options: ReadingOptions,
-) -> tuple[Sequence[str], Sequence[ColumnClock], TimeScale]:
-    """Return the columns of the main recording, their clocks, and the times of the rows.
+) -> tuple[Sequence[str], Sequence[ColumnClock], float | None]:
+    """Return the columns of the main recording, their clocks, and the unit of their stamps in seconds.
 
-    There are no columns if all have the clock of the rows. Which values are held depends on the columns that
-    are chosen.
+    The unit is None if the stamps are numbers of rows. There are no columns if all have the clock of rows.
+    Which values are held depends on the columns that are chosen.
     """
     names = [name for name in (groups[0] if groups else ()) if name != time and name not in table.clocks]
-    none = (), (), TimeScale(np.empty(0), 1.0)
+    none = (), (), None
     if not names or options.rates == ROWS or (time is not None and time not in groups[0]):
         return none
     values = np.column_stack([columns[name].numbers[name] for name in names])
     if not may_differ(values, ()):
         return none
-    scale = TimeScale((dt or 1.0) * np.arange(len(values), dtype=np.float64), 1.0)
+    stamps, seconds = np.arange(len(values), dtype=np.float64), dt
     if time is not None:
-        structure = split_structures(table.names)[time]
         try:
-            scale = find_time_scale(table, columns[time], time, structure, options)
+            scale = find_time_scale(table, columns[time], time, split_structures(table.names)[time], options)
         except RecordError:
             return none
-    clocks = find_clocks(scale.stamps, values, ())
-    return (names, clocks, scale) if clocks else none
+        stamps, seconds = scale.stamps, scale.seconds
+    clocks = find_clocks(stamps, values, ())
+    return (names, clocks, seconds) if clocks else none
 
 
 def _find_problem(column: Columns, name: str, is_time: bool, has_clock: bool) -> str:

@@ -19,6 +19,9 @@ from islands.io.records.sampling.uniform_grid import AGREEMENT, GAP
 
 _HOW = {MEAN: "the mean from each to the next", SAMPLE: "the value at each"}
 
+#: Beginning of the statement about the clocks.
+_DIFFERENT = "columns have samples at different times"
+
 #: Deviation of a gap from a whole number of steps, in steps, up to which samples are missing in it.
 #: Also the part of equal samples by which two clocks may differ and be the same.
 _WHOLE = 0.25
@@ -272,18 +275,25 @@ def _find_rows(stamps: NDArray[np.float64], times: NDArray[np.float64]) -> NDArr
     return nearest
 
 
-def describe_clocks(names: Sequence[str], clocks: Sequence[ColumnClock], seconds: float) -> str:
-    """Return the clocks of columns as text; ``seconds`` is the unit of their stamps."""
+def merge_notes(warnings: Sequence[str], steps: Sequence[str]) -> tuple[str, ...]:
+    """Return the warnings of a file and how a record was read from it, without what both state."""
+    clocks = any(step.startswith(_DIFFERENT) for step in steps)
+    kept = [each for each in warnings if each not in steps and not (clocks and each.startswith(_DIFFERENT))]
+    return (*kept, *steps)
+
+
+def describe_clocks(names: Sequence[str], clocks: Sequence[ColumnClock], seconds: float | None) -> str:
+    """Return the clocks of columns as text; ``seconds`` is the unit of their stamps, None for rows."""
     listed = ", ".join(
         f"{name} {_describe_step(own, seconds)}" for name, own in zip(names, clocks, strict=True)
     )
-    return f"columns have samples at different times: {listed}"
+    return f"{_DIFFERENT}: {listed}"
 
 
-def _describe_step(own: ColumnClock, seconds: float) -> str:
+def _describe_step(own: ColumnClock, seconds: float | None) -> str:
     if own.kind == "rows" and len(own.rows) == np.ptp(own.rows) + 1:
         return "in every row"
-    text = f"every {own.step * seconds:.6g} s"
+    text = f"every {own.step:.6g} rows" if seconds is None else f"every {own.step * seconds:.6g} s"
     return text + (" (held between them)" if own.kind == "held" else "")
 
 

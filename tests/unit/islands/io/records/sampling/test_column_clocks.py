@@ -248,6 +248,18 @@ def test_the_preview_names_the_clocks(tmp_path):
     assert warning == "columns have samples at different times: u_V every 0.01 s, y_mm every 0.1 s"
 
 
+def test_the_preview_of_a_file_without_a_time_counts_rows(tmp_path):
+    join(sample(0.01), sample(0.1)).drop(columns="time_s").to_csv(tmp_path / "r.csv", index=False)
+    found = preview(tmp_path / "r.csv")
+    assert found.dt is None
+    assert "columns have samples at different times: u_V in every row, y_mm every 10 rows" in found.warnings
+    inspected = islands.inspect_record(tmp_path / "r.csv", dt=0.01)
+    assert (inspected.sampling.samples, inspected.sampling.dt) == (600, 0.1)
+    (note,) = [each for each in inspected.warnings if "different times" in each]
+    assert "y_mm every 0.1 s" in note
+    assert "--dt 0.01" in inspected.command
+
+
 # Columns with the clock of the rows
 
 
