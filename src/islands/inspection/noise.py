@@ -104,6 +104,6 @@ def estimate_noise(signal: NDArray[np.float64], record: Dataset, order: int = _O
 
 
 def measure_increments(signal: NDArray[np.float64], record: Dataset) -> float:
-    """Return the root mean square of the increments of a signal."""
+    """Return the root mean square of the increments of a signal; zero if no sample follows another."""
     increments = np.concatenate([np.diff(signal[first:last]) for first, last in record.bounds])
-    return float(np.sqrt(np.mean(increments**2)))
+    return float(np.sqrt(np.mean(increments**2))) if increments.size else 0.0

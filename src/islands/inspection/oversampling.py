@@ -49,6 +49,8 @@ def recommend_rate(record: Dataset) -> Fact:
             f"The record is oversampled: means of {count} samples ({dt:.4g} s) keep the bandwidth of all "
             f"signals {noisy}."
         )
+    elif max(record.segments) < 2:
+        text = f"No sample of {record.output_name} follows another: the record does not show a rate."
     elif spread > 0.0 and measure_increments(record.y, record) > _FAR * spread:
         text = f"{record.output_name} changes much between two samples: a higher sampling rate shows more."
     else:

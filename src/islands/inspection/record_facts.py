@@ -85,7 +85,7 @@ def measure_facts(record: Dataset) -> RecordFacts:
 
 
 def _count_samples(record: Dataset, complete: Dataset, part: Dataset, first: int) -> Fact:
-    seconds = complete.samples * complete.dt
+    seconds = record.samples * record.dt
     text = f"{record.samples} samples of {record.dt:.4g} s: {seconds:.4g} s."
     if complete is not record:
         text += f" {record.output_name} is missing in {record.samples - complete.samples} of them."

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 
 from islands.inspection.oversampling import recommend_rate
@@ -29,3 +31,9 @@ def test_short_record_keeps_its_samples():
 def test_samples_that_are_far_apart_are_reported():
     u = white(2000, 0)
     assert "higher sampling rate" in recommend_rate(measure(u, u)).sentence
+
+
+def test_a_record_of_single_samples_shows_no_rate():
+    record = measure(white(100, 0), white(100, 1))
+    single = replace(record, segments=(1,) * 100, recordings=("",) * 100)
+    assert "the record does not show a rate" in recommend_rate(single).sentence

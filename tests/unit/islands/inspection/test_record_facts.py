@@ -49,7 +49,8 @@ def test_missing_outputs_are_counted():
     u = slow(2000, 0)
     y = lag(u, 5.0)
     y[100:150] = np.nan
-    assert "missing in 50" in measure_facts(Dataset(u, y, 1.0)).find("samples").sentence
+    sentence = measure_facts(Dataset(u, y, 1.0)).find("samples").sentence
+    assert sentence == f"{len(y)} samples of 1 s: {len(y)} s. y is missing in 50 of them."
 
 
 @pytest.mark.parametrize("samples", [1, 2, 5, 30])
