@@ -88,6 +88,19 @@ def test_two_arrays_and_a_sampling_time_are_a_record(u, y, names):
     assert np.array_equal(made.y, RECORD.y)
 
 
+@pytest.mark.parametrize(
+    ("unit", "step"), [("h", 3600.0), ("hours", 3600.0), ("days since 2025-01-01", 86_400.0), ("", 1.0)]
+)
+def test_a_coordinate_of_an_xarray_data_set_is_in_its_unit(unit, step):
+    """Conventions for climate data state an origin."""
+    data = xr.Dataset(
+        {name: ("time", values) for name, values in COLUMNS.items()},
+        coords={"time": ("time", 12.5 + np.arange(len(TIME)), {"units": unit})},
+    )
+    record = islands.as_record(data, **CHOICE)
+    assert (record.dt, record.reading) == (pytest.approx(step), ())
+
+
 def test_units_of_an_xarray_data_set_are_those_of_the_record():
     data = SAME["xarray"].assign(y=("t", RECORD.y, {"units": "um"}))
     made = islands.as_record(data, **CHOICE)

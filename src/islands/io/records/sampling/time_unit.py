@@ -181,7 +181,8 @@ def _read_days(
 ) -> TimeScale:
     """Read numbers that may be dates in days or seconds as the likelier of both."""
     step, is_date = _usual_step(known), not _DATE_WORDS.isdisjoint(re.split(r"[\W_]+", name.lower()))
-    in_seconds, in_days = _is_decimal_step(step), _is_clock_step(step * _DAY)
+    in_seconds = _is_decimal_step(step) or _is_clock_step(step)
+    in_days = _is_clock_step(step * _DAY)
     if not (in_seconds or in_days):
         in_days = _counts_time(known * _DAY, _DAY * _measure_rounding(known)) and not _counts_time(known)
     number = f"{known[0]:.15g} is {count.date(float(known[0]))} ({count.name})"

@@ -82,10 +82,13 @@ def test_a_gap_in_days_is_a_gap(tmp_path):
 
 @pytest.mark.parametrize(
     ("first", "step", "digits"),
-    [(45987.5, 0.01, 2), (32900.0, 1.0, 0), (45000.0, 0.5, 1), (727_000.0, 0.001, 3)],
+    [(45987.5, 0.01, 2), (32900.0, 1.0, 0), (45000.0, 0.5, 1), (727_000.0, 0.001, 3), (36000.0, 60.0, 0)],
 )
 def test_seconds_of_the_size_of_days_remain_seconds(tmp_path, first, step, digits):
-    assert read(tmp_path, "time", first + step * K, digits).dt == pytest.approx(step)
+    record = read(tmp_path, "time", first + step * K, digits)
+    assert record.dt == pytest.approx(step)
+    # Half a day and a day are usual steps as well.
+    assert any("also possible as days" in note for note in record.reading) == (step in (0.5, 1.0))
 
 
 @pytest.mark.parametrize(
