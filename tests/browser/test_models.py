@@ -133,7 +133,7 @@ def test_the_equation_is_mathml_that_matches_the_model(
     for term in model["terms"]:
         assert f"{abs(term['parameter']):.6g}" in text
     terms = page.locator(".pair table").first.locator("tbody tr")
-    assert terms.locator("th").all_text_contents() == [term["regressor"] for term in model["terms"]]
+    assert terms.locator("th").all_text_contents() == [term["term"] for term in model["terms"]]
     exact = terms.locator("data").evaluate_all("all => all.map((one) => Number(one.value))")
     assert exact[::3] == [term["parameter"] for term in model["terms"]]
 

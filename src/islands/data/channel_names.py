@@ -139,8 +139,17 @@ def is_unit(text: str) -> bool:
 
 
 def normalise_unit(text: str) -> str:
-    """Return a unit in one spelling: ``um`` for ``µm``, ``kohm`` for ``kΩ`` and ``kOhm``."""
-    return text.translate(_SPELLINGS).replace("Ohm", "ohm")
+    """Return a unit in one spelling: ``um`` for ``µm``, ``kohm`` for ``kOhm``, ``C`` for ``°C``."""
+    spelled = text.translate(_SPELLINGS).replace("Ohm", "ohm")
+    return re.sub("(?:°|deg)(?=[CF])", "", spelled)
+
+
+def describe_contradiction(name: str, unit: str) -> str:
+    """State that the unit of a column is not that of its name; empty if they agree or one is unknown."""
+    named = parse_channel_name(name).unit
+    if not (named and unit and is_unit(unit)) or normalise_unit(named) == normalise_unit(unit):
+        return ""
+    return f"{name} is named in {named}, but its unit is {unit}: rename the column or convert it"
 
 
 def spell_unit(text: str) -> str:

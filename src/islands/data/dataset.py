@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.channel_names import describe_contradiction
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import RecordError, SettingsError, check_seconds
 
@@ -86,6 +87,9 @@ class Dataset:
         units = ("",) * inputs if tuple(self.input_units) == ("",) else tuple(self.input_units)
         if len(units) != inputs:
             raise RecordError(f"{inputs} inputs need {inputs} units, got {units}")
+        for name, unit in zip((*names, self.output_name), (*units, self.output_unit), strict=True):
+            if contradiction := describe_contradiction(name, unit):
+                raise RecordError(contradiction)
         segments = tuple(int(length) for length in self.segments) or (len(y),)
         check_seconds(self.dt, "the sampling time dt", RecordError)
         _check_segments(segments, len(y), self.held_out)
@@ -255,7 +259,7 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
             )
         if not same_dt(first.dt, other.dt):
             raise RecordError(
-                f"recordings were sampled at {first.dt} s and {other.dt} s: resample one of them"
+                f"recordings were sampled at {first.dt:.10g} s and {other.dt:.10g} s: resample one of them"
             )
     return replace(
         first,

@@ -17,6 +17,7 @@ from islands.io.certificates import certificates_document
 from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
+from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
 from islands.models.signal_statement import describe_signals
 from islands.parallel import map_over_record
@@ -104,10 +105,6 @@ def _model_document(
     rank: int, assessment: Assessment, recommended: bool, ensemble: Ensemble | None
 ) -> dict[str, Any]:
     model, written = assessment.model, assessment.model.equation()
-    terms = [
-        {**term, "inclusion": None if ensemble is None else ensemble.inclusion(name)}
-        for term, name in zip(terms_document(model), model.parameter_names, strict=True)
-    ]
     return {
         **({} if isinstance(model, Model) else {"kind": model.kind}),
         "rank": rank,
@@ -116,7 +113,7 @@ def _model_document(
         "equation": written.line,
         "latex": written.latex,
         "signals": describe_signals(model),
-        "terms": terms,
+        "terms": terms_in_result(model, ensemble),
         "bands": bands_document(assessment.bands),
         "metrics": {
             part: {mode: asdict(value) for mode, value in assessment.metrics[part].items()} for part in PARTS
@@ -135,6 +132,15 @@ def _model_document(
         "residual_tests": residual_tests_document(assessment.residual_tests)
         | residual_structure_document(assessment.residual_structure),
     }
+
+
+def terms_in_result(model: AnyModel, ensemble: Ensemble | None) -> list[dict[str, Any]]:
+    """Return the terms of a model as JSON values, with their text for readers and their inclusion."""
+    texts = zip(terms_document(model), model.equation().terms, model.parameter_names, strict=True)
+    return [
+        {**term, "term": text, "inclusion": None if ensemble is None else ensemble.inclusion(name)}
+        for term, text, name in texts
+    ]
 
 
 def physics_document(physics: PhysicsChecks) -> dict[str, Any]:

@@ -255,7 +255,7 @@ class Block:
             ("states", listed[self.outputs : self.computed]),
         )
         stated = [f"{kind} {', '.join(signals)}" for kind, signals in kinds if signals]
-        dt = "any" if self.dt is None else f"{self.dt!r} s"
+        dt = "any" if self.dt is None else f"{self.dt:.10g} s"
         return f"{'; '.join(filter(None, [*stated, f'sampling time {dt}', self.values]))}."
 
     def heading(self, mark: str) -> str:

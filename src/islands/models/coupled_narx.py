@@ -17,6 +17,7 @@ from islands.models.equations import (
     mathml_equation,
     mathml_statement,
     named_equation,
+    named_term,
     signal_names,
 )
 from islands.models.narx import Model, measured_model
@@ -196,7 +197,11 @@ class CoupledModel:
             line="\n".join(map(self._equation, range(len(self.models)))),
             plain=coupled_text(self),
             named=coupled_equation(self),
-            terms=self.parameter_names,
+            terms=tuple(
+                f"{signal_names(model)[0]}: {named_term(model, place)}"
+                for model in self.models
+                for place in range(model.size)
+            ),
             latex=coupled_latex(self),
             mathml=coupled_mathml(self),
         )

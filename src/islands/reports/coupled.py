@@ -66,7 +66,7 @@ def _format_errors(number: int, output: Mapping[str, Any]) -> list[str]:
 
 def _format_term(term: Mapping[str, Any]) -> list[str]:
     return [
-        term["regressor"],
+        term["term"],
         _format_number(term["parameter"], ".6g"),
         _format_number(term["standard_error"], ".2g"),
         _format_number(term["inclusion"], ".2f"),

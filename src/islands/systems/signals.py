@@ -242,7 +242,7 @@ def _count_samples(dt: float, duration: float) -> int:
         raise SettingsError(f"the sampling time must be a positive number of seconds, got {dt}")
     samples = round(duration / dt) if np.isfinite(duration) else 0
     if samples < 1:
-        raise SettingsError(f"a signal must have at least one sample of {dt} s, got {duration} s")
+        raise SettingsError(f"a signal must have at least one sample of {dt:.10g} s, got {duration:.10g} s")
     return samples
 
 

@@ -101,10 +101,10 @@ function makeModelTable(job, models) {
 export function makeTermTable(model) {
   return makeTable(
     "Terms of the model",
-    ["Regressor", ["Parameter", "figure"], ["Standard error", "figure"], ["Inclusion", "figure"]],
+    ["Term", ["Parameter", "figure"], ["Standard error", "figure"], ["Inclusion", "figure"]],
     model.terms.map((term) => [
-      // Lines break between factors only.
-      el("code", {}, term.regressor.split(/(?<=\*)/).map((factor) => el("span", {}, factor))),
+      // Lines break between factors only. Results of earlier versions have no texts with the names of columns.
+      el("code", {}, (term.term ?? term.regressor).split(/(?<=\*)/).map((factor) => el("span", {}, factor))),
       makeExactValue(term.parameter, (value) => formatNumber(value, 6)),
       makeExactValue(term.standard_error, formatNumber),
       makeExactValue(term.inclusion ?? null, formatNumber),

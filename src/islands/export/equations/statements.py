@@ -152,11 +152,11 @@ class EquationCode:
         lines += [f"    output = {render(substitute(system.output, symbols))}", ""]
         lines += [f"Effect {each}." for each in given.effects]
         if core is not None:
-            lines.append(f"Sampling time {given.dt!r} s.")
+            lines.append(f"Sampling time {given.dt:.10g} s.")
             return _wrap(lines)
         count = given.steps * given.times
         lines += [
-            f"Sampling time {given.dt!r} s; input between samples: {given.hold}.",
+            f"Sampling time {given.dt:.10g} s; input between samples: {given.hold}.",
             f"Classical Runge-Kutta method, {count} {'steps' if count > 1 else 'step'} per sample.",
         ]
         if system.shooting:

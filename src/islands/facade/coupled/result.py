@@ -24,8 +24,8 @@ from islands.io.ensembles import (
     ensemble_document,
     ensemble_from_document,
 )
-from islands.io.models import model_json, terms_document
-from islands.io.result_folder import finite, record_document
+from islands.io.models import model_json
+from islands.io.result_folder import finite, record_document, terms_in_result
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.models.coupled_narx import CoupledModel, coupled_equation, coupled_signals
 from islands.progress import Steps
@@ -304,10 +304,7 @@ class CoupledResult(FittedCoupledModel):
             "equation": self.equation,
             "latex": written.latex,
             "signals": coupled_signals(self.model),
-            "terms": [
-                {**term, "inclusion": None if ensemble is None else ensemble.inclusion(term["regressor"])}
-                for term in terms_document(self.model)
-            ],
+            "terms": terms_in_result(self.model, ensemble),
             "metrics": {
                 part: {
                     mode: _average([parts[part][mode] for parts in metrics.values()])

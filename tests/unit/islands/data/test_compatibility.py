@@ -81,9 +81,8 @@ def test_inputs_that_do_not_match_are_refused(expected, given, message):
 
 def test_stated_units_precede_those_of_the_names():
     volts = record("u", input_units=("V",), output_unit="um")
-    for changes in ({"input_units": ("counts",)}, {"output_unit": "nm"}):
-        with pytest.raises(RecordError, match=r"has (u|y_um) in"):
-            match_record(volts, record("u", **({"input_units": ("V",), "output_unit": "um"} | changes)))
+    with pytest.raises(RecordError, match="has u in"):
+        match_record(volts, record("u", input_units=("counts",), output_unit="um"))
     assert match_record(volts, record("u")).input_names == ("u",)
     # The last part of a name need not be a unit.
     assert match_record(record("u_est", output="y_est"), record("u_val", output="y_val")).inputs == 1

@@ -27,8 +27,11 @@ def test_the_record_of_an_output_has_the_others_as_inputs() -> None:
     [
         ((ONE,), "at least two outputs"),
         ((ONE, ONE), "a_m is given twice"),
-        ((ONE, replace(TWO, output_name="u_V")), "u_V is an input and an output"),
-        ((replace(ONE, input_names=("b_K+1",)), replace(TWO, input_names=("b_K+1",))), "input and an output"),
+        ((ONE, replace(TWO, output_name="u_V", output_unit="V")), "u_V is an input and an output"),
+        (
+            tuple(replace(each, input_names=("b_K+1",), input_units=("K",)) for each in (ONE, TWO)),
+            "input and an output",
+        ),
         ((ONE, replace(TWO, segments=(10, 30))), "differ in their inputs"),
         ((ONE, replace(TWO, u=2.0 * U)), "differ in their inputs"),
     ],

@@ -6,6 +6,7 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
+from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset, join
 from islands.errors import RecordError
 
@@ -219,3 +220,29 @@ def test_recordings_whose_sampling_times_differ_by_rounding_are_joined():
 def test_join_without_recordings_is_refused():
     with pytest.raises(RecordError, match="there is no recording to join"):
         join(())
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("y_um", "mm"), ("y (V)", "mV"), ("speed_rad_s", "rpm"), ("p/bar", "Pa")],
+)
+def test_a_unit_that_contradicts_the_name_is_refused(name, unit):
+    """It was accepted; the model took the unit of the name and refused its own record."""
+    expected = f"{name} is named in {parse_unit(name)}, but its unit is {unit}: rename the column"
+    assert expected in error_message(output_name=name, output_unit=unit)
+    assert expected in error_message(input_names=(name,), input_units=(unit,))
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("y_um", "\u00b5m"), ("T_C", "\u00b0C"), ("y_um", ""), ("y", "mm"), ("y_um", "counts"), ("y_est", "mm")],
+)
+def test_a_unit_that_agrees_with_the_name_is_kept(name, unit):
+    made = record(output_name=name, output_unit=unit)
+    assert (made.output_name, made.output_unit) == (name, unit)
+
+
+def test_sampling_times_are_stated_as_they_were_meant():
+    recordings = [record(dt=0.3 - 0.2), record(dt=0.2)]
+    with pytest.raises(RecordError, match=r"sampled at 0\.1 s and 0\.2 s"):
+        join(recordings)

@@ -70,7 +70,7 @@ def test_a_result_has_every_field_of_the_contract(findings):
             *("outcomes", "recordings", "warm_up", "information", "constraints", "physics", "residual_tests"),
         ]
         for term in model["terms"]:
-            assert list(term) == ["regressor", "parameter", "standard_error", "inclusion"]
+            assert list(term) == ["regressor", "parameter", "standard_error", "term", "inclusion"]
         for named, inner in (("metrics", {"mape", "r2", "rmse", "fit_percent"}), ("outcomes", None)):
             assert set(model[named]) == {"estimation", "validation"}
             for modes in model[named].values():
@@ -138,7 +138,7 @@ def test_models_are_in_rank_order_with_their_numbers(findings):
     for model, entry in zip(result["models"], findings.models, strict=True):
         assert model["size"] == entry.model.size == len(model["terms"])
         for term, expected in zip(model["terms"], terms_document(entry.model), strict=True):
-            assert term == {**expected, "inclusion": term["inclusion"]}
+            assert term == {**expected, "term": term["term"], "inclusion": term["inclusion"]}
         free_run = entry.metrics["validation"]["free_run"]
         assert model["metrics"]["validation"]["free_run"]["mape"] == free_run.mape
         assert model["physics"]["hold_drift_percent"] == entry.physics.hold_drift_percent

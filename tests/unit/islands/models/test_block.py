@@ -119,3 +119,9 @@ def test_an_unknown_format_names_the_others() -> None:
         export(PREY, "fortran")
     renamed = CoupledModel(tuple(replace(each) for each in PREY.models))
     assert all(export(renamed, kind) for kind in EXPORTS)
+
+
+def test_a_sampling_time_is_stated_without_its_rounding_error() -> None:
+    """It was 0.09999999999999999 s."""
+    made = CoupledModel(tuple(replace(each, dt=0.3 - 0.2) for each in TWO_MASSES.models))
+    assert "sampling time 0.1 s." in export(made, "c")

@@ -46,3 +46,9 @@ def test_channels_are_the_outputs_and_then_the_inputs() -> None:
 def test_equations_that_do_not_belong_together_are_refused(models, message) -> None:
     with pytest.raises(ModelError, match=message):
         CoupledModel(models)
+
+
+def test_terms_have_the_names_of_the_columns() -> None:
+    """The table of terms had the position of the equation and y, u1 and u2."""
+    assert TWO_MASSES.equation().terms[:4] == ("y1: y1(k-1)", "y1: y1(k-2)", "y1: u(k-1)", "y1: y2(k-1)")
+    assert len(TWO_MASSES.equation().terms) == TWO_MASSES.size
