@@ -151,6 +151,7 @@ def physics_document(physics: PhysicsChecks) -> dict[str, Any]:
         "hold_drift_percent": physics.hold_drift_percent,
         "holds": [asdict(entry) for entry in physics.holds],
         "excursions": [asdict(entry) for entry in physics.excursions],
+        "extremes": [asdict(entry) for entry in physics.extremes],
     }
 
 

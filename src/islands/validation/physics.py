@@ -33,6 +33,14 @@ CONSTANT_TOLERANCE = 1e-6
 #: Levels of the holds relative to the midpoint of the input, as fractions of its amplitude.
 LEVELS = (-0.8, -0.4, 0.0, 0.4, 0.8)
 
+#: Levels beyond those of the holds: the recorded extremes, and 1.2 of them. They have no influence on the
+#: recommended model.
+EXTREMES = (-1.2, -1.0, 1.0, 1.2)
+
+#: Largest distance of the output at an extreme from its recorded range, in ranges. The output of a slow
+#: system leaves the range of a short record without a fault.
+MOST_RANGES = 100.0
+
 #: Length of a hold in periods of the preceding loop.
 HOLD_PERIODS = 20
 
@@ -109,6 +117,31 @@ class ExcursionTest:
 
 
 @dataclass(frozen=True, slots=True)
+class ExtremeTest:
+    """The output at an input that is held at a recorded extreme or beyond it.
+
+    Attributes
+    ----------
+    level : float
+        Level of the input relative to its midpoint, as a fraction of its amplitude.
+    bounded : bool
+        Whether the output stayed within the bound.
+    ranges : float
+        Largest distance of the output from its recorded range, in ranges. Infinite after a divergence, or if
+        the recorded output is constant and the output changed.
+    """
+
+    level: float
+    bounded: bool
+    ranges: float
+
+    @property
+    def plausible(self) -> bool:
+        """Whether the output is bounded and at most 100 ranges from its recorded range."""
+        return self.bounded and self.ranges <= MOST_RANGES
+
+
+@dataclass(frozen=True, slots=True)
 class PhysicsChecks:
     """Results of the physics checks of a model.
 
@@ -120,12 +153,15 @@ class PhysicsChecks:
     holds : tuple of HoldTest
         Holds at five levels, each reached while loading and while unloading.
     excursions : tuple of ExcursionTest
+    extremes : tuple of ExtremeTest
+        Holds at the recorded extremes and at 1.2 of them.
     """
 
     clusters: tuple[ClusterSum, ...]
     convergent: bool
     holds: tuple[HoldTest, ...]
     excursions: tuple[ExcursionTest, ...]
+    extremes: tuple[ExtremeTest, ...] = ()
 
     @property
     def property_1(self) -> bool:
@@ -162,15 +198,17 @@ def check_physics(model: DynamicModel, record: Dataset) -> PhysicsChecks:
     record = match_record(model, record)
     plan = _plan_checks(record, model.maximum_lag)
     simulated = list(_simulate(model, record, plan.excitations))
-    holds, excursions = [], []
+    holds, excursions, extremes = [], [], []
     for (kind, signal), y in zip(plan.scenarios, simulated, strict=True):
         if isinstance(kind, tuple):
             at_rest = y[len(y) - HOLD_PERIODS * plan.period + model.maximum_lag :]
             holds.append(_evaluate_hold(kind, at_rest, record.output_range))
+        elif isinstance(kind, float):
+            extremes.append(_evaluate_extreme(kind, y, record))
         else:
             excursions.append(_evaluate_excursion(kind, signal, y, record.output_range))
     convergent = not isinstance(model, Model) or is_convergent(model)
-    return PhysicsChecks(cluster_sums(model), convergent, tuple(holds), tuple(excursions))
+    return PhysicsChecks(cluster_sums(model), convergent, tuple(holds), tuple(excursions), tuple(extremes))
 
 
 def cluster_sums(model: DynamicModel) -> tuple[ClusterSum, ...]:
@@ -218,8 +256,8 @@ def _choose_period(record: Dataset, maximum_lag: int) -> int:
     return int(np.clip(period, max(40, 4 * maximum_lag), _MAX_HOLD_SAMPLES // HOLD_PERIODS))
 
 
-#: Name of an excursion, or (level, loading) of a hold.
-_Kind = str | tuple[float, bool]
+#: Name of an excursion, (level, loading) of a hold, or level of an extreme.
+_Kind = str | tuple[float, bool] | float
 
 
 class _Plan(NamedTuple):
@@ -234,7 +272,7 @@ class _Plan(NamedTuple):
 @lru_cache(maxsize=8)
 def _plan_checks(record: Dataset, maximum_lag: int) -> _Plan:
     period = _choose_period(record, maximum_lag)
-    scenarios = [*_make_holds(period), *_make_excursions(period)]
+    scenarios = [*_make_holds(period), *_make_excursions(period), *_make_extremes(period)]
     signals = [signal for _, signal in scenarios]
     return _Plan(period, scenarios, _make_excitations(record, maximum_lag, signals))
 
@@ -264,6 +302,13 @@ def _make_excursions(period: int) -> list[tuple[_Kind, NDArray[np.float64]]]:
             (f"{kind} x {factor:g}", sine(1.0, EXCURSION_PERIODS * samples + 1, amplitude, 1.0 / samples))
         )
     return excursions
+
+
+def _make_extremes(period: int) -> list[tuple[_Kind, NDArray[np.float64]]]:
+    """Return a quarter of a sine from the midpoint to every extreme, and its hold."""
+    rise = np.sin(0.5 * np.pi * np.arange(1, period // 4 + 1) / (period // 4))
+    shape = np.concatenate([rise, np.ones(HOLD_PERIODS * period)])
+    return [(level, level * shape) for level in EXTREMES]
 
 
 def _make_excitations(record: Dataset, warm_up: int, signals: Sequence[NDArray[np.float64]]) -> Dataset:
@@ -304,6 +349,14 @@ def _evaluate_hold(kind: tuple[float, bool], y: NDArray[np.float64], output_rang
     drift = percent_of_range(y[-1] - y[0], output_range) if bounded else np.inf
     moves = np.ptp(y[len(y) // 2 :]) if bounded else np.inf
     return HoldTest(level, loading, bounded, bool(moves <= CONSTANT_TOLERANCE * output_range), drift)
+
+
+def _evaluate_extreme(level: float, y: NDArray[np.float64], record: Dataset) -> ExtremeTest:
+    if np.isnan(y).any():
+        return ExtremeTest(level, False, np.inf)
+    low, high = np.nanmin(record.y), np.nanmax(record.y)
+    distance = max(0.0, low - y.min(), y.max() - high)
+    return ExtremeTest(level, True, percent_of_range(distance, record.output_range) / 100)
 
 
 def _evaluate_excursion(

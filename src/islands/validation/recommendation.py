@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.validation.assessment import Assessment
-from islands.validation.physics import PhysicsChecks
+from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
 
 #: Standard errors by which a mean squared error may exceed the least, which is a minimum over many models.
 STANDARD_ERRORS = 3.0
@@ -88,7 +88,7 @@ def recommend(
         chosen + 1,
         (
             _describe_choice(chosen, best, len(equal), assessments, unit),
-            _describe_physics(bool(sound), hysteresis),
+            _describe_physics(bool(sound), hysteresis, assessments[chosen].physics),
         ),
     )
 
@@ -116,7 +116,10 @@ def recommend_fittest(
     size = f"{errors[chosen]:.4g} {unit}".rstrip()
     reason = f"least error of the search on the estimation data ({mode.replace('_', ' ')}), RMSE {size}"
     sound = is_sound(assessments[chosen].physics, hysteresis)
-    return Recommendation(chosen + 1, (reason, _describe_physics(True, hysteresis)) if sound else (reason,))
+    return Recommendation(
+        chosen + 1,
+        (reason, _describe_physics(True, hysteresis, assessments[chosen].physics)) if sound else (reason,),
+    )
 
 
 def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:
@@ -179,8 +182,22 @@ def _describe_choice(chosen: int, best: int, count: int, assessments: Sequence[A
     )
 
 
-def _describe_physics(sound: bool, hysteresis: bool) -> str:
-    checks = "bounded at held inputs and at other amplitudes and rates"
+def _describe_physics(sound: bool, hysteresis: bool, physics: PhysicsChecks) -> str:
+    """State the levels at which the model is bounded, or those of the checks that no model passes."""
+    beyond = [abs(each.level) for each in physics.extremes if not each.plausible]
+    held = max(
+        (abs(each.level) for each in physics.extremes if abs(each.level) < min(beyond, default=inf)),
+        default=0,
+    )
+    held = max(held, *map(abs, LEVELS)) if sound else max(map(abs, LEVELS))
+    factors = {
+        kind: " and ".join(f"{factor:g}" for named, factor in EXCURSIONS if named == kind)
+        for kind in ("amplitude", "rate")
+    }
+    checks = (
+        f"bounded at inputs held at up to {held:g} times their recorded amplitude about the midpoint, at "
+        f"{factors['amplitude']} times the amplitude and at {factors['rate']} times the rate"
+    )
     checks += ", and Property 1 holds" if hysteresis else ""
     return checks if sound else f"no model passes the physics checks ({checks})"
 

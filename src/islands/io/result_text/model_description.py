@@ -288,12 +288,28 @@ def _list_physical_failures(found: SearchResult, entry: Assessment) -> Iterator[
     held = sum(not hold.bounded for hold in physics.holds)
     if held:
         yield f"diverges in {held} of {len(physics.holds)} holds of the inputs"
+    for test in physics.extremes:
+        if not test.plausible:
+            inputs = _describe_level(found, entry, test.level)
+            effect = (
+                "diverges" if not test.bounded else f"leaves its recorded range by {test.ranges:.3g} ranges"
+            )
+            yield f"the output {effect} at {inputs} ({abs(test.level):g} of the recorded amplitude)"
     if found.requires_property_1 and not physics.property_1 and isfinite(physics.hold_drift_percent):
         yield f"the output drifts by {physics.hold_drift_percent:.3g} % of its range at constant input"
     opened = [test for test in physics.excursions if test.bounded and test.closure_percent > _OPEN_PERCENT]
     if found.claims_hysteresis and opened:
         worst = max(opened, key=lambda test: test.closure_percent)
         yield f"loops do not close at {worst.name}: {worst.closure_percent:.3g} % of the output range"
+
+
+def _describe_level(found: SearchResult, entry: Assessment, level: float) -> str:
+    """Return the values of the inputs at a level of the physics checks: ``u = -1 V, valve = 3``."""
+    record = found.split.estimation
+    low, high = record.u.min(axis=0), record.u.max(axis=0)
+    values = (low + high) / 2 + level * (high - low) / 2
+    parts = zip(signal_names(entry.model)[1:], values, record.input_units, strict=True)
+    return ", ".join(f"{name} = {value:.4g} {unit}".rstrip() for name, value, unit in parts)
 
 
 def _list_insignificant(entry: Assessment) -> list[str]:

@@ -98,7 +98,9 @@ def test_a_result_has_the_reason_that_ended_an_evolution(findings):
 def test_a_result_lists_physics_checks_and_residual_tests(findings):
     for model in loaded(findings)["models"]:
         physics, tests = model["physics"], model["residual_tests"]
-        assert set(physics) == {"property_1", "clusters", "hold_drift_percent", "holds", "excursions"}
+        assert set(physics) == {
+            *("property_1", "clusters", "hold_drift_percent", "holds", "excursions", "extremes")
+        }
         assert physics["property_1"] is True
         assert physics["clusters"] == [{"cluster": "y", "sum": pytest.approx(1.0), "target": 1.0}]
         assert len(physics["holds"]) == 10

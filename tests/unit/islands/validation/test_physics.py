@@ -312,3 +312,30 @@ def test_record_without_a_measured_output_is_refused():
     data = Dataset(record().u, np.full(record().samples, np.nan), 0.01)
     with pytest.raises(RecordError, match="the output is missing at sample 0, where a simulation starts"):
         check_physics(model(HYSTERESIS), data)
+
+
+def test_a_bilinear_model_that_escapes_beyond_the_recorded_levels_is_found():
+    """y(k) = (0.5 - 0.5 u) y(k-1) + u(k-1) has a pole of 1 at u = -1, and was "bounded at held inputs"."""
+    bilinear = model({"y(k-1)": 0.5, "y(k-1)*u(k-1)": -0.5, "u(k-1)": 1.0})
+    u = np.random.default_rng(0).uniform(-1.0, 1.0, 2000)
+    u[:2] = -1.0, 1.0
+    y = np.zeros(2000)
+    for k in range(1, 2000):
+        y[k] = (0.5 - 0.5 * u[k - 1]) * y[k - 1] + u[k - 1]
+    checked = check_physics(bilinear, Dataset(u, y, 0.1))
+    assert all(hold.bounded for hold in checked.holds)
+    assert all(entry.bounded for entry in checked.excursions)
+    by_level = {entry.level: entry for entry in checked.extremes}
+    assert list(by_level) == [-1.2, -1.0, 1.0, 1.2]
+    assert by_level[-1.0].bounded
+    assert by_level[-1.0].ranges > 100.0
+    assert not by_level[-1.2].bounded
+    assert [entry.plausible for entry in checked.extremes] == [False, False, True, True]
+
+
+def test_the_output_at_an_extreme_is_compared_with_its_recorded_range():
+    """A static gain of 4 at 1.2 of the amplitude is a tenth of the range above it."""
+    checked = check_physics(
+        model({"u(k-1)": 4.0 / AMPLITUDE, "1": 3.0 - 4.0 * MIDPOINT / AMPLITUDE}), record()
+    )
+    assert [entry.ranges for entry in checked.extremes] == pytest.approx([0.1, 0.0, 0.0, 0.1], abs=1e-3)

@@ -175,4 +175,4 @@ def test_the_fittest_model_is_recommended_although_its_free_run_diverges():
     equal = [Candidate(9, NOISE, trained=0.4), Candidate(3, NOISE, trained=0.4)]
     found = recommend_fittest([entry.assessment() for entry in equal], "one_step_ahead", False)
     assert found.rank == 1
-    assert found.reasons[1].startswith("bounded at held inputs")
+    assert found.reasons[1].startswith("bounded at inputs held at up to 0.8 times")

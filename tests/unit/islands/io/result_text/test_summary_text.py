@@ -170,6 +170,21 @@ def test_the_verdict_is_that_of_the_free_run(findings):
     assert poor["As a simulation"].startswith("As a simulation: unsuitable")
 
 
+def test_an_output_that_escapes_at_an_extreme_is_a_failure_with_the_input(findings):
+    physics = findings.recommended.physics
+    assert "held at up to 1.2 times their recorded amplitude" in said(findings)["Good for"]
+    far, lost, *others = physics.extremes
+    changed = replace(physics, extremes=(replace(far, bounded=False), replace(lost, ranges=1940.0), *others))
+    found = said(findings, physics=changed)
+    record = findings.split.estimation
+    assert "held at up to 0.8 times their recorded amplitude" in found["Good for"]
+    assert (
+        f"the output leaves its recorded range by 1.94e+03 ranges at u_V = {record.u.min():.4g} V (1 of the "
+        "recorded amplitude)"
+    ) in found["Fails at"]
+    assert "the output diverges at u_V = " in found["Fails at"]
+
+
 def test_a_band_that_misses_the_validation_data_is_a_failure(findings):
     bands = findings.recommended.bands
     assert 0.75 <= bands.coverage <= 1.0
