@@ -1,6 +1,8 @@
 """Base classes of all deliberate errors. A message says what is wrong, where, and what to do."""
 
-from collections.abc import Iterable, Mapping
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 from math import isfinite, nan
 from numbers import Integral, Real
@@ -26,6 +28,52 @@ class ModelError(IslandsError):
 
 class SettingsError(IslandsError):
     """A setting is unknown, out of range, or contradicts another setting."""
+
+
+@contextmanager
+def command_line_names() -> Iterator[None]:
+    """Let messages name options as on the command line, in this process."""
+    _names.append(_name_flag)
+    try:
+        yield
+    finally:
+        _names.pop()
+
+
+def name_option(name: str, value: object = None) -> str:
+    """Return an option as the caller gives it: ``gaps="split"``, or ``--gaps split`` on the command line.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument of the library.
+    value : object
+        Its value; a text in capital letters is a placeholder. Without one, only the option is named.
+    """
+    return _names[-1](name, value)
+
+
+def _name_argument(name: str, value: object) -> str:
+    is_literal = isinstance(value, str) and not value.isupper()
+    return f"{name}=" + (f'"{value}"' if is_literal else _format(value))
+
+
+def _format(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _name_flag(name: str, value: object) -> str:
+    flag = f"--{name.replace('_', '-')}"
+    if value is False:
+        return f"--no-{flag[2:]}"
+    text = ",".join(map(str, value)) if isinstance(value, list | tuple) else _format(value)
+    return flag if value is None else f"{flag} {shlex.quote(text)}"
+
+
+#: Functions that name an option; the last one is used.
+_names: list[Callable[[str, object], str]] = [_name_argument]
 
 
 def suggest(name: str, known: Iterable[str]) -> str:

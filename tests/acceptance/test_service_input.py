@@ -236,7 +236,7 @@ DEFECTIVE = {
     ),
     "repeated time": (
         csv(t_s={50: "0.47"}),
-        ("a.csv, line 50, column t_s repeats the time stamp 0.47", "give --resample DT"),
+        ("a.csv, line 50, column t_s repeats the time stamp 0.47", "give resample=DT"),
     ),
     "too short": (csv(20), ("a.csv: 20 samples, from line 2 to line 21, are too few", "at least 30")),
 }

@@ -247,9 +247,7 @@ ODD_FILES = (
     OddFile("HDF5", "r.h5", write_hdf5),
     OddFile("TDMS", "r.tdms", write_tdms, columns=("u", "y")),
     # Files that are refused.
-    OddFile(
-        "numbers without header", "r.csv", text(NAMELESS), ("r.csv, line 1", "--no-header", "--names a,b,c")
-    ),
+    OddFile("numbers without header", "r.csv", text(NAMELESS), ("r.csv, line 1", "header=False", "names=[")),
     OddFile("empty", "r.csv", text(""), ("r.csv is empty",)),
     OddFile(
         "text in a cell",
@@ -258,31 +256,31 @@ ODD_FILES = (
         ("r.csv, line 14, column u_V: 'off'", "correct the cell"),
     ),
     OddFile(
-        "missing value", "r.csv", text(replaced(14, "")), ("r.csv, line 14, column u_V", "--gaps interpolate")
+        "missing value", "r.csv", text(replaced(14, "")), ("r.csv, line 14, column u_V", 'gaps="interpolate"')
     ),
     OddFile(
         "gap",
         "r.csv",
         text(without(table(), 20, 21)),
-        ("r.csv, line 20, column t_s", "a gap of 0.03", "--gaps split"),
+        ("r.csv, line 20, column t_s", "a gap of 0.03", 'gaps="split"'),
     ),
     OddFile(
         "repeated stamp",
         "r.csv",
         text(replaced(14, "0.11", 0)),
-        ("line 14, column t_s repeats", "--resample", "--dt"),
+        ("line 14, column t_s repeats", "resample=DT", "dt=DT"),
     ),
     OddFile(
         "uncertain dates",
         "r.csv",
         text(table("when,u_V,y_um", times=["03/04/2026"] * 30 + ["04/04/2026"] * 30)),
-        ("r.csv, line 2, column when", "--dates day-first"),
+        ("r.csv, line 2, column when", 'dates="day-first"'),
     ),
     OddFile(
         "uncertain thousands",
         "r.csv",
         text(table("t_s\tu_V\ty_um", "\t", [f"{k},001" for k in range(1, 61)], number="{:.0f}")),
-        ("line 2, column t_s (1,001)", "1001 or 1.001", "--decimal"),
+        ("line 2, column t_s (1,001)", "1001 or 1.001", "decimal="),
     ),
     OddFile(
         "several records", "r.zip", write_zip("a.csv", "b.csv"), ("r.zip contains 2 records, a.csv, b.csv",)

@@ -15,7 +15,7 @@ from islands.cli.console import errors, exit_with_closed_output
 from islands.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
 from islands.cli.stop_requests import exit_code, ignore_signals, raise_on_signals
 from islands.distribution import describe_missing_extra, read_version
-from islands.errors import IslandsError, SettingsError, suggest
+from islands.errors import IslandsError, SettingsError, command_line_names, suggest
 from islands.processes.settings import limit_threads
 
 
@@ -86,7 +86,8 @@ class Commands(TyperGroup):
         """Run the command. Report an error in one line; exit with code 2, or 130 or 143 after a signal."""
         try:
             try:
-                return super().invoke(ctx)
+                with command_line_names():
+                    return super().invoke(ctx)
             except ModuleNotFoundError as error:
                 raise explain_missing_package(error, str(ctx.invoked_subcommand)) from error
         except BrokenPipeError:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
-from islands.errors import RecordError, SettingsError
+from islands.errors import RecordError, SettingsError, check_seconds, name_option
 from islands.inspection.channel import channels
 from islands.inspection.column_roles import ColumnChoice, choose_columns
 from islands.inspection.findings import (
@@ -84,7 +84,7 @@ def inspect_record(
     RecordError
         The file cannot be read, or a column does not exist. The messages are those of `read_record`.
     SettingsError
-        The record is neither a file nor a Dataset.
+        The record is neither a file nor a Dataset, or the sampling time is not a positive number.
     """
     if isinstance(record, Dataset):
         return _inspect_dataset(record if rows is None else record[rows])
@@ -93,6 +93,8 @@ def inspect_record(
             f"inspect_record takes a file or a Dataset, got a {type(record).__name__}: make a Dataset by "
             "as_record(data, inputs=..., output=...)"
         )
+    if dt is not None:
+        check_seconds(dt, name_option("dt").removesuffix("="))
     # The file is parsed once: parsing takes most of the time.
     table = open_record(record, reading)
     found = preview_table(table, Path(record).name, reading)
@@ -405,5 +407,5 @@ def _find_sampling_problem(found: Preview, dt: float | None) -> str:
     """Return the warning of a preview about its sampling."""
     if found.dt is not None or (dt is not None and found.time is None):
         return ""
-    words = ("time", "--dt", "grid", "gap")
+    words = ("time", name_option("dt"), "grid", "gap")
     return next((text for text in found.warnings if any(word in text for word in words)), "")

@@ -1,16 +1,19 @@
 """Names from finite sets: an unknown name suggests the known names that are similar."""
 
+import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import islands
 from islands.data.dataset import Dataset
 from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.diagnosis.monitoring.alarm_rate import parse_alarm_rate
-from islands.errors import IslandsError, suggest
+from islands.errors import IslandsError, command_line_names, name_option, suggest
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.presets import resolve_settings
 from islands.export import export
@@ -20,6 +23,7 @@ from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec, parse_spec
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import get_published_model
+from islands_api.cli.app import app
 
 
 def test_similar_names_are_suggested_in_the_order_of_their_similarity() -> None:
@@ -79,3 +83,42 @@ def test_an_unknown_name_suggests_the_one_that_is_meant(kind: str) -> None:
     use, meant = UNKNOWN[kind]
     with pytest.raises(IslandsError, match=rf"\. Did you mean '{meant}'"):
         use()
+
+
+#: Options with a value, as an argument of the library and on the command line.
+OPTIONS = [
+    ("gaps", "split", 'gaps="split"', "--gaps split"),
+    ("gaps", None, "gaps=", "--gaps"),
+    ("header", False, "header=False", "--no-header"),
+    ("names", ["a", "b"], "names=['a', 'b']", "--names a,b"),
+    ("resample", 0.0123456789, "resample=0.0123457", "--resample 0.0123457"),
+    ("dt", "DT", "dt=DT", "--dt DT"),
+    ("missing", "Sensor 3", 'missing="Sensor 3"', "--missing 'Sensor 3'"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "argument", "flag"), OPTIONS)
+def test_an_option_is_named_as_the_caller_gives_it(
+    name: str, value: object, argument: str, flag: str
+) -> None:
+    assert name_option(name, value) == argument
+    with command_line_names():
+        assert name_option(name, value) == flag
+    assert name_option(name, value) == argument
+
+
+def test_a_message_names_an_option_as_its_caller_gives_it(
+    tmp_path: Path,
+) -> None:
+    rows = [f"{k % 7},{k % 5}" for k in range(60)]
+    (tmp_path / "r.csv").write_text("\n".join(["u,y", *rows]))
+    with pytest.raises(islands.RecordError, match=r"sampling time by dt=, or name the column by time=$"):
+        islands.read_record(tmp_path / "r.csv", ["u"], "y")
+    command = ["fit", str(tmp_path / "r.csv"), "--input", "u", "--output", "y", "--out", str(tmp_path / "o")]
+    done = CliRunner().invoke(app, command)
+    assert "sampling time by --dt, or name the column by --time" in " ".join(done.stderr.split())
+
+
+def test_no_message_of_a_reader_leads_with_a_flag() -> None:
+    sources = (Path(islands.__file__).parent / "io").rglob("*.py")
+    assert not [path.name for path in sources if re.search(r"--[a-z]{2,}", path.read_text())]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 from zoneinfo import ZoneInfo
 
-from islands.errors import SettingsError, check_seconds, suggest
+from islands.errors import SettingsError, check_seconds, name_option, suggest
 from islands.io.records.column_names import TIME_UNITS
 
 #: Characters of the decimal marks by the values of ``decimal``.
@@ -100,11 +100,13 @@ class ReadingOptions:
     def __post_init__(self) -> None:
         names = split_words(self.names)
         if not all(names) or len(set(names)) < len(names):
-            raise SettingsError(f"--names {','.join(names)}: give every column another name")
+            raise SettingsError(f"{name_option('names', list(names))}: give every column another name")
         object.__setattr__(self, "names", names)
         words = split_words(self.missing)
         if not all(words):
-            raise SettingsError("--missing: a word is empty; empty cells are missing values without it")
+            raise SettingsError(
+                f"{_name('missing')}: a word is empty; empty cells are missing values without it"
+            )
         object.__setattr__(self, "missing", words)
         _check_choice("time-unit", self.time_unit, TIME_UNIT_CHOICES)
         _check_choice("decimal", self.decimal, DECIMAL_MARKS)
@@ -113,7 +115,7 @@ class ReadingOptions:
         _check_choice("outliers", self.outliers, (EXCLUDE, KEEP))
         _check_choice("rates", self.rates, RATES)
         if self.resample is not None:
-            check_seconds(self.resample, "resample")
+            check_seconds(self.resample, _name("resample"))
         _check_timezone(self.timezone)
 
     @staticmethod
@@ -140,11 +142,11 @@ class ReadingOptions:
             An option does not apply.
         """
         given = {
-            "--names": self.names,
-            "--no-header": not self.header,
-            "--decimal": self.decimal,
-            "--dates": self.dates,
-            "--sheet": None if sheets else self.sheet,
+            _name("names"): self.names,
+            name_option("header", False): not self.header,
+            _name("decimal"): self.decimal,
+            _name("dates"): self.dates,
+            _name("sheet"): None if sheets else self.sheet,
         }
         for option, value in given.items():
             if value:
@@ -166,9 +168,16 @@ def split_words(words: Sequence[str]) -> tuple[str, ...]:
     return tuple(str(word).strip() for word in listed)
 
 
+def _name(option: str) -> str:
+    """Return the name of an option as the subject of a sentence."""
+    return name_option(option).removesuffix("=")
+
+
 def _check_choice(option: str, value: str | None, choices: Sequence[str] | Mapping[str, str]) -> None:
     if value is not None and value not in choices:
-        raise SettingsError(f"--{option} is {' or '.join(choices)}, got {value!r}{suggest(value, choices)}")
+        raise SettingsError(
+            f"{_name(option)} is {' or '.join(choices)}, got {value!r}{suggest(value, choices)}"
+        )
 
 
 def _check_timezone(name: str | None) -> None:
@@ -177,7 +186,8 @@ def _check_timezone(name: str | None) -> None:
             ZoneInfo(name)
     except (OSError, ValueError, LookupError) as error:
         raise SettingsError(
-            f"--timezone {name} is not a time zone of this machine: give a name such as Europe/Berlin or UTC"
+            f"{name_option('timezone', name)} is not a time zone of this machine: give a name such "
+            "as Europe/Berlin or UTC"
         ) from error
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from islands.distribution import describe_missing_extra
-from islands.errors import RecordError, suggest
+from islands.errors import RecordError, name_option, suggest
 from islands.io.records.formats.text.table import DelimitedText, split_table
 from islands.io.records.formats.text.table_start import has_samples
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
@@ -82,13 +82,13 @@ def read_workbook(path: Path, options: ReadingOptions = DEFAULT_READING) -> Deli
     if not lines:
         raise RecordError(
             f"{file} has no sheet with a table of numbers; its sheets are {', '.join(names)}: name "
-            "the sheet by --sheet (library: sheet=)"
+            f"the sheet by {name_option('sheet')}"
         )
     others = [other for other in names if other != name]
     table = split_table(lines, f"{file}, sheet {name}", "row", options)
     if not others:
         return table
-    listed = f"the sheet {name} of {file} is read; other sheets (--sheet): {', '.join(others)}"
+    listed = f"the sheet {name} of {file} is read; other sheets ({name_option('sheet')}): {', '.join(others)}"
     return replace(table, notes=(listed, *table.notes), others=listed)
 
 

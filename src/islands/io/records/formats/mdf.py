@@ -66,7 +66,7 @@ def _open(path: Path) -> Any:
     from asammdf import MDF  # noqa: PLC0415
     from asammdf.blocks.mdf_v3 import MDF3  # noqa: PLC0415
     from asammdf.blocks.mdf_v4 import MDF4  # noqa: PLC0415
-    from asammdf.blocks.utils import logger  # noqa: PLC0415
+    from asammdf.mdf import logger  # noqa: PLC0415
 
     # The destructor of a reader that has not opened its file raises, and Python prints the traceback.
     MDF3.__del__ = MDF4.__del__ = _close  # type: ignore[method-assign]

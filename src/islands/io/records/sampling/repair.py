@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError
+from islands.errors import RecordError, name_option
 from islands.io.records.sampling.missing_values import drop_repeated, repair_missing
 from islands.io.records.sampling.recording import Recording, UniformRecording, count_text
 from islands.io.records.sampling.resampling import resample
@@ -86,7 +86,7 @@ def join_recordings(parts: Sequence[UniformRecording], file: str) -> UniformReco
         if abs(part.dt - first.dt) > AGREEMENT * first.dt:
             raise RecordError(
                 f"{file}: the sampling time of recording 1 is {first.dt:.6g} s, that of recording {number} "
-                f"{part.dt:.6g} s: give --resample {max(part.dt, first.dt):.6g} (library: resample=)"
+                f"{part.dt:.6g} s: give {name_option('resample', max(part.dt, first.dt))}"
             )
     segments = (length for part in parts for length in part.segments or (len(part.values),))
     steps = (f"recording {number}: {step}" for number, part in enumerate(parts, 1) for step in part.steps)
@@ -105,7 +105,7 @@ def _usual_step(recording: Recording) -> float:
     if not len(steps):
         raise RecordError(
             f"{recording.rows.file}: column {recording.time} never increases: name another time "
-            "column by --time"
+            f"column by {name_option('time')}"
         )
     return float(np.median(steps))
 
@@ -120,8 +120,8 @@ def _find_gaps(stamps: NDArray[np.float64], usual: float, new: float | None) -> 
 def _gap_error(recording: Recording, found: NDArray[np.bool_]) -> RecordError:
     described = describe_gaps(recording.stamps, recording.rows, found)
     return RecordError(
-        f"{recording.rows.file}, column {recording.time}: {described}: give --gaps split for segments "
-        "or --gaps interpolate to fill them (library: gaps=)"
+        f"{recording.rows.file}, column {recording.time}: {described}: give {name_option('gaps', 'split')} "
+        f"for segments or {name_option('gaps', 'interpolate')} to fill them"
     )
 
 
@@ -164,7 +164,8 @@ def _common_step(parts: list[Recording]) -> float:
             raise RecordError(
                 f"{part.rows.file}, {part.rows.row(0)} to {part.rows.row(-1)}: the step of this part "
                 "differs from "
-                f"the usual step {step:.6g}: give --resample {step * part.seconds:.6g} (library: resample=)"
+                f"the usual step {step:.6g}: give "
+                f"{name_option('resample', step * part.seconds)}"
             )
     return step
 
@@ -189,7 +190,7 @@ def _fill(
         raise RecordError(
             f"{recording.rows.place(sample, recording.time)} is off the uniform grid of the other "
             "rows, whose step is "
-            f"{slope:.6g}: give --resample {slope * recording.seconds:.6g} as well (library: resample=)"
+            f"{slope:.6g}: give {name_option('resample', slope * recording.seconds)} as well"
         )
     samples = count_text(int(places[-1]) + 1 - len(stamps), "sample")
     steps.append(f"interpolated: {samples} in {describe_gaps(stamps, recording.rows, found)}")
@@ -212,5 +213,5 @@ def _check_count(samples: int, recording: Recording) -> None:
     if samples > MOST_SAMPLES:
         raise RecordError(
             f"{recording.rows.file}: a uniform grid would have {samples} samples, and {MOST_SAMPLES} "
-            "is the most: take a longer sampling time, or --gaps split"
+            f"is the most: take a longer sampling time, or {name_option('gaps', 'split')}"
         )

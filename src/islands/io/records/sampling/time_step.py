@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError, check_seconds
+from islands.errors import RecordError, check_seconds, name_option
 from islands.io.records.column_names import TIME_UNITS, looks_like_time, seconds_per_unit
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.sampling.recording import Recording
@@ -68,7 +68,7 @@ def find_sampling(
         known[f"column {time}"] = step * seconds
         start = None if scale.elapsed else float(stamps[0]) * seconds
     if dt is not None:
-        known["--dt (library: dt=)"] = float(dt)
+        known[name_option("dt")] = float(dt)
     known |= {f"array {name}": seconds for name, seconds in table.stated(structure).items()}
     if not known:
         raise RecordError(_unknown_sampling_message(table, file, structure))
@@ -161,8 +161,8 @@ def find_time_scale(
 
 def _unknown_sampling_message(table: Table, file: str, structure: str) -> str:
     message = (
-        f"{file} has no time column (t, t_s, time_ms ...): give the sampling time by --dt (library: "
-        "dt=), or name the column by --time (library: time=)"
+        f"{file} has no time column (t, t_s, time_ms ...): give the sampling time by "
+        f"{name_option('dt')}, or name the column by {name_option('time')}"
     )
     fields = {name: name.removeprefix(structure) for name in table.names}
     unknown_unit = [

@@ -6,7 +6,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError
+from islands.errors import RecordError, name_option
 from islands.io.records.table import RowRange
 
 #: Tolerance relative to a step: deviation of time stamps from the grid, and difference of two sampling times.
@@ -123,15 +123,16 @@ def _raise_not_increasing(stamps: NDArray[np.float64], name: str, rows: RowRange
     if current == previous:
         problem = f"repeats the time stamp {previous:.10g}{others}"
         advice = (
-            "give --resample DT, which averages rows of equal time (library: resample=), or, if only "
-            "the printed time is too coarse, --dt DT (library: dt=)"
+            f"give {name_option('resample', 'DT')}, which averages rows of equal time, or, if only the "
+            f"printed time is too coarse, {name_option('dt', 'DT')}"
         )
     else:
         problem = f"jumps back to {current:.10g} from {previous:.10g}{others}"
-        advice = "if several recordings follow one another, give --gaps split for segments (library: gaps=)"
+        advice = f"if several recordings follow one another, give {name_option('gaps', 'split')} for segments"
         usual = float(np.median(steps))
         if abs(previous - current + usual - _SUMMER) <= max(usual, 1.0):
-            advice = "if it is the end of summer time, give --timezone, as Europe/Berlin (library: timezone=)"
+            zone = name_option("timezone", "Europe/Berlin")
+            advice = f"if it is the end of summer time, give the time zone, as {zone}"
     raise RecordError(f"{rows.place(sample, name)} {problem}: {advice}")
 
 
@@ -145,19 +146,19 @@ def _raise_not_uniform(
         sample = int(np.argmax(gaps)) + 1
         problem = "follows a gap: the time changes"
         advice = (
-            f"{describe_gaps(stamps, rows, gaps)}; give --gaps split for segments or --gaps "
-            "interpolate to fill them (library: gaps=)"
+            f"{describe_gaps(stamps, rows, gaps)}; give {name_option('gaps', 'split')} for "
+            f"segments or {name_option('gaps', 'interpolate')} to fill them"
         )
         if abs(steps[sample - 1] - usual - _SUMMER) <= max(usual, 1.0):
-            advice += "; if it is the beginning of summer time, give --timezone, for example Europe/Berlin"
+            zone = name_option("timezone", "Europe/Berlin")
+            advice += f"; if it is the beginning of summer time, give the time zone, as {zone}"
     else:
         sample = max(sample, 1)
         problem = "is off the uniform grid: the time changes"
         advice = (
-            f"give --resample {usual * seconds:.6g} to interpolate onto a uniform grid (library: "
-            "resample=), or, if the "
-            f"samples are uniform and only their time stamps are not, --dt {usual * seconds:.6g} "
-            "(library: dt=)"
+            f"give {name_option('resample', usual * seconds)} to interpolate onto a uniform grid, or, "
+            "if the samples are uniform and only their time stamps are not, "
+            f"{name_option('dt', usual * seconds)}"
         )
     raise RecordError(
         f"{rows.place(sample, name)} {problem} from {stamps[sample - 1]:.10g} to {stamps[sample]:.10g}, but "

@@ -21,8 +21,8 @@ def test_the_valid_record_of_these_tests_is_read(tmp_path):
 def test_a_missing_time_or_input_is_refused(tmp_path, cell, column, name):
     message = refusal(tmp_path, changed(14, column, cell))
     assert message.startswith(f"bad.csv, line 14, column {name} is empty or NaN")
-    assert "--gaps interpolate" in message
-    assert "--gaps split" in message
+    assert 'gaps="interpolate"' in message
+    assert 'gaps="split"' in message
 
 
 @pytest.mark.parametrize("cell", ["nan", "NaN", "", "  ", "NA"])
@@ -182,7 +182,7 @@ def test_a_gap_is_refused_at_the_line_after_it(tmp_path):
     del rows[30]
     message = refusal(tmp_path, rows)
     assert "line 31, column t_s follows a gap: the time changes from 0.28 to 0.3" in message
-    assert "a gap of 0.02 before line 31; give --gaps split" in message
+    assert 'a gap of 0.02 before line 31; give gaps="split"' in message
 
 
 @pytest.mark.parametrize("missing", [2, 30, 59])
@@ -201,7 +201,7 @@ def test_a_jump_backwards_is_refused_as_the_start_of_another_recording(tmp_path)
     rows = [*lines(), *lines()[1:]]
     message = refusal(tmp_path, rows)
     assert "line 62, column t_s jumps back to 0 from 0.59" in message
-    assert "give --gaps split for segments" in message
+    assert 'give gaps="split" for segments' in message
 
 
 def test_jittered_sampling_is_refused(tmp_path):
@@ -209,8 +209,8 @@ def test_jittered_sampling_is_refused(tmp_path):
     rows = [HEADER, *(f"{t[k]:.6f},{k % 7},{k % 11}" for k in range(60))]
     message = refusal(tmp_path, rows)
     assert "column t_s is off the uniform grid" in message
-    assert "give --resample 0.01" in message
-    assert "--dt 0.01" in message
+    assert "give resample=0.01" in message
+    assert "dt=0.01" in message
 
 
 def test_one_displaced_time_stamp_is_named(tmp_path):
@@ -249,7 +249,7 @@ def test_a_change_of_the_sampling_rate_is_refused_at_its_line(tmp_path):
 
 def test_a_time_column_and_a_sampling_time_that_disagree_are_refused(tmp_path):
     message = refusal(tmp_path, lines(), dt=0.0102)
-    assert "0.01 s by column t_s and 0.0102 s by --dt (library: dt=)" in message
+    assert "0.01 s by column t_s and 0.0102 s by dt=" in message
 
 
 @pytest.mark.parametrize("dt", [0.0, -0.01, float("nan"), float("inf")])
@@ -262,7 +262,7 @@ def test_a_file_without_a_sampling_time_is_refused(tmp_path):
     rows[0] = "k,u_V,y_um"
     message = refusal(tmp_path, rows)
     assert "bad.csv has no time column" in message
-    assert "give the sampling time by --dt (library: dt=), or name the column by --time" in message
+    assert "give the sampling time by dt=, or name the column by time=" in message
 
 
 def test_a_time_column_in_an_unknown_unit_is_named(tmp_path):
@@ -274,7 +274,7 @@ def test_a_time_column_in_an_unknown_unit_is_named(tmp_path):
 
 def test_two_possible_time_columns_are_refused(tmp_path):
     rows = [f"{line},{k}" if k else f"{line},time_ms" for k, line in enumerate(lines())]
-    assert "columns t_s and time_ms may all be the time: name one by --time" in refusal(tmp_path, rows)
+    assert "columns t_s and time_ms may all be the time: name one by time=" in refusal(tmp_path, rows)
 
 
 # Columns

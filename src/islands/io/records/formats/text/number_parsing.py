@@ -4,7 +4,6 @@ Whole columns are converted at once; only if that fails is the invalid cell sear
 """
 
 import reprlib
-import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
@@ -13,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError
+from islands.errors import RecordError, name_option
 from islands.io.records.column_names import looks_like_time
 from islands.io.records.formats.text.missing_words import (
     EMPTY,
@@ -244,4 +243,4 @@ def _convert_written(
 def _give_missing(text: str) -> str:
     """Return how to declare a text as missing; a comma separates words on the command line."""
     word = text if len(text) <= _SHOWN and "," not in text else "WORD"
-    return f"give --missing {shlex.quote(word)} (library: missing=)"
+    return f"give {name_option('missing', word)}"

@@ -8,7 +8,7 @@ from functools import cache
 from itertools import chain, islice
 
 from islands.data.channel_names import is_unit, spell_unit
-from islands.errors import RecordError
+from islands.errors import RecordError, name_option
 from islands.io.records.column_names import append_unit
 from islands.io.records.formats.text.missing_words import EMPTY, is_missing, parse_words
 from islands.io.records.formats.text.number_format import is_number
@@ -35,11 +35,6 @@ _MOST_PROPERTIES = 40
 
 #: Labels in the first cell of a row of units.
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
-
-_NO_HEADER = (
-    "add a header line, for example t_s,u_V,y_um, or give --no-header for the names c1, c2, ... or "
-    "--names a,b,c (library: header=False or names=)"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +150,7 @@ def _find_without_header(
     names = given or tuple(f"c{number + 1}" for number in range(width))
     if len(names) != width:
         raise RecordError(
-            f"{file}, line {samples + 1} has {width} columns, and --names (library: names=) gives "
+            f"{file}, line {samples + 1} has {width} columns, and {name_option('names')} gives "
             f"{len(names)}: name all columns in their order"
         )
     return TableStart(separator, None, names, samples, samples > top, None)
@@ -313,6 +308,13 @@ def is_value(cell: str) -> bool:
     return bool(is_number(cell) or split_quantity(cell))
 
 
+def _advise_header() -> str:
+    return (
+        f"add a header line, for example t_s,u_V,y_um, or give {name_option('header', False)} for the names "
+        f"c1, c2, ... or {name_option('names', ['a', 'b', 'c'])}"
+    )
+
+
 def _find_header(lines: Sequence[str], top: int, samples: int, separator: str, file: str) -> int:
     """Return the index of the header above the samples; the line above may be a row of units."""
     width = len(_split(lines[samples], separator))
@@ -326,7 +328,7 @@ def _find_header(lines: Sequence[str], top: int, samples: int, separator: str, f
     if not fitting or fitting[-1] != above[-1]:
         raise RecordError(
             f"{file}, line {samples + 1} is the first sample, and no line above has the names of its {width} "
-            f"columns: {_NO_HEADER}"
+            f"columns: {_advise_header()}"
         )
     # The nearest line with different names; below it are rows of units, of types or of other properties.
     adjacent = [at for at, other in zip(reversed(fitting), reversed(above), strict=False) if at == other]
@@ -359,5 +361,6 @@ def _check_header(names: Sequence[str], file: str, line: int, has_units: bool) -
     channels = len(numbers) < len(names) and all(name.isdigit() and len(name) < 4 for name in numbers)
     if numbers and not has_units and not (channels and not _is_sample(names)):
         raise RecordError(
-            f"{file}, line {line} contains the number {numbers[0][:_SHOWN]} instead of a name: {_NO_HEADER}"
+            f"{file}, line {line} contains the number {numbers[0][:_SHOWN]} instead of a name: "
+            f"{_advise_header()}"
         )

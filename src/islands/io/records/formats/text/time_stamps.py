@@ -13,7 +13,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError
+from islands.errors import RecordError, name_option
 from islands.io.records.formats.text.missing_words import is_missing
 from islands.io.records.table import RowRange
 
@@ -168,8 +168,8 @@ def _is_day_first(
         raise RecordError(
             f"{rows.place(next(iter(dates.values())), name)}: {one}/{two}/{year} may be the day {one} "
             "of the month "
-            f"{two} or the reverse, and no other date tells: give --dates day-first or --dates month-first "
-            "(library: dates=)"
+            f"{two} or the reverse, and no other date tells: give {name_option('dates', 'day-first')} "
+            f"or {name_option('dates', 'month-first')}"
         )
     return month_first is None
 

@@ -36,7 +36,7 @@ def test_the_first_group_with_a_table_is_read_and_the_others_are_named(hdf5, opt
 
     path = hdf5(write)
     assert read_record(path, ["u"], "y").u[:, 0].tolist() == COLUMNS["u"].tolist()
-    assert preview(path).warnings == ("the group one/run of r.h5 is read; other groups (--sheet): two",)
+    assert preview(path).warnings == ("the group one/run of r.h5 is read; other groups (sheet=): two",)
     assert read_record(path, ["u"], "y", sheet="two").samples == 60
     with pytest.raises(RecordError, match=r"r\.h5 has no group three; its groups are one/run, two"):
         read_record(path, ["u"], "y", sheet="three")

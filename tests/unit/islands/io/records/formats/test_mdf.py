@@ -25,8 +25,8 @@ def test_a_channel_group_is_read_with_its_times_and_units(tmp_path):
     record = read_record(path, ["u"], "y")
     assert (record.dt, record.input_units) == (pytest.approx(0.01), ("V",))
     assert record.u[:, 0].tolist() == (K % 7 - 3.0).tolist()
-    assert "the group 0 of r.mf4 is read; other groups (--sheet): 1" in preview(path).warnings
-    with pytest.raises(RecordError, match=r"r\.mf4 has no column speed.*other groups \(--sheet\): 1"):
+    assert "the group 0 of r.mf4 is read; other groups (sheet=): 1" in preview(path).warnings
+    with pytest.raises(RecordError, match=r"r\.mf4 has no column speed.*other groups \(sheet=\): 1"):
         read_record(path, ["speed"], "y")
     path.write_bytes(b"MDF" + bytes(200))
     with pytest.raises(RecordError, match=r"r\.mf4 is damaged or not an MDF file"):

@@ -44,7 +44,7 @@ def test_a_record_without_defects_is_unchanged_by_the_options(tmp_path):
 def test_gaps_are_counted_and_the_longest_is_named(tmp_path):
     message = refusal(tmp_path, gone(rows(), 50, 120, 121, 122))
     assert "line 50, column t_s follows a gap: the time changes from 0.47 to 0.49" in message
-    assert "2 gaps, the longest of 0.04 before line 119; give --gaps split" in message
+    assert '2 gaps, the longest of 0.04 before line 119; give gaps="split"' in message
 
 
 def test_gaps_become_segments(tmp_path):
@@ -58,7 +58,7 @@ def test_segments_may_begin_between_the_samples_of_the_grid(tmp_path):
     t = T + 0.1 + np.where(K >= 200, 0.0537, 0.0)
     record = read(tmp_path, rows(t), gaps="split")
     assert (record.segments, record.dt) == ((200, 200), pytest.approx(DT, rel=1e-9))
-    assert "give --resample 0.01" in refusal(tmp_path, rows(t), gaps="interpolate")
+    assert "give resample=0.01" in refusal(tmp_path, rows(t), gaps="interpolate")
 
 
 def test_gaps_are_interpolated_on_the_grid(tmp_path):
@@ -72,7 +72,7 @@ def test_gaps_are_interpolated_on_the_grid(tmp_path):
 def test_missing_values_are_named_interpolated_or_separate_segments(tmp_path):
     table = rows(u=blank(U, 100, 101), y=blank(Y, 300))
     message = refusal(tmp_path, table)
-    assert "line 102, column u_V and 1 more of its cells are empty or NaN: give --gaps" in message
+    assert "line 102, column u_V and 1 more of its cells are empty or NaN: give gaps=" in message
     filled = read(tmp_path, table, gaps="interpolate")
     assert np.abs(filled.u[:, 0] - U).max() < 2e-2
     assert filled.reading == ("interpolated: 3 missing values, the first in line 102",)
@@ -105,8 +105,8 @@ def test_jitter_is_resampled_or_ignored(tmp_path):
     table = rows(t, np.sin(2 * np.pi * 2.0 * t), np.cos(2 * np.pi * 1.5 * t))
     message = refusal(tmp_path, table)
     assert "off the uniform grid" in message
-    assert "--resample 0.01" in message
-    assert "--dt 0.01" in message
+    assert "resample=0.01" in message
+    assert "dt=0.01" in message
     resampled = read(tmp_path, table, resample=DT)
     assert np.abs(resampled.u[:, 0] - np.sin(2 * np.pi * 2.0 * resampled.time)).max() < 5e-3
     assert resampled.reading[0].endswith("s to 0.01 s by linear interpolation")
@@ -117,7 +117,7 @@ def test_jitter_is_resampled_or_ignored(tmp_path):
 def test_stamps_that_are_printed_too_coarsely_are_repeated_and_replaced_by_dt(tmp_path):
     table = rows(np.floor(T * 20 + 1e-9) / 20, digits=2)
     assert "repeats the time stamp 0 (320 of 400 rows do)" in refusal(tmp_path, table)
-    assert "or, if only the printed time is too coarse, --dt DT" in refusal(tmp_path, table)
+    assert "or, if only the printed time is too coarse, dt=DT" in refusal(tmp_path, table)
     assert read(tmp_path, table, dt=DT).dt == DT
 
 
@@ -128,7 +128,7 @@ def test_dt_does_not_hide_a_gap(tmp_path):
 def test_repeated_rows_are_left_out_and_other_rows_of_equal_time_averaged(tmp_path):
     table = rows()
     doubled = [*table[:31], table[30], *table[31:]]
-    assert "line 32, column t_s repeats the time stamp 0.29: give --resample" in refusal(tmp_path, doubled)
+    assert "line 32, column t_s repeats the time stamp 0.29: give resample=" in refusal(tmp_path, doubled)
     record = read(tmp_path, doubled, gaps="split")
     assert np.array_equal(record.y, read(tmp_path, table).y)
     assert record.reading == ("left out: 1 repeated row, the first is line 32",)

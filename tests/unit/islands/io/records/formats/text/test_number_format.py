@@ -53,7 +53,7 @@ def test_numbers_with_two_readings_are_refused_unless_the_mark_is_given(tmp_path
     rows = table([f"{k},{k:03d}" for k in range(1, 61)], "\t", "{:.0f}")
     message = refusal(tmp_path, rows, ["u"], "y", dt=0.01)
     assert "bad.csv, line 2, column y (1,001) may be 1001 or 1.001" in message
-    assert "give --decimal point or --decimal comma" in message
+    assert 'give decimal="point" or decimal="comma"' in message
     (tmp_path / "r.csv").write_text("\n".join(rows))
     names = {"names": ["k", "u", "y"], "dt": 0.01}
     assert read_record(tmp_path / "r.csv", ["u"], "y", decimal="point", **names).y[0] == 1001.0

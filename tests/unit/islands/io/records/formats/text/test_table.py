@@ -71,12 +71,12 @@ def test_names_replace_a_header(tmp_path):
 
 def test_another_number_of_names_than_columns_is_refused(tmp_path):
     message = refusal(tmp_path, lines(), names=["t", "u"])
-    assert "bad.csv, line 2 has 3 columns, and --names (library: names=) gives 2" in message
+    assert "bad.csv, line 2 has 3 columns, and names= gives 2" in message
 
 
 def test_options_of_tables_are_refused_for_arrays(tmp_path):
     np.savez(tmp_path / "r.npz", u=np.arange(60.0), y=np.arange(60.0))
-    with pytest.raises(SettingsError, match=r"r\.npz is not a table of text: leave --names out"):
+    with pytest.raises(SettingsError, match=r"r\.npz is not a table of text: leave names out"):
         read_record(tmp_path / "r.npz", ["u"], "y", dt=1.0, names=["a", "b"])
 
 

@@ -78,7 +78,7 @@ def test_days_without_a_proof_of_their_order_are_refused_unless_it_is_given(tmp_
     assert "column Timestamp: 04/03/2026 may be the day 04 of the month 03" in refusal(
         tmp_path, rows, ["u"], "y"
     )
-    assert "give --dates day-first or --dates month-first" in refusal(tmp_path, rows, ["u"], "y")
+    assert 'give dates="day-first" or dates="month-first"' in refusal(tmp_path, rows, ["u"], "y")
     rows = table(moment.strftime("%d/%m/%Y") for moment in moments(datetime(2026, 3, 4), 86400.0))
     assert read(tmp_path, rows, dates="day-first").dt == 86400.0
     assert read(tmp_path, rows).dt == 86400.0  # the 13th of March proves the order
@@ -101,7 +101,7 @@ def test_a_change_to_winter_time_is_refused_unless_the_time_zone_is_given(tmp_pa
     rows = table(moment.strftime("%Y-%m-%d %H:%M") for moment in local)
     message = refusal(tmp_path, rows, ["u"], "y")
     assert "line 32, column Timestamp jumps back" in message
-    assert "if it is the end of summer time, give --timezone" in message
+    assert 'if it is the end of summer time, give the time zone, as timezone="Europe/Berlin"' in message
     assert read(tmp_path, rows, timezone="Europe/Berlin").dt == 60.0
 
 
@@ -109,7 +109,9 @@ def test_a_change_to_summer_time_is_refused_unless_the_time_zone_is_given(tmp_pa
     utc = [datetime(2026, 3, 29, 0, 30) + timedelta(minutes=k) for k in range(SAMPLES)]
     local = [moment + timedelta(hours=1 if moment.hour < 1 else 2) for moment in utc]
     rows = table(moment.strftime("%Y-%m-%d %H:%M") for moment in local)
-    assert "beginning of summer time, give --timezone" in refusal(tmp_path, rows, ["u"], "y")
+    assert 'beginning of summer time, give the time zone, as timezone="Europe' in refusal(
+        tmp_path, rows, ["u"], "y"
+    )
     assert read(tmp_path, rows, timezone="Europe/Berlin").dt == 60.0
 
 
