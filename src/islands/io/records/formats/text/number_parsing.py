@@ -145,7 +145,8 @@ def _read_words(
         numbers = find_states(column, missing.texts)
         given = missing.texts if numbers else missing.texts | OPEN_CIRCUIT
         replaced = [_MISSING if is_missing(text, given) else text for text in column]
-        notes.extend(_describe_missing(column, replaced, name, rows))
+        if _MISSING in replaced:
+            notes.extend(_describe_missing(column, replaced, name, rows))
         if numbers:
             replaced = [numbers.get(text.strip(), text) for text in replaced]
             notes.append(f"column {name}: {_list_states(numbers)}")

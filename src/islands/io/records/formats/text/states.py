@@ -40,6 +40,9 @@ def find_states(texts: Sequence[str], given: Collection[str] = ()) -> dict[str, 
     given : collection of str
         Words of the user for a missing value, in lower case.
     """
+    first = next((text for text in texts if not is_missing(text, given)), "")
+    if not is_state(first) and first.strip() not in _NUMBERS:
+        return {}  # nearly all columns
     found = {text.strip() for text in texts}
     words = {word for word in found if is_state(word) and word.lower() not in given}
     pair = next((pair for pair in PAIRS if words and {word.lower() for word in words} <= {*pair}), None)
