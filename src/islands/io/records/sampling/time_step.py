@@ -53,8 +53,8 @@ def find_sampling(
     start = None
     if time is None and options.time_unit is not None:
         raise RecordError(
-            f"{file} has no time column that --time-unit could describe: name the column by --time, or leave "
-            "--time-unit out (library: time=, time_unit=)"
+            f"{file} has no time column that {name_option('time_unit')} could describe: name the column by "
+            f"{name_option('time')}, or leave the unit out"
         )
     if dt is not None:
         dt = check_seconds(dt, "the sampling time dt", RecordError)
@@ -149,7 +149,7 @@ def find_time_scale(
         if options.time_unit is not None:
             raise RecordError(
                 f"{columns.rows.file}: column {time} holds time stamps, which have no unit: leave "
-                "--time-unit out (library: time_unit=)"
+                f"{name_option('time_unit')} out"
             )
         return TimeScale(columns.numbers[time], 1.0, elapsed=True)
     field = time.removeprefix(structure)
@@ -172,7 +172,7 @@ def _unknown_sampling_message(table: Table, file: str, structure: str) -> str:
         units = ", ".join(unit for unit in TIME_UNITS if unit)
         message += (
             f"; if {unknown_unit[0]} is the time, end its name in one of the units {units}, or give "
-            "--time and --time-unit (library: time=, time_unit=)"
+            f"{name_option('time')} and {name_option('time_unit')}"
         )
     return message
 

@@ -60,8 +60,8 @@ def test_a_code_in_an_input_is_refused_without_gaps(tmp_path):
     assert message.startswith(
         "bad.csv, line 152, column u and 2 more of its cells are -9999, a code of missing"
     )
-    assert "--gaps split" in message
-    assert "--outliers keep" in message
+    assert 'gaps="split"' in message
+    assert 'outliers="keep"' in message
     record = read_record(tmp_path / "bad.csv", ["u"], "y", gaps="split")
     assert record.segments == (150, 548, 499)
     assert record.reading[0] == "gross errors of u: 3 times -9999, a code of missing values are left out"

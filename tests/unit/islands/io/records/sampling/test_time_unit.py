@@ -203,16 +203,16 @@ def test_time_stamps_have_no_unit(tmp_path):
 
 def test_a_unit_without_a_time_column_is_refused(tmp_path):
     rows = ["k,u,y", *(f"{k},{k % 7},{k % 5}" for k in range(40))]
-    assert "no time column that --time-unit could describe" in refusal(
+    assert "no time column that time_unit= could describe" in refusal(
         tmp_path, rows, ("u",), "y", time_unit="d", dt=0.1
     )
 
 
 def test_an_unknown_unit_is_refused(tmp_path):
     with pytest.raises(
-        SettingsError, match="--time-unit is s or ms or us or ns or min or h or d, got 'days'"
+        SettingsError, match="time_unit= is s or ms or us or ns or min or h or d, got 'days'"
     ):
         read(tmp_path, "t", K, time_unit="days")
-    with pytest.raises(RecordError, match="--time and --time-unit"):
+    with pytest.raises(RecordError, match="time= and time_unit="):
         read(tmp_path, "t_weeks", K)
     assert read(tmp_path, "t_weeks", 7.0 * K, time="t_weeks", time_unit="d").dt == 604_800.0
