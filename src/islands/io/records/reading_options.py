@@ -108,7 +108,7 @@ class ReadingOptions:
                 f"{_name('missing')}: a word is empty; empty cells are missing values without it"
             )
         object.__setattr__(self, "missing", words)
-        _check_choice("time-unit", self.time_unit, TIME_UNIT_CHOICES)
+        _check_choice("time_unit", self.time_unit, TIME_UNIT_CHOICES)
         _check_choice("decimal", self.decimal, DECIMAL_MARKS)
         _check_choice("dates", self.dates, DATE_ORDERS)
         _check_choice("gaps", self.gaps, GAPS)
