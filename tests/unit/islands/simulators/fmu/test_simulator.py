@@ -154,11 +154,15 @@ def test_steps_are_refined_until_a_simulation_does_not_diverge() -> None:
     [
         ({"dt": 0.004}, "", "fixed step of 0.005 s, of which the sampling time 0.004 s is not a multiple"),
         (
-            {"input_units": ("kN",)},
+            {"input_names": ("u_kN",), "input_units": ("kN",)},
             "",
             "the input u of .* is in N, that of the record in kN: convert the column",
         ),
-        ({"output_unit": "V"}, "", "the output x of .* is in m, that of the record in V: convert the column"),
+        (
+            {"output_name": "y_V", "output_unit": "V"},
+            "",
+            "the output x of .* is in m, that of the record in V: convert the column",
+        ),
         (
             {},
             "?parameters=m=-1",

@@ -295,8 +295,8 @@ def test_columns_of_a_record_are_matched_with_those_of_the_document() -> None:
     )
     expected = simulate_spec(document, with_channel)
     assert simulate_spec(document, reversed_columns).tolist() == expected.tolist()
-    with pytest.raises(RecordError, match=r"multiply u_N by 0\.001"):
-        simulate_spec(document, replace(with_channel, input_units=("mN", "K")))
+    with pytest.raises(RecordError, match=r"multiply u_mN by 0\.001"):
+        simulate_spec(document, replace(with_channel, input_names=("u_mN", "T_mK"), input_units=("mN", "mK")))
 
 
 def test_a_document_has_the_states_at_the_first_sample_of_its_record() -> None:
