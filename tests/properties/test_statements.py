@@ -1,0 +1,171 @@
+"""Properties of the sentences about a result: no two of them contradict each other."""
+
+from dataclasses import replace
+from functools import cache
+from math import inf, nan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import islands
+from islands.data.dataset import Dataset
+from islands.data.split import Split
+from islands.io.result_text.model_description import describe
+from islands.io.result_text.summary_text import summary
+from islands.reports.identification import identification_report
+from islands.simulation.outcome import EvaluationOutcome, Status
+from islands.validation.ensemble import Ensemble
+from islands.validation.metrics import Metrics
+from islands.validation.predictable_residual import VERDICTS, ResidualStructure
+from support.assessments import with_changes
+from support.portfolio_records import KINDS
+from support.searches import record
+from support.statements import EXCLUSIVE, find_contradictions
+
+OK = EvaluationOutcome(Status.OK, "")
+LOST = EvaluationOutcome(Status.DIVERGED, "at sample 17")
+
+#: Shares, fractions and ratios on both sides of every limit of the sentences.
+SHARES = st.sampled_from([0.0, 0.05, 0.0999, 0.1001, 0.3, 0.939, 1.0])
+RMSES = st.sampled_from([1e-16, 3e-16, 0.01, 0.015, 0.1, 1.0])
+
+
+@cache
+def found():
+    data = record(300)
+    named = Dataset(data.u, data.y, 0.1, ("u_V",), "y_um", ("V",), "um")
+    return islands.fit(named, library="phi-polynomial", max_terms=4, seed=7).search_result
+
+
+#: Measured quantities that the sentences state.
+CHOICES = st.fixed_dictionaries(
+    {
+        "lost": st.booleans(),
+        "shares": st.tuples(SHARES, SHARES),
+        "percent": st.sampled_from([1e-6, 0.5, 1.5]),
+        "r2": st.tuples(*[st.sampled_from([0.3, 0.95])] * 2),
+        "rmse": st.tuples(*[RMSES] * 3),
+        "bounded": st.tuples(*[st.sampled_from([True, True, True, False])] * 3),
+        "constant": st.booleans(),
+        "extremes": st.tuples(*[st.sampled_from([0.0, 3.0, 500.0, inf])] * 4),
+        "coverage": st.sampled_from([None, 0.5, 0.74, 0.76, 0.9]),
+        "widening": st.sampled_from([1.0, 3.0]),
+        "ensemble": st.sampled_from(["none", "certain", "doubtful"]),
+    }
+)
+
+
+def make_structure(shares, percent, lost):
+    """Return a structure of a residual with the verdict of its numbers, as `measure_structure` gives it."""
+    adequate, minor, inadequate = VERDICTS
+    if lost:
+        return ResidualStructure(shares[0], nan, nan, inadequate)
+    verdict = adequate if shares[1] <= 0.1 or percent <= 1e-5 else minor if percent <= 1.0 else inadequate
+    return ResidualStructure(*shares, percent, verdict)
+
+
+def make_physics(physics, bounded, constant, extremes):
+    """Return checks of which the first hold, or an excursion, or some extremes fail."""
+    first, *holds = physics.holds
+    minor, *others = physics.excursions
+    changed = replace(first, bounded=bounded[0], constant=bounded[0] and constant, drift_percent=7.5)
+    pairs = zip(physics.extremes, extremes, strict=True)
+    return replace(
+        physics,
+        holds=(changed, *holds),
+        excursions=(
+            replace(minor, bounded=bounded[1]),
+            *others[:-1],
+            replace(others[-1], bounded=bounded[2]),
+        ),
+        extremes=tuple(replace(each, bounded=far < inf, ranges=far) for each, far in pairs),
+    )
+
+
+def make_result(choices):
+    """Return a result with one model that has the chosen quantities."""
+    base = found()
+    entry, parts, lost = base.recommended, base.split, choices["lost"]
+    free, one, trained = (
+        Metrics(1.0, r2, rmse, 9.0) for r2, rmse in zip((*choices["r2"], 0.95), choices["rmse"], strict=True)
+    )
+    free = Metrics(nan, nan, nan, nan) if lost else free
+    coverage = choices["coverage"]
+    changed = with_changes(
+        entry,
+        physics=make_physics(entry.physics, choices["bounded"], choices["constant"], choices["extremes"]),
+        residual_structure=make_structure(choices["shares"], choices["percent"], lost),
+        metrics={
+            "estimation": entry.metrics["estimation"] | {"free_run": trained},
+            "validation": entry.metrics["validation"] | {"free_run": free, "one_step_ahead": one},
+        },
+        outcomes={
+            "estimation": entry.outcomes["estimation"],
+            "validation": entry.outcomes["validation"] | {"free_run": LOST if lost else OK},
+        },
+        bands=None if coverage is None or lost else replace(entry.bands, coverage=coverage),
+    )
+    wide = replace(parts.validation, u=choices["widening"] * parts.validation.u)
+    ensembles = {"none": None, "certain": base.ensemble, "doubtful": Ensemble(base.ensemble.structures[:0])}
+    return replace(
+        base,
+        models=(changed,),
+        split=Split(parts.estimation, wide),
+        ensemble=ensembles[choices["ensemble"]],
+    )
+
+
+@given(CHOICES)
+def test_no_two_sentences_of_a_result_contradict_each_other(choices):
+    result = make_result(choices)
+    assert not find_contradictions(" ".join(describe(result)))
+    assert not find_contradictions(summary(result))
+
+
+@given(CHOICES)
+def test_the_sentences_of_the_report_do_not_contradict_each_other(choices):
+    page = identification_report("job", make_result(choices), {}).decode()
+    assert not find_contradictions(page)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", sorted(KINDS))
+def test_no_two_sentences_about_a_record_contradict_each_other(name):
+    data, _ = KINDS[name].record(seed=0)
+    result = islands.fit(data).search_result
+    assert not find_contradictions(summary(result))
+    assert not find_contradictions(identification_report(name, result, {}).decode())
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("fault", ["sentinels", "spikes", "short", "extrapolation", "integrator"])
+def test_no_two_sentences_about_an_awkward_record_contradict_each_other(fault):
+    rng = np.random.default_rng(0)
+    samples = 60 if fault == "short" else 1200
+    u, y = rng.uniform(-1.0, 1.0, samples), np.zeros(samples)
+    if fault == "extrapolation":
+        u[-samples // 4 :] *= 3.0
+    pole = 1.0 if fault == "integrator" else 0.9
+    for k in range(1, samples):
+        y[k] = pole * y[k - 1] + 0.2 * u[k - 1]
+    y += 0.02 * rng.standard_normal(samples)
+    if fault in ("sentinels", "spikes"):
+        y[[100, 500, 1000]] = -9999.0 if fault == "sentinels" else 12.0
+    result = islands.fit(Dataset(u, y, 0.1, ("valve",), "level")).search_result
+    assert not find_contradictions(summary(result))
+
+
+def test_the_checker_finds_the_contradictions_that_were_printed():
+    """Each pair can be found: a checker that finds none shows nothing."""
+    assert find_contradictions("As a simulation: good. Fails at: the drift. ")
+    assert find_contradictions("As a simulation: usable, with limits. Fails at: none of the checks. ")
+    assert find_contradictions(
+        "no structure is left in the free-run residual; 94 % of the free-run residual is predictable"
+    )
+    assert find_contradictions(
+        "93 % of the residual of the free run is predictable; 94 % of the free-run residual is predictable"
+    )
+    assert len(set(EXCLUSIVE)) == len(EXCLUSIVE)
+    assert not find_contradictions("As a simulation: good. Fails at: none of the checks. ")

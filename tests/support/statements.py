@@ -1,0 +1,46 @@
+"""Checker of the sentences about a result: pairs of statements that exclude each other."""
+
+import re
+
+#: Pairs of patterns that one text does not contain together.
+EXCLUSIVE = (
+    (r"As a simulation: good", r"Fails at: (?!none of the checks)"),
+    (r"As a simulation: good", r"within the limits below"),
+    (r"As a simulation: good", r"Good for: no use"),
+    (r"As a simulation: (usable|unsuitable)", r"Fails at: none of the checks"),
+    (r"As a simulation: unsuitable", r"Good for: [^.]*simulation from the inputs alone"),
+    (r"As a simulation: (good|usable)", r"Fails at: [^:]*simulation from the inputs alone"),
+    (
+        r"Fails at: none of the checks",
+        r"Next: [^.]*(allow more than|try (an estimate|terms|linear|products|even)|estimate from)",
+    ),
+    (r"no structure is left in the free-run residual", r"[%] of the free-run residual is predictable"),
+    (r"the residual is a rounding error", r"[%] of the free-run residual is predictable"),
+    (r"the free run on the validation data diverges", r"Good for: [^.]*simulation from the inputs alone"),
+    (r"the free run on the validation data diverges", r"times that on the estimation data"),
+    (r"every term has an inclusion probability", r"doubtful terms"),
+    (r"every term has an inclusion probability", r"models without .* are about as good"),
+    (r"diverges in \d+ of \d+ holds", r"Good for: [^.]*bounded at inputs held"),
+    (r"diverges at (minor-loops|amplitude x|rate x)", r"Good for: [^.]*bounded at inputs held"),
+    (r"no model passes the physics checks", r"Good for: .*bounded at inputs held.* Fails at:"),
+    (r"the output (diverges|leaves its recorded range) .*1\.2 of the rec", r"Good for: .*up to 1\.2 times"),
+    (r"the output (diverges|leaves its recorded range) .*\(1 of the rec", r"Good for: .*up to 1(\.2)? times"),
+    (r"drifts by [\d.e+]+ % of its range at constant input", r"Good for: .*Property 1 holds.* Fails at:"),
+)
+
+#: Statements of one quantity, whose numbers are equal wherever they occur.
+REPEATED = (
+    r"(\d+) % of (?:the residual of the free run|the free-run residual) is predictable",
+    r"RMSE (\S+) ?\S*, mean absolute error",
+)
+
+
+def find_contradictions(text: str) -> list[str]:
+    """Return the contradictions of a text, whose lines and tags do not count."""
+    joined = " ".join(re.sub(r"<[^<>]*>", " ", text).split())
+    found = [
+        f"{one} / {other}" for one, other in EXCLUSIVE if re.search(one, joined) and re.search(other, joined)
+    ]
+    return found + [
+        f"{pattern}: {values}" for pattern in REPEATED if len(values := set(re.findall(pattern, joined))) > 1
+    ]
