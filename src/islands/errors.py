@@ -33,7 +33,7 @@ class SettingsError(IslandsError):
 @contextmanager
 def command_line_names() -> Iterator[None]:
     """Let messages name options as on the command line, in this process."""
-    _names.append(_name_flag)
+    _names.append(name_flag)
     try:
         yield
     finally:
@@ -64,7 +64,8 @@ def _format(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _name_flag(name: str, value: object) -> str:
+def name_flag(name: str, value: object = None) -> str:
+    """Return an option of the command line: ``--time-unit d``, or ``--no-header`` for the value False."""
     flag = f"--{name.replace('_', '-')}"
     if value is False:
         return f"--no-{flag[2:]}"

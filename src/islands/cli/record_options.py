@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from islands.cli.option_groups import group_options, make_option
+from islands.errors import name_flag
 from islands.io.records.reading_options import ReadingOptions
 
 #: Prefix of the parameters, which keeps them apart from those of a search.
@@ -23,14 +24,12 @@ _LISTS = frozenset({"names", "missing"})
 def _make_option(option: Field[Any]) -> Parameter:
     if option.name == "header":
         annotation: Any = Annotated[
-            bool, typer.Option(ReadingOptions.flag(option.name), help=option.metadata["help"])
+            bool, typer.Option(name_flag(option.name, False), help=option.metadata["help"])
         ]
         default = False
     else:
         kind = _TYPES.get(option.name, str | None)
-        annotation = Annotated[
-            kind, typer.Option(ReadingOptions.flag(option.name), help=option.metadata["help"])
-        ]
+        annotation = Annotated[kind, typer.Option(name_flag(option.name), help=option.metadata["help"])]
         default = None
     return make_option(_PREFIX + option.name, annotation, default)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
-from islands.errors import RecordError, SettingsError, check_seconds, name_option
+from islands.errors import RecordError, SettingsError, check_seconds, name_flag, name_option
 from islands.inspection.channel import channels
 from islands.inspection.column_roles import ColumnChoice, choose_columns
 from islands.inspection.findings import (
@@ -243,9 +243,9 @@ class _FileInspection:
             )
         except RecordError:
             return {}, ()  # the reading of the record reports it
-        treatment = "are left out; --outliers keep uses them"
+        treatment = "are left out (option outliers: keep uses them)"
         if self.reading.outliers == KEEP:
-            treatment = "are used; --outliers exclude leaves them out"
+            treatment = "are used (option outliers: exclude leaves them out)"
         return found.numbers, [f"{errors} {treatment}" for errors in excluded]
 
     def _align(
@@ -392,7 +392,7 @@ class _FileInspection:
             bounds = ("" if bound is None else str(bound) for bound in (self.rows.start, self.rows.stop))
             words += ["--rows", ":".join(bounds)]
         for name, value in reading.changes().items():
-            words.append(reading.flag(name))
+            words.append(name_flag(name, value if name == "header" else None))
             if name != "header":
                 words.append(",".join(value) if isinstance(value, list) else str(value))
         return shlex.join([*words, "--out", "result"])

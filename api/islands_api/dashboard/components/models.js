@@ -103,7 +103,7 @@ export function makeTermTable(model) {
     "Terms of the model",
     ["Term", ["Parameter", "figure"], ["Standard error", "figure"], ["Inclusion", "figure"]],
     model.terms.map((term) => [
-      // Lines break between factors only. Results of earlier versions have no texts with the names of columns.
+      // Lines break between factors only. Results of earlier versions have no texts with names of columns.
       el("code", {}, (term.term ?? term.regressor).split(/(?<=\*)/).map((factor) => el("span", {}, factor))),
       makeExactValue(term.parameter, (value) => formatNumber(value, 6)),
       makeExactValue(term.standard_error, formatNumber),

@@ -118,11 +118,6 @@ class ReadingOptions:
             check_seconds(self.resample, _name("resample"))
         _check_timezone(self.timezone)
 
-    @staticmethod
-    def flag(name: str) -> str:
-        """Return the option of the command line for a field: ``--time-unit`` for ``time_unit``."""
-        return "--no-header" if name == "header" else f"--{name.replace('_', '-')}"
-
     @property
     def has_header(self) -> bool:
         """Whether the names are in the file."""

@@ -315,8 +315,10 @@ def _describe(
     ]
     if faster:
         other = SAMPLE if use.rates == MEAN else MEAN
-        text += f", with {_HOW[use.rates]} for {', '.join(faster)} (--rates {other}: {_HOW[other]}; "
-        text += "--rates rows: every row is a sample)"
+        text += (
+            f", with {_HOW[use.rates]} for {', '.join(faster)} (option rates: {other} takes {_HOW[other]}, "
+        )
+        text += "rows every row as a sample)"
     else:
-        text += " (--rates rows: every row is a sample)"
+        text += " (option rates: rows takes every row as a sample)"
     return text

@@ -189,8 +189,7 @@ def _read_days(
     if is_date or (in_days and not in_seconds):
         return _elapse(
             numbers,
-            f"column {name} is read as days: {number}; if it is in seconds, give --time-unit s (library: "
-            "time_unit=)",
+            f"column {name} is read as days: {number}; if it is in seconds, give it the time unit s",
         )
     if in_seconds and not in_days:
         return TimeScale(numbers, 1.0)
@@ -198,7 +197,7 @@ def _read_days(
         numbers,
         1.0,
         note=f"column {name} is read as seconds; its numbers are also possible as days: {number}; if they "
-        "are, give --time-unit d (library: time_unit=)",
+        "are, give it the time unit d",
     )
 
 
@@ -216,7 +215,7 @@ def _read_fractions(
     return _elapse(
         numbers,
         f"column {name} is read as fractions of a day: {known[0]:.10g} is {first:%H:%M:%S} (Excel); if it is "
-        "in seconds, give --time-unit s (library: time_unit=)",
+        "in seconds, give it the time unit s",
     )
 
 

@@ -242,7 +242,7 @@ def test_record_is_matched_with_the_model_by_columns_and_sampling_time():
     for changes, message in (
         ({"dt": 1.0}, "the model has a sampling time of 0.1 s"),
         ({"input_names": ("a_V", "b_mV"), "input_units": ("V", "mV")}, "some names occur in both"),
-        ({"input_units": ("mV", "V")}, "multiply a_V by 0.001"),
+        ({"input_names": ("a", "b"), "input_units": ("mV", "V")}, "multiply a by 0.001"),
     ):
         with pytest.raises(RecordError, match=message):
             free_run(chosen, replace(data, **changes))

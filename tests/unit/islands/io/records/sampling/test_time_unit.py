@@ -41,7 +41,7 @@ def test_days_of_excel_at_one_minute_are_not_seconds(tmp_path, name):
     assert record.dt == 60.0
     (note,) = record.reading
     assert note.startswith(f"column {name} is read as days: 45987.5 is 2025-11-26 12:00:00 (Excel); ")
-    assert "give --time-unit s" in note
+    assert "give it the time unit s" in note
 
 
 @pytest.mark.parametrize(
@@ -209,9 +209,7 @@ def test_a_unit_without_a_time_column_is_refused(tmp_path):
 
 
 def test_an_unknown_unit_is_refused(tmp_path):
-    with pytest.raises(
-        SettingsError, match="time_unit is s or ms or us or ns or min or h or d, got 'days'"
-    ):
+    with pytest.raises(SettingsError, match="time_unit is s or ms or us or ns or min or h or d, got 'days'"):
         read(tmp_path, "t", K, time_unit="days")
     with pytest.raises(RecordError, match="time= and time_unit="):
         read(tmp_path, "t_weeks", K)
