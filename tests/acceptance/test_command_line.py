@@ -3,6 +3,7 @@
 import csv
 import importlib.util
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,7 @@ def test_folder_contains_models_figures_and_a_summary(folder: Path, result: dict
         document = json.loads((folder / "fit" / "models" / f"{model['rank']:02d}.json").read_text())
         terms = [{**term} for term in model["terms"]]
         assert all(0.0 <= term.pop("inclusion") <= 1.0 for term in terms)
+        assert all(re.search(r"\b(y_um|u_V)\(k-\d\)", term.pop("term")) for term in terms)
         assert document["terms"] == terms
     figures = {path.stem for path in (folder / "fit" / "figures").glob("*.svg")}
     assert figures == {"free-run", "loop", "hold", "residuals", "record", "front"}

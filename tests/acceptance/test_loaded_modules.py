@@ -18,11 +18,11 @@ finally:
 #: Largest number of modules of a command, a few more than measured, and the large packages it loads.
 LIMITS = {
     "--version": (280, ""),
-    "fit --help": (690, ""),
+    "fit --help": (700, ""),
     "inspect {record}": (535, ""),
     "jobs --help": (870, ""),
     "jobs list --url http://127.0.0.1:9": (820, ""),
-    "show published:13": (915, "numba scipy"),
+    "show published:13": (925, "numba scipy"),
     "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1310, "numba scipy"),
     "simulate published:13 {record} --input u_V --output y_um": (1240, "numba scipy"),
     # Other processes draw the report.

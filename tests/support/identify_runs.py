@@ -33,6 +33,9 @@ DEEPEST = resolve_settings("hysteresis", {"max_height": 12}).maximum_lag
 def record(samples=700, seed=0, dt=0.01):
     rng = np.random.default_rng(seed)
     u, y = 0.1 * np.cumsum(rng.normal(size=samples)), np.zeros(samples)
+    # The validation data, a quarter, have inputs of the estimation data: they do not extrapolate.
+    held = samples // 4
+    u[-held:] = u[-held - 1 : -2 * held - 1 : -1]
     for k in range(3, samples):
         rise = u[k - 1] - u[k - 2]
         y[k] = y[k - 1] + 0.8 * rise - 0.3 * y[k - 1] * abs(rise)

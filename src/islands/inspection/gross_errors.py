@@ -25,6 +25,9 @@ _CODES = frozenset(
 #: Least distance of a code, and of another repeated value, from all other values, relative to their range.
 _CODE_GAP, _REPEATED_GAP = 2.0, 5.0
 
+#: Largest part of the values that are equal, unless they are a known code.
+_MOST_REPEATED = 0.05
+
 #: Distinct values of an output, at least: codes of an output with a few levels are levels.
 _LEAST_LEVELS = 10
 
@@ -149,7 +152,7 @@ def _find_code(y: Signal, is_measured: bool = True) -> float | None:
         if others.size <= known.size // 2 or np.unique(others).size < _LEAST_LEVELS:
             continue
         gap = float(np.abs(others - extreme).min()) / float(np.ptp(others))
-        is_repeated = is_measured and known.size - others.size > 1
+        is_repeated = is_measured and 1 < known.size - others.size <= _MOST_REPEATED * known.size
         if gap > (_CODE_GAP if extreme in _CODES else _REPEATED_GAP if is_repeated else np.inf):
             return extreme
     return None

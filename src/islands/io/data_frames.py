@@ -24,7 +24,7 @@ from islands.io.records.column_names import (
     take_output,
 )
 from islands.io.records.formats.columnar import ColumnarFile
-from islands.io.records.reading_options import EXCLUDE, ReadingOptions
+from islands.io.records.reading_options import EXCLUDE, ROWS, ReadingOptions
 from islands.io.records.table_reading import read_table
 
 if TYPE_CHECKING:
@@ -126,7 +126,8 @@ def as_record(
     record = read_table(
         *(table, _TITLE, inputs, output, dt),
         missing_output=missing_output,
-        options=ReadingOptions(outliers=outliers),
+        # The elements of arrays are samples; a column of a frame may have its own clock.
+        options=ReadingOptions(outliers=outliers, rates=None if y is None else ROWS),
         resting_inputs=resting_inputs,
     )
     names = [*record.input_names, output]

@@ -42,6 +42,12 @@ def test_a_single_code_of_missing_values_is_found_and_named(code):
     assert errors.describe("line {}".format) == f"1 times {code:.12g}, a code of missing values (line 17)"
 
 
+def test_a_frequent_level_is_no_code():
+    rng = np.random.default_rng(3)
+    y = np.where(rng.random(SAMPLES) < 0.3, 1.0, 1e-9 * rng.normal(size=SAMPLES))
+    assert not found(y, stepped()).samples.size
+
+
 def test_two_different_codes_are_found():
     u = stepped()
     y = lagged(u)

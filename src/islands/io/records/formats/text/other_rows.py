@@ -67,10 +67,14 @@ def keep_samples(
     headers = [at for at, row in enumerate(cells) if labels and row and _is_header(row, labels)]
     if not headers:
         return SampleRows(numbers, cells, (), tuple(notes))
-    blocks = [_extend(cells, at, missing) for at in headers]
-    left_out = set().union(*blocks)
-    starts = {block.stop - sum(at < block.stop for at in left_out) for block in blocks}
-    times = f"{len(blocks)} times, first in" if len(blocks) > 1 else "in"
+    left_out: dict[int, None] = {}
+    starts, end = set(), 0
+    for header in headers:
+        block = _extend(cells, header, end, missing)
+        left_out |= dict.fromkeys(block)
+        starts.add(block.stop - len(left_out))
+        end = block.stop
+    times = f"{len(headers)} times, first in" if len(headers) > 1 else "in"
     lines = f"{len(left_out)} {counted}s" if len(left_out) > 1 else "it"
     notes.append(
         f"the header is repeated {times} {counted} {numbers[headers[0]]}: {lines} "
@@ -110,10 +114,10 @@ def _trim(cells: Sequence[str]) -> Sequence[str]:
     return list(cells[:width])
 
 
-def _extend(cells: Sequence[Sequence[str]], header: int, missing: Collection[str]) -> range:
-    """Return the rows around a repeated header that are not samples: a description, units, types."""
+def _extend(cells: Sequence[Sequence[str]], header: int, least: int, missing: Collection[str]) -> range:
+    """Return the rows around a repeated header, from the least one, that are not samples: units, types."""
     width, first, stop = len(cells[0]), header, header + 1
-    while first and not _is_sample(cells[first - 1], width, missing):
+    while first > least and not _is_sample(cells[first - 1], width, missing):
         first -= 1
     while stop < min(len(cells), header + _MOST_PROPERTIES) and not any(map(is_value, cells[stop])):
         stop += 1
