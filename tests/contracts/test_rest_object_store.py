@@ -68,6 +68,7 @@ def test_a_service_without_its_object_store_is_alive_but_not_ready(
     assert service.client.get("/readyz").status_code == 200
 
 
+@pytest.mark.ci
 def test_requests_that_are_repeated_during_an_outage_are_logged_once_a_minute(
     serve: Any, objects: MemoryObjects, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,6 +121,7 @@ def test_figures_of_another_machine_are_served(service: Service, machine: Servic
     assert (answer.status_code, answer.content) == (200, b"<svg/>")
 
 
+@pytest.mark.ci
 def test_a_job_waits_for_the_object_store_and_is_not_lost(
     service: Service, machine: ServiceSettings, absent: MemoryObjects, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -97,6 +97,7 @@ def test_a_table_of_text_is_uploaded_under_any_name(service, name):
     assert job.status_code == 202, job.text
 
 
+@pytest.mark.ci
 def test_an_mdf_file_under_another_name_is_refused(service):
     answer = service.upload(b"MDF     4.10    " + bytes(400), "record.dat")
     assert "MDF" in problem_of(answer, 422, "invalid-record")

@@ -39,6 +39,7 @@ def found(stiffened: Dataset) -> Diagnosis:
     return islands.diagnose(stiffened, "second-order", effects=FEW[:3])
 
 
+@pytest.mark.ci
 def test_effect_is_named_and_predicts_whole_recordings(found: Diagnosis) -> None:
     assert found.verdict == Verdict.NAMED
     assert [each.name for each in found.effects] == ["cubic-stiffness"]

@@ -130,6 +130,7 @@ def test_sign_holds_during_refinement():
     assert -0.2 < bound.theta[2] <= 0.0
 
 
+@pytest.mark.ci
 def test_every_model_of_a_fit_meets_its_constraints():
     result = islands.fit(
         make_record(), library="polynomial", degree=3, lags=2, max_terms=6, constraints=TRUE[2]

@@ -94,6 +94,7 @@ ERRORS: dict[str, tuple[Callable[[Dataset], Dataset], str, set[str]]] = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("case", ERRORS)
 def test_gross_error_of_a_channel_that_the_simulation_reads_is_named(case: str) -> None:
     spoil, name, columns = ERRORS[case]
@@ -133,6 +134,7 @@ def test_constant_channel_remains_if_the_simulation_reads_it() -> None:
     assert found.record_findings == ()
 
 
+@pytest.mark.ci
 def test_correction_on_which_the_simulation_fails_is_rejected() -> None:
     def heat(u: np.ndarray, dt: float, gain: float = 1.0) -> np.ndarray:
         if (gain * u > 700.0).any():

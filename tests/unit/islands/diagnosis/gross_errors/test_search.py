@@ -162,6 +162,7 @@ def test_short_delay_is_an_effect_and_no_gross_error() -> None:
     assert run(move(RECORD, 5)).verdict != Verdict.GROSS_ERROR
 
 
+@pytest.mark.ci
 def test_simulation_that_resembles_its_input_is_not_compared_with_it() -> None:
     nominal = U + 0.2 * np.std(U) * np.sin(np.arange(U.size))
     clipped = replace(RECORD, y=np.clip(nominal, -0.1 * np.std(U), 0.1 * np.std(U)) + NOISE)

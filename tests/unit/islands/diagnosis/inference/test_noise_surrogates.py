@@ -45,6 +45,7 @@ def test_random_walk_begins_at_its_level_and_spreads(randomisation: Randomisatio
         assert spread[450] > 1.5 * spread[50]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("randomisation", Randomisation)
 def test_thresholds_hold_for_a_random_walk_whose_slow_part_is_absorbed(randomisation: Randomisation) -> None:
     """A calibration absorbs slow functions. What is left rarely exceeds the threshold of surrogates."""

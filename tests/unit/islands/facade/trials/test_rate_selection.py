@@ -164,6 +164,7 @@ def measurements(result):
     return [(each.model.parameters, each.metrics) for each in result.models]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("search", [fit_with_shooting, identify_in_two_epochs])
 def test_a_search_that_averages_equals_the_search_on_means(search):
     one, other = with_or_without_means(search)
