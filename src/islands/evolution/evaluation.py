@@ -30,7 +30,7 @@ from islands.kernels.pair_table import PLACE_BYTES, clear, complete_pairs, pair_
 from islands.program.regressor_matrix import select_rows
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
-from islands.simulation.predictors import divergence_bound
+from islands.simulation.predictors import find_divergence_bound
 
 #: Indices of y(k) and y(k-1), the first terms of every gene index.
 _TARGET = 0
@@ -115,7 +115,7 @@ class Evaluator:
         self.warm_up = settings.maximum_lag
         self._layout = layout(record, self.warm_up, FITNESSES[settings.fitness](settings.shooting))
         self._predicted = int(self._layout.length.sum())
-        self._bound = divergence_bound(record.y)
+        self._bound = find_divergence_bound(record)
         self._rows = select_rows(record, self.warm_up)
         self._constraint = constraint(settings.constraints)
         self._outcomes = _OUTCOMES | {

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.figures.style import REMARK, SIMULATED
-from islands.simulation.predictors import divergence_bound
+from islands.simulation.predictors import find_divergence_bound
 
 #: Smallest distance between two annotations, as a fraction of the axis width.
 _MIN_DISTANCE = 0.12
@@ -30,7 +30,7 @@ def finite_part(record: Dataset, simulated: NDArray[np.float64]) -> NDArray[np.f
             f"a simulation has one value for each of the record's {record.samples} samples, "
             f"got shape {values.shape}"
         )
-    values[~(np.abs(values) <= divergence_bound(record.y))] = np.nan
+    values[~(np.abs(values) <= find_divergence_bound(record))] = np.nan
     return values
 
 

@@ -20,7 +20,7 @@ from islands.kernels.characteristic_roots import converges
 from islands.models.clusters import OUTPUT_AT_REST, clusters
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
-from islands.simulation.predictors import divergence_bound, free_run
+from islands.simulation.predictors import find_divergence_bound, free_run
 from islands.systems.signals import hold_signal, minor_loops, sine
 
 #: Tolerance of the sum of a cluster.
@@ -336,7 +336,7 @@ def _make_excitations(record: Dataset, warm_up: int, signals: Sequence[NDArray[n
 
 def _simulate(model: DynamicModel, record: Dataset, excitations: Dataset) -> Iterator[NDArray[np.float64]]:
     """Yield the model's output in every segment of the excitations, NaN after a divergence."""
-    simulated = free_run(model, excitations, bound=divergence_bound(record.y)).y
+    simulated = free_run(model, excitations, bound=find_divergence_bound(record)).y
     for begin, end in excitations.bounds:
         yield simulated[begin + model.maximum_lag : end]
 

@@ -91,9 +91,9 @@ def describe_findings(found: SearchResult) -> list[str]:
     entry = found.recommended
     physics = (*found.recommendation.reasons, "")[1]
     failures = list(_list_failures(found, entry))
-    good = [*([physics] if physics and not physics.startswith("no model") else [])]
     bad = [*([physics] if physics.startswith("no model") else []), *failures]
-    good = [*_list_uses(entry, bool(bad)), *good]
+    uses = _list_uses(entry, bool(bad))
+    good = [*uses, *([physics] if physics and not physics.startswith("no model") else [])]
     return [
         _describe_error(found, entry),
         *_describe_recordings(found, entry),
