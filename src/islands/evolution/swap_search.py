@@ -5,7 +5,8 @@ adds the gene that reduces the shooting error most, exchanges single genes as lo
 continues with the next size. Its structures seed the evolution, which is not bound to the pool.
 """
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from math import inf
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, Population
+from islands.evolution.offspring import Offspring
 from islands.evolution.variation import Genes, with_required_genes
 from islands.expressions.tree import Expression
 from islands.kernels.breeding import Individuals
@@ -72,7 +74,8 @@ def swap_search(
             break
         steps.report(f"swap search among {len(pool)} candidates: {len(best) + 1} terms", None)
         found = search.extend(best)
-        start = _find_best([each for each in (found, search.best(len(best) + 1)) if each])
+        known = search.best(len(best) + 1)
+        start = min((each for each in (found, known) if each), key=_order, default=None)
         if start is None or start.size <= len(best):
             break
         exchanged = search.exchange(start, skip)
@@ -81,7 +84,10 @@ def swap_search(
 
 
 class _SwapSearch:
-    """Structures that were evaluated, by size and structure."""
+    """Structures that were evaluated, by size.
+
+    Most of them are compared by their errors alone, so that their individuals are not made.
+    """
 
     def __init__(self, evaluator: Evaluator, pool: Sequence[Expression]) -> None:
         # The numbers of genes are valid for the whole search: its evaluations fit into the caches.
@@ -89,7 +95,8 @@ class _SwapSearch:
         self._evaluator, self._index = evaluator, evaluator.gene_index
         self._pool = self._number(pool)
         self._required = self._number(with_required_genes((), evaluator.settings))
-        self._seen: dict[int, dict[tuple[str, ...], Individual]] = {}
+        self._found: dict[int, list[tuple[Offspring, NDArray[np.int64]]]] = defaultdict(list)
+        self._places: NDArray[np.int64] = np.empty(0, np.int64)
         self._evaluations = 0
 
     @property
@@ -134,28 +141,44 @@ class _SwapSearch:
         thresholds = [threshold] * (self._evaluator.settings.max_terms + 1)
         evaluated, _ = self._evaluator.evaluate_genes(structures, np.zeros(count, np.bool_), thresholds)
         self._evaluations += count
-        found = evaluated.take(np.flatnonzero(np.isfinite(evaluated.fitness)))
-        for each in found:
-            self._seen.setdefault(each.size, {}).setdefault(each.key, each)
-        return _find_best(found)
+        rows = np.flatnonzero(np.isfinite(evaluated.fitness))
+        self._keep(evaluated, rows)
+        return _find_best(evaluated, rows[evaluated.sizes[rows] == evaluated.sizes[rows].max(initial=0)])
+
+    def _keep(self, evaluated: Offspring, rows: NDArray[np.int64]) -> None:
+        """Keep the first individual of each structure."""
+        places, first = np.unique(evaluated.places[rows], return_index=True)
+        new = ~np.isin(places, self._places)
+        self._places = np.concatenate([self._places, places[new]])
+        rows = rows[first[new]]
+        sizes = evaluated.sizes[rows]
+        for size in np.unique(sizes).tolist():
+            self._found[size].append((evaluated, rows[sizes == size]))
 
     def best(self, size: int) -> Individual | None:
         """Return the best structure of a size."""
-        return _find_best(self._seen.get(size, {}).values())
+        found = (_find_best(*each) for each in self._found.get(size, ()))
+        return min((each for each in found if each), key=_order, default=None)
 
     def ranked(self, depth: int) -> tuple[Population, ...]:
         """Return the best structures of every size."""
-        return tuple(
-            tuple(sorted(found.values(), key=_order)[:depth]) for _, found in sorted(self._seen.items())
-        )
+        return tuple(_rank(found, depth) for _, found in sorted(self._found.items()))
 
 
-def _find_best(individuals: Collection[Individual]) -> Individual | None:
-    """Return the first individual by `_order`, whose texts decide between equal errors only."""
-    least = min(((-each.size, each.fitness) for each in individuals), default=None)
-    return min(
-        (each for each in individuals if (-each.size, each.fitness) == least), key=_order, default=None
-    )
+def _find_best(evaluated: Offspring, rows: NDArray[np.int64]) -> Individual | None:
+    """Return the first of some individuals of one size; their texts decide between equal errors."""
+    errors = evaluated.fitness[rows]
+    return min(evaluated.take(rows[errors == errors.min(initial=inf)]), key=_order, default=None)
+
+
+def _rank(found: Sequence[tuple[Offspring, NDArray[np.int64]]], depth: int) -> Population:
+    """Return the first individuals of one size."""
+    errors = np.sort(np.concatenate([evaluated.fitness[rows] for evaluated, rows in found]))
+    limit = errors[min(depth, errors.size) - 1]
+    first = [
+        each for evaluated, rows in found for each in evaluated.take(rows[evaluated.fitness[rows] <= limit])
+    ]
+    return tuple(sorted(first, key=_order)[:depth])
 
 
 def _order(individual: Individual) -> tuple[int, float, tuple[str, ...]]:
