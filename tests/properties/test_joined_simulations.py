@@ -16,7 +16,7 @@ from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LinearSpec
-from support.simulated_records import SAMPLES, made, names
+from support.simulated_records import SAMPLES, made, name_parameters
 
 pytestmark = pytest.mark.usefixtures("toy_class")
 
@@ -54,9 +54,7 @@ def take_part(record: Dataset) -> list[Dataset]:
 SLOW = ("second-order", "held", "extended", "fmu")
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.ci) if name in SLOW else name for name in names()]
-)
+@pytest.mark.parametrize("name", name_parameters(SLOW))
 def test_simulation_of_joined_recordings_is_that_of_each(name: str) -> None:
     record, columns = made()[name].record, made()[name].columns
     alone = make_simulation(name, slice(0, SAMPLES))
@@ -90,7 +88,7 @@ def test_simulation_of_joined_recordings_is_that_of_each(name: str) -> None:
     assert whole.simulate(values).tolist() == np.concatenate(expected).tolist()
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", name_parameters())
 def test_one_segment_is_a_single_recording(name: str) -> None:
     alone = make_simulation(name, slice(0, SAMPLES))
     given = replace(alone, context=replace(alone.context, segments=(SAMPLES,)))

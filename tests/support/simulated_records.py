@@ -1,13 +1,14 @@
 """A specification of every simulator, each with a short record that the simulator could have produced."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+import pytest
 import scipy
 from numpy.typing import NDArray
 
@@ -89,6 +90,21 @@ def names() -> list[str]:
     ]
 
 
+def name_parameters(slow: Collection[str] = ("fmu",)) -> list[object]:
+    """Return the names as parameters of a test, those of slow simulators for the level ci."""
+    return [pytest.param(name, marks=pytest.mark.ci) if name in slow else name for name in names()]
+
+
+class _Made(dict[str, SpecAndRecord]):
+    """Specifications and records by name; the FMU is compiled when it is first asked for."""
+
+    def __missing__(self, name: str) -> SpecAndRecord:
+        if name != "fmu":
+            raise KeyError(name)
+        self[name] = SpecAndRecord(FmuSpec(kind="fmu", file=write_fmu()), self["second-order"].record)
+        return self[name]
+
+
 def wave(samples: int = SAMPLES, dt: float = DT) -> NDArray[np.float64]:
     """Return a sum of five sines without a common period in the record."""
     t = dt * np.arange(samples)
@@ -136,11 +152,7 @@ def made() -> Mapping[str, SpecAndRecord]:
     plain = recorded(u, 0.8 * u + 0.01 * rng.standard_normal(u.size))
     oscillator = recorded(u, oscillation, units=("N", "m"))
     spring = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})
-    fmus = {}
-    if "fmu" in names():
-        fmus["fmu"] = SpecAndRecord(FmuSpec(kind="fmu", file=write_fmu()), oscillator)
-    return {
-        **fmus,
+    found = {
         "bouc-wen-piezo": SpecAndRecord(PhysicalSpec(kind="bouc-wen-piezo"), plain),
         "second-order": SpecAndRecord(spring, oscillator),
         "rigid-axis": SpecAndRecord(
@@ -195,6 +207,7 @@ def made() -> Mapping[str, SpecAndRecord]:
             oscillator,
         ),
     }
+    return _Made(found)
 
 
 def extension(core: LocalSpec, **effect: object) -> dict[str, object]:

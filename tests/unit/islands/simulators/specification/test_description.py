@@ -31,7 +31,7 @@ from islands.simulators.specification.table import (
     innermost,
     parse_spec,
 )
-from support.simulated_records import SpecAndRecord, made, names
+from support.simulated_records import SpecAndRecord, made, name_parameters, names
 
 pytestmark = pytest.mark.usefixtures("toy_class")
 
@@ -44,7 +44,7 @@ FAST = ("bouc-wen-piezo", "column", "extended")
 TRANSIENT = 100
 
 
-@pytest.fixture(params=NAMES)
+@pytest.fixture(params=name_parameters())
 def case(request: pytest.FixtureRequest) -> SpecAndRecord:
     return made()[request.param]
 
