@@ -146,7 +146,7 @@ def quick_self_test(
 @pytest.mark.parametrize(
     ("clean", "effects", "quick"),
     [
-        pytest.param(40, None, True, id="stub"),
+        pytest.param(40, None, True, id="stub", marks=pytest.mark.ci),
         pytest.param(4, ("offset",), False, id="small", marks=pytest.mark.ci),
         pytest.param(40, None, False, id="whole", marks=pytest.mark.nightly),
     ],

@@ -58,6 +58,7 @@ def files() -> Iterator[tuple[str, str]]:
                 continue
 
 
+@pytest.mark.ci
 def test_no_file_installs_the_project_by_name():
     found = {(path, "".join(match.groups(""))) for path, text in files() for match in BY_NAME.finditer(text)}
     # Extras that consist of other extras.

@@ -162,6 +162,7 @@ def test_thresholds_are_ignored_if_abandonment_is_disabled():
     assert complete.evaluate(population, [0.0] * 6) == Evaluator(record(), CONSTRAINED).evaluate(population)
 
 
+@pytest.mark.ci
 def test_threshold_equal_to_the_fitness_abandons_nothing():
     for name, setting in SETTINGS.items():
         known = [evaluate_alone(name, place, False) for place in range(len(POOL))]

@@ -85,6 +85,7 @@ def test_claims_of_backlogged_owners_are_in_proportion_to_their_weights(fair, we
                 assert abs(shares[0] - shares[1]) <= bound * (1 + 1e-6)
 
 
+@pytest.mark.ci
 @few
 @given(st.integers(2, 4), st.integers(1, 400), st.integers(4, 24))
 def test_backlogged_owners_of_equal_weight_are_served_in_turn(fair, several, weight, count):

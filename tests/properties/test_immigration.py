@@ -102,6 +102,7 @@ def test_first_immigrants_are_taken_of_equal_or_too_many(replaced):
     assert {id(each) for each in after.population} == {id(one), id(two)}
 
 
+@pytest.mark.ci
 @given(islands(), arrivals())
 def test_worst_policy_evaluates_abandoned_individuals(island, arriving):
     after = receive_migrants(island, arriving, evaluator(), replace(SETTINGS, replaced="worst"))

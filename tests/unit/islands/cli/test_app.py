@@ -190,6 +190,7 @@ def test_simulate_writes_prediction_bands(run, fitted):
     assert (code, "need a model of a result folder" in error) == (2, True)
 
 
+@pytest.mark.ci
 def test_simulate_prints_the_errors_that_the_result_reports(run, fitted):
     result = json.loads(Path("out/result.json").read_text())
     files = {f"out/models/{entry['rank']:02d}.json": entry for entry in result["models"]}

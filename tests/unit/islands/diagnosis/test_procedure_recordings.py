@@ -50,6 +50,7 @@ def test_effect_is_named_and_predicts_whole_recordings(found: Diagnosis) -> None
     assert found.gain.before.rmse > 3 * SIGMA
 
 
+@pytest.mark.ci
 def test_every_recording_has_its_own_initial_state(found: Diagnosis) -> None:
     # A recording that is held out as a whole too: its initial state is fitted, and nothing else.
     assert get_initial_states(found) == pytest.approx(np.ravel(STATES), abs=0.01)
@@ -64,6 +65,7 @@ def test_held_out_recordings_do_not_change_the_estimate(stiffened: Dataset, foun
     assert other.candidates == found.candidates
 
 
+@pytest.mark.ci
 def test_extended_simulation_fits_the_initial_states_of_new_recordings(
     stiffened: Dataset, found: Diagnosis
 ) -> None:
@@ -74,6 +76,7 @@ def test_extended_simulation_fits_the_initial_states_of_new_recordings(
     assert np.sqrt(np.mean(error**2)) == pytest.approx(SIGMA, rel=0.2)
 
 
+@pytest.mark.ci
 def test_clean_recordings_have_no_discrepancy() -> None:
     found = islands.diagnose(islands.join(oscillator_recordings(3)), "second-order", effects=FEW)
     assert found.verdict == Verdict.NOTHING
@@ -134,6 +137,7 @@ def test_complete_catalogue_names_friction_only_if_there_is_some(seed: int) -> N
     assert clean.verdict == Verdict.NOTHING
 
 
+@pytest.mark.ci
 def test_noise_of_surrogates_is_independent_between_recordings(found: Diagnosis) -> None:
     record = found.record
     surrogates = make_surrogates(found, make_simulator("second-order", record), {})

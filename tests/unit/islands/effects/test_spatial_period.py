@@ -102,6 +102,7 @@ def test_cogging_of_an_axis_is_named_with_its_pitch() -> None:
     assert np.hypot(values["cosine"], values["sine"]) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.ci
 def test_the_cyclic_error_of_an_encoder_is_named_with_its_period() -> None:
     """The simulation is a gain; the error is three tenths of the noise."""
     rng = np.random.default_rng(5)

@@ -48,6 +48,7 @@ def record() -> tuple[islands.Dataset, Signal]:
     return islands.Dataset(np.column_stack([u, temperature]), y, 0.01, ("u_V", "T_degC"), "y_um"), simulated
 
 
+@pytest.mark.ci
 def test_user_defined_effect_is_named(record: tuple[islands.Dataset, Signal]) -> None:
     data, simulated = record
     found = islands.diagnose(
@@ -71,6 +72,7 @@ def _proportional(u: Signal, dt: float, gain: float = 0.8) -> Signal:
     return gain * u
 
 
+@pytest.mark.ci
 def test_function_simulator_is_diagnosed_like_the_function_of_a_file(
     record: tuple[islands.Dataset, Signal], tmp_path: Path
 ) -> None:

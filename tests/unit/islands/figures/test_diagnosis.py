@@ -84,6 +84,7 @@ def test_lines_are_interrupted_between_recordings() -> None:
     ] * 2
 
 
+@pytest.mark.ci
 def test_residual_structure_does_not_reach_across_recordings() -> None:
     divided = draw_residual(divide(900, 600)).axes
     single = residual_figure().axes

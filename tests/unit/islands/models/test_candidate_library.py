@@ -143,6 +143,7 @@ def test_too_large_library_is_refused_before_it_is_built():
         candidates("phi-polynomial", 500, 1_000_000, 9)
 
 
+@pytest.mark.ci
 def test_candidate_limit_applies_to_the_library_not_the_full_set():
     # The full set has 435 897 monomials of degree 5 in 16 + 16 lags; phi-polynomial has a hundredth of them.
     assert full_set(5, 16, 16) == 435_897

@@ -27,6 +27,7 @@ def find_servers(pid):
     return [child for child, line in descendants(pid).items() if "intake.fork_server" in line]
 
 
+@pytest.mark.ci
 def test_a_server_that_has_ended_is_started_again(programs):
     server = programs("import os; print(os.getppid(), flush=True)")
     pids = []

@@ -39,6 +39,7 @@ def interrupted_map(function: object, arguments: Iterable[object]) -> Iterator[o
     raise KeyboardInterrupt
 
 
+@pytest.mark.ci
 def test_interrupted_diagnosis_continues_with_its_fits(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt), keep_fits(tmp_path / "out") as journal:
         run(RECORD, journal, interrupted_map)

@@ -63,7 +63,7 @@ def find(law: str) -> tuple[Dataset, Diagnosis]:
 
 
 @pytest.mark.parametrize(
-    "law", [pytest.param(law, marks=() if law == "u**5" else pytest.mark.nightly) for law in LAWS]
+    "law", [pytest.param(law, marks=pytest.mark.ci if law == "u**5" else pytest.mark.nightly) for law in LAWS]
 )
 def test_missing_term_of_a_recorded_output_is_found(law: str) -> None:
     _, found = find(law)
@@ -100,6 +100,7 @@ def test_right_simulation_gets_no_terms(seed: int) -> None:
     assert found.discovery is None
 
 
+@pytest.mark.ci
 def test_effect_of_the_catalogue_keeps_its_name() -> None:
     record = make_record(lambda u, _rate, _y: 2e-4 * u**3)
     found = diagnose(record, make_column(record))

@@ -65,6 +65,7 @@ def test_channel_that_is_constant_until_the_hold_out_part_is_left_out() -> None:
     assert finding.name == "constant-channel"
 
 
+@pytest.mark.ci
 def test_copy_of_the_output_is_no_cause_of_a_gain() -> None:
     """Coupling of a copy of the output would explain the misfit."""
     found = islands.diagnose(

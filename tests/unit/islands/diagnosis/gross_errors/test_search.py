@@ -149,6 +149,7 @@ def test_sampling_time_at_which_the_simulation_diverges_is_advised() -> None:
         diagnose(replace(RECORD, dt=1000 * DT), simulator, TOLERANCE, catalogue=())
 
 
+@pytest.mark.ci
 def test_free_parameters_absorb_a_unit_but_not_the_sign() -> None:
     assert run(replace(RECORD, y=1e3 * RECORD.y), free=True).verdict == Verdict.NOTHING
     flipped = run(replace(RECORD, y=-RECORD.y), free=True)

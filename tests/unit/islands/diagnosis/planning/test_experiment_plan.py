@@ -39,6 +39,7 @@ def plan() -> islands.ExperimentPlan:
     )
 
 
+@pytest.mark.ci
 def test_the_decisive_experiment_is_for_inseparable_pairs(
     plan: islands.ExperimentPlan,
 ) -> None:

@@ -196,6 +196,7 @@ def test_initial_sizes_are_limited_by_the_maximum_sizes(changes, expected):
     assert {name: made[name] for name in changes} == changes
 
 
+@pytest.mark.ci
 def test_select_fitness_recommends_the_model_of_least_training_error():
     """The choice of Appendix A of the paper: validation data have no influence, also if a model diverges."""
     estimation = appendix.soft_record(appendix.S2, seed=1)

@@ -108,6 +108,7 @@ def test_a_wrong_size_of_an_unused_array_does_no_harm(archive):
     assert read_record(archive(x=member(U, (2**40,))), ["u"], "y").samples == 60
 
 
+@pytest.mark.ci
 def test_a_nearly_constant_signal_may_use_the_full_compression_ratio(tmp_path):
     hold = np.repeat([0.0, 1.0], 500_000)
     np.savez_compressed(tmp_path / "r.npz", u=hold, y=hold, dt=0.1)

@@ -38,7 +38,7 @@ pytestmark = pytest.mark.usefixtures("toy_class")
 NAMES = names()
 
 #: Simulators whose effects are tested one by one at the fast level.
-FAST = ("bouc-wen-piezo", "column", "extended")
+FAST = ("bouc-wen-piezo", "column")
 
 #: Samples after which the free run of a model no longer depends on its initial outputs.
 TRANSIENT = 100

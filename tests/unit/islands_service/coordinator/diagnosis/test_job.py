@@ -61,6 +61,7 @@ def phases(store: Store, job: Job) -> list[str]:
     return [phase for phase, _ in groupby(reported)]
 
 
+@pytest.mark.ci
 def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs, submit: Submit) -> None:
     job = submit()
     document = run_job(claim(store), store, blobs).document or {}

@@ -83,6 +83,7 @@ def test_files_of_an_earlier_run_are_deleted(run, tmp_path):
     assert read_checkpoint(tmp_path / "out/checkpoint.json")[1]["job"]["seed"] == 9
 
 
+@pytest.mark.ci
 def test_hall_of_fame_of_all_islands_is_written_with_the_checkpoint(run, tmp_path):
     assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 0
     archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")

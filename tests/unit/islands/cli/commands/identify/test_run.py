@@ -70,6 +70,7 @@ def test_ctrl_c_in_the_last_generation_leaves_out_the_refinement(run, interrupte
     assert models(tmp_path / "out") == models(tmp_path / "whole")
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("signals", "code"),
     [((signal.SIGINT, signal.SIGINT), 130), ((signal.SIGTERM, signal.SIGTERM), 0)],
