@@ -1,4 +1,4 @@
-"""Pages that are files of the repository's root: contributing guide and changelog."""
+"""Pages that are files of the repository's root: the README as home, contributing guide and changelog."""
 
 import re
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 
 #: Page of the site for a file of the root.
-SOURCES = {"contributing.md": "CONTRIBUTING.md", "changelog.md": "CHANGELOG.md"}
+SOURCES = {"index.md": "README.md", "contributing.md": "CONTRIBUTING.md", "changelog.md": "CHANGELOG.md"}
 
 _LINK = re.compile(r"\[([^\]]+)\]\(([^)\s]+)\)")
 

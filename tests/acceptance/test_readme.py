@@ -1,4 +1,4 @@
-"""Commands of the README, run in their order in an empty folder."""
+"""Commands of the README, run in their order in an empty folder, and the output that the first steps show."""
 
 import re
 import shlex
@@ -10,18 +10,24 @@ from pathlib import Path
 
 import pytest
 
+import islands
 from islands.io.models import read_model
+from support import pages
 from support.command_line import succeed
+from support.repository import DOCS
 from support.undrawn import undrawn_figures
 
 README = Path(__file__).parents[2] / "README.md"
+
+#: The first steps show output of two commands of the README.
+FIRST_MODEL = DOCS / "getting-started/first-model.md"
 
 #: Commands with separate tests: they start services, or search for half a minute.
 ELSEWHERE = ("identify", "serve", "jobs")
 
 
-def read_commands() -> list[list[str]]:
-    lines = re.findall(r"^ {4}islands (.*)$", README.read_text(encoding="utf-8"), re.MULTILINE)
+def read_commands(page: Path) -> list[list[str]]:
+    lines = re.findall(r"^ {4}islands (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     words = [shlex.split(line, comments=True) for line in lines]
     return [each for each in words if each[0] not in ELSEWHERE]
 
@@ -34,7 +40,7 @@ def test_every_command_runs_and_the_shown_equation_is_that_of_the_result(tmp_pat
     )
     assert shown is not None
     with chdir(tmp_path), undrawn_figures():
-        commands = read_commands()
+        commands = read_commands(README)
         assert {each[0] for each in commands} >= {
             "examples",
             "fit",
@@ -51,7 +57,24 @@ def test_every_command_runs_and_the_shown_equation_is_that_of_the_result(tmp_pat
             else:
                 succeed(*words)
         assert shown[0] in Path("motor/summary.txt").read_text(encoding="utf-8")
+        check_first_model(FIRST_MODEL)
         assert read_model(Path("motor/models/01.json")).input_names == ("drive_V",)
         (program,) = re.findall(r"^```python\n(.*?)^```", README.read_text(encoding="utf-8"), re.M | re.S)
         Path("program.py").write_text(program, encoding="utf-8")
         subprocess.run([sys.executable, "program.py"], check=True, timeout=120)
+
+
+def check_first_model(page: Path) -> None:
+    """Compare the blocks of a page with the record and the results in the current folder."""
+    for words in read_commands(page):
+        if "--out" in words and not Path(words[words.index("--out") + 1]).exists():
+            succeed(*words)
+    record, *outputs = (code for language, code in pages.blocks(page) if language == "text")
+    assert Path("motor.csv").read_text(encoding="utf-8").startswith(record)
+    summaries = "".join(
+        Path(f"{name}/summary.txt").read_text(encoding="utf-8") for name in ("motor", "piezo")
+    )
+    assert len(outputs) > 2
+    assert not [output for output in outputs if output not in summaries]
+    (program,) = (code for language, code in pages.blocks(page) if language == "c")
+    assert program in islands.load("motor").export("c")

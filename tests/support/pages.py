@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import yaml
 from hooks import expand_nav, nav_pages, written_pages
+from project_pages import SOURCES
 
 from islands_api.cli.app import COMMANDS
 from support.repository import DOCS, ROOT
@@ -76,7 +77,7 @@ def site_pages() -> set[str]:
 
 def is_generated(page: str) -> bool:
     """Return whether the site generates a page, given its path below ``docs/``."""
-    return page in {"contributing.md", "changelog.md"} or page.startswith(("reference/", "tutorials/"))
+    return page in SOURCES or page.startswith(("reference/", "tutorials/"))
 
 
 def commands(page: Path) -> Iterator[str]:
