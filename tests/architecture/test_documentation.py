@@ -57,6 +57,12 @@ def test_every_written_page_is_in_the_navigation() -> None:
     assert pages.written_pages() <= pages.site_pages()
 
 
+def test_the_search_finds_an_entry_for_what_newcomers_ask() -> None:
+    """The search of the site prefers words in headings."""
+    asked = {"overfitting", "extrapolation", "nan", "divergence", "dead-time", "gross-error", "arx"}
+    assert asked <= pages.anchors(DOCS / "glossary.md")
+
+
 def test_every_page_of_the_navigation_exists_or_is_generated() -> None:
     missing = [page for page in pages.site_pages() - pages.written_pages() if not pages.is_generated(page)]
     assert not missing
