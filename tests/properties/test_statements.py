@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 import islands
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.io.result_text.model_description import describe
+from islands.io.result_folder import result_document
+from islands.io.result_text.statements import describe
 from islands.io.result_text.summary_text import summary
 from islands.reports.identification import identification_report
 from islands.simulation.outcome import EvaluationOutcome, Status
@@ -120,8 +121,9 @@ def make_result(choices):
 @given(CHOICES)
 def test_no_two_sentences_of_a_result_contradict_each_other(choices):
     result = make_result(choices)
-    assert not find_contradictions(" ".join(describe(result)))
-    assert not find_contradictions(summary(result))
+    document = result_document(result)
+    assert not find_contradictions(" ".join(describe(document)))
+    assert not find_contradictions(summary(document, result.recommended.model))
 
 
 @given(CHOICES)
@@ -135,7 +137,7 @@ def test_the_sentences_of_the_report_do_not_contradict_each_other(choices):
 def test_no_two_sentences_about_a_record_contradict_each_other(name):
     data, _ = KINDS[name].record(seed=0)
     result = islands.fit(data).search_result
-    assert not find_contradictions(summary(result))
+    assert not find_contradictions(str(islands.Result.from_search(result)))
     assert not find_contradictions(identification_report(name, result, {}).decode())
 
 
@@ -154,7 +156,7 @@ def test_no_two_sentences_about_an_awkward_record_contradict_each_other(fault):
     if fault in ("sentinels", "spikes"):
         y[[100, 500, 1000]] = -9999.0 if fault == "sentinels" else 12.0
     result = islands.fit(Dataset(u, y, 0.1, ("valve",), "level")).search_result
-    assert not find_contradictions(summary(result))
+    assert not find_contradictions(str(islands.Result.from_search(result)))
 
 
 def test_the_checker_finds_the_contradictions_that_were_printed():

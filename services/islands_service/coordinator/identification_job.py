@@ -26,7 +26,7 @@ from islands.facade.results.identification import Result
 from islands.io.checkpoints import history_document
 from islands.io.models import NARX, model_json
 from islands.io.result_folder import result_document
-from islands.io.result_text.model_description import describe
+from islands.io.result_text.statements import describe
 from islands.progress import PhasedProgress, ProgressCallback, StoppedError, TimeLeft
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
@@ -226,6 +226,7 @@ def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> Job
     if ended_by:
         found = replace(found, search=replace(found.search, ended_by=ended_by))
     document = result_document(found)
+    words = describe(document)
     models = document.pop("models")
     recommended = document["recommended"]
     best = models[recommended["rank"] - 1]
@@ -233,7 +234,7 @@ def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> Job
         "models": len(models),
         "rank": recommended["rank"],
         "reasons": recommended["reasons"],
-        "words": "\n".join([*describe(found), *([f"Note: {note}."] if note else [])]),
+        "words": "\n".join([*words, *([f"Note: {note}."] if note else [])]),
         "equation": found.recommended.model.equation().line,
         "size": best["size"],
         "metrics": best["metrics"]["validation"]["free_run"],

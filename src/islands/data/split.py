@@ -1,5 +1,6 @@
 """Split of the data into an estimation part and a validation part."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -105,23 +106,41 @@ def split_data(record: Dataset, validation: Dataset | float) -> Split:
     return parts
 
 
+def measure_input_ranges(record: Dataset) -> list[tuple[float, float]]:
+    """Return the least and the largest value of every input."""
+    return [(float(signal.min()), float(signal.max())) for signal in record.u.T]
+
+
 def describe_extrapolation(parts: Split) -> list[str]:
-    """State every input of the validation data that leaves the range of the estimation data.
+    """State every input of the validation data that leaves the range of the estimation data."""
+    record = parts.estimation
+    ranges = map(measure_input_ranges, (parts.estimation, parts.validation))
+    return compare_input_ranges(record.input_names, record.input_units, *ranges)
+
+
+def compare_input_ranges(
+    names: Sequence[str],
+    units: Sequence[str],
+    estimated: Sequence[Sequence[float]],
+    validated: Sequence[Sequence[float]],
+) -> list[str]:
+    """State every input whose range in the validation data leaves that in the estimation data.
 
     An excess of at most 5 % of the range does not count.
+
+    Parameters
+    ----------
+    names, units : sequence of str
+        Of the inputs.
+    estimated, validated : sequence of (float, float)
+        Least and largest value of every input in the estimation data and in the validation data.
     """
     found = []
-    for place, name in enumerate(parts.estimation.input_names):
-        (low, high), (lowest, highest) = (
-            (float(part.u[:, place].min()), float(part.u[:, place].max()))
-            for part in (parts.estimation, parts.validation)
-        )
+    for name, unit, (low, high), (lowest, highest) in zip(names, units, estimated, validated, strict=True):
         allowed = _NEGLIGIBLE_EXCESS * (high - low)
         if lowest < low - allowed or highest > high + allowed:
-            channel = parse_channel_name(name).base
-            unit = parts.estimation.input_units[place]
             found.append(
-                f"{channel} is {lowest:.4g} to {highest:.4g} {unit}".rstrip()
+                f"{parse_channel_name(name).base} is {lowest:.4g} to {highest:.4g} {unit}".rstrip()
                 + f" in the validation data and {low:.4g} to {high:.4g} {unit}".rstrip()
                 + " in the estimation data"
             )

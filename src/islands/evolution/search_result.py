@@ -134,11 +134,6 @@ class SearchResult:
         return "hysteresis" in self.settings["constraints"]
 
     @property
-    def claims_hysteresis(self) -> bool:
-        """Whether the search is for models of hysteresis, or found a model with Property 1."""
-        return self.requires_property_1 or any(entry.physics.property_1 for entry in self.models)
-
-    @property
     def has_loop(self) -> bool:
         """Whether the output over the input is a loop, or models of hysteresis were searched for."""
         return self.requires_property_1 or has_loops(self.split.validation)

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.inspection.channel import Channel, describe_amount
+from islands.inspection.channel import Channel, channels, describe_amount
 from islands.inspection.fact import Fact
+from islands.inspection.quantisation import find_quantisation
 
 #: Order of the differences that separate the noise from the signal.
 _ORDER = 4
@@ -74,6 +75,12 @@ def measure_noise(channel: Channel, record: Dataset, quantisation: Fact) -> Fact
     error = 2.0 * float(np.std(parts)) / len(parts) ** 0.5 if len(parts) > 1 else value
     text = f"{name} has white noise of {describe_amount(value, unit)} rms ({part})."
     return Fact("noise", name, value, unit, (max(0.0, value - error), value + error), None, text)
+
+
+def measure_output_noise(record: Dataset) -> float | None:
+    """Return the standard deviation of the white noise of the output; None if it cannot be separated."""
+    *_, output = channels(record)
+    return measure_noise(output, record, find_quantisation(output)).value
 
 
 def _may_be_signal(channel: Channel, record: Dataset, level: float) -> bool:

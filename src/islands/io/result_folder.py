@@ -12,13 +12,16 @@ from typing import Any
 import numpy as np
 
 from islands.data.dataset import Dataset
+from islands.data.split import measure_input_ranges
 from islands.evolution.search_result import SearchResult
+from islands.inspection.noise import measure_output_noise
 from islands.io.certificates import certificates_document
 from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
 from islands.models.coupled_narx import AnyModel
-from islands.models.narx import Model
+from islands.models.equations import named_signals, named_statement
+from islands.models.narx import Model, require_narx
 from islands.models.signal_statement import describe_signals
 from islands.parallel import map_over_record
 from islands.validation.assessment import PARTS, Assessment
@@ -32,11 +35,17 @@ SCHEMA = "islands.result/1"
 
 def result_json(found: SearchResult) -> str:
     """Return the text of ``result.json``."""
-    return json.dumps(result_document(found), indent=2, allow_nan=False) + "\n"
+    return _write_json(result_document(found))
+
+
+def _write_json(document: Mapping[str, Any]) -> str:
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
 def result_document(found: SearchResult) -> dict[str, Any]:
     """Return a result as JSON values; NaN and infinity become null."""
+    # The checks of a model are made when they are first read.
+    list(map_over_record(attrgetter("physics", "residual_tests"), found.models, found.record.samples))
     search, recommendation = found.search, found.recommendation
     document = {
         "schema": SCHEMA,
@@ -66,6 +75,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
                 name: {"bytes": size, "limit": limit} for name, (size, limit) in search.caches.items()
             },
         },
+        "data": _data_document(found),
         "loop": found.has_loop,
         "recommended": asdict(recommendation),
         "models": [
@@ -93,6 +103,17 @@ def record_document(record: Dataset) -> dict[str, Any]:
     }
 
 
+def _data_document(found: SearchResult) -> dict[str, Any]:
+    """Return the facts about the data that the statements about a result read."""
+    parts = {"estimation": found.split.estimation, "validation": found.split.validation}
+    return {
+        "missing_outputs": int(np.isnan(found.record.y).sum()),
+        "output_range": found.record.output_range,
+        "noise": measure_output_noise(found.split.estimation),
+        "inputs": {part: measure_input_ranges(record) for part, record in parts.items()},
+    }
+
+
 def content_sha256(record: Dataset) -> str:
     """Return the SHA-256 of the samples, sampling time and segments, for records not read from a file."""
     digest = hashlib.sha256(np.ascontiguousarray(record.u).tobytes())
@@ -113,6 +134,8 @@ def _model_document(
         "equation": written.line,
         "latex": written.latex,
         "signals": describe_signals(model),
+        "named_equation": written.named,
+        "named_signals": named_signals(model),
         "terms": terms_in_result(model, ensemble),
         "bands": bands_document(assessment.bands),
         "metrics": {
@@ -127,7 +150,10 @@ def _model_document(
         },
         "warm_up": assessment.warm_up,
         "information": asdict(assessment.information),
-        "constraints": [asdict(entry) for entry in assessment.constraints],
+        "constraints": [
+            {**asdict(entry), "named": named_statement(entry.text, require_narx(model))}
+            for entry in assessment.constraints
+        ],
         "physics": physics_document(assessment.physics),
         "residual_tests": residual_tests_document(assessment.residual_tests)
         | residual_structure_document(assessment.residual_structure),
@@ -151,7 +177,7 @@ def physics_document(physics: PhysicsChecks) -> dict[str, Any]:
         "hold_drift_percent": physics.hold_drift_percent,
         "holds": [asdict(entry) for entry in physics.holds],
         "excursions": [asdict(entry) for entry in physics.excursions],
-        "extremes": [asdict(entry) for entry in physics.extremes],
+        "extremes": [{**asdict(entry), "plausible": entry.plausible} for entry in physics.extremes],
     }
 
 
@@ -199,13 +225,12 @@ def write_result(found: SearchResult, folder: Path) -> None:
     models.mkdir(parents=True, exist_ok=True)
     for path in models.glob("[0-9][0-9]*.json"):
         path.unlink()
-    # The checks of a model are made when they are first read.
-    list(map_over_record(attrgetter("physics", "residual_tests"), found.models, found.record.samples))
     for rank, entry in enumerate(found.models, start=1):
         write_model(entry.model, models / f"{rank:02d}.json")
-    (folder / "summary.txt").write_text(summary(found), encoding="utf-8")
+    document = result_document(found)
+    (folder / "summary.txt").write_text(summary(document, found.recommended.model), encoding="utf-8")
     (folder / "method.txt").write_text(method_text(found), encoding="utf-8")
-    (folder / "result.json").write_text(result_json(found), encoding="utf-8")
+    (folder / "result.json").write_text(_write_json(document), encoding="utf-8")
 
 
 def finite(value: Any) -> Any:

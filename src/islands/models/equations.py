@@ -105,7 +105,12 @@ def signal_names(model: SignalReference) -> tuple[str, ...]:
     They are the columns of the record. A unit in brackets is left out (``flow`` for ``flow (l/s)``), unless
     two signals would have the same name. Other names are written in brackets: ``[flow 2]``.
     """
-    columns = (model.output_name, *(parse_channel_name(name).base for name in model.input_names))
+    return name_columns(model.output_name, model.input_names)
+
+
+def name_columns(output: str, inputs: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of an output column and of input columns in the text of an equation."""
+    columns = (output, *(parse_channel_name(name).base for name in inputs))
     stems = [name if name.isidentifier() else parse_channel_name(name).stem for name in columns]
     return tuple(
         stem if stem.isidentifier() and stems.count(stem) == 1 else f"[{name}]"

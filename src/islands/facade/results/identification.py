@@ -16,8 +16,8 @@ from islands.facade.results.comparison import ResultComparison, compare_models
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
 from islands.figures.names import OVERVIEW, RESPONSES
-from islands.io.result_folder import content_sha256, write_result
-from islands.io.result_text.model_description import describe
+from islands.io.result_folder import content_sha256, result_document, write_result
+from islands.io.result_text.statements import describe
 from islands.io.result_text.summary_text import summary
 from islands.progress import Steps
 from islands.simulation.predictors import Simulation
@@ -243,17 +243,24 @@ class Result:
                     save(figure, folder / f"{name}.svg")
 
     def __str__(self) -> str:
-        if self._search_result is None:
+        if (document := self._describable_document()) is None:
             return (Path(self.folder or "") / "summary.txt").read_text(encoding="utf-8")
-        return summary(self._search_result)
+        return summary(document, self.best.model)
 
     def _repr_html_(self) -> str:
-        if self._search_result is None:
+        figure = None if self._search_result is None else self.best.plot()
+        if (document := self._describable_document()) is None:
             reasons = [f"Recommended: model {self.best.rank}: {'; '.join(self.recommendation.reasons)}"]
             return render_html(self.best.model, [*reasons, self.best.describe_error()])
         # The equation, which is indented, is shown in MathML.
-        sentences = [line for line in describe(self._search_result) if not line.startswith(" ")]
-        return render_html(self.best.model, sentences, self.best.plot())
+        sentences = [line for line in describe(document) if not line.startswith(" ")]
+        return render_html(self.best.model, sentences, figure)
+
+    def _describable_document(self) -> Mapping[str, Any] | None:
+        """Return ``result.json``; None for one of an earlier version, which lacks facts."""
+        if self._search_result is not None:
+            return result_document(self._search_result)
+        return self.document if "data" in self.document else None
 
 
 def _row(entry: FittedModel, recommended: bool) -> dict[str, object]:

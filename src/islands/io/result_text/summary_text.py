@@ -2,23 +2,32 @@
 
 from islands.evolution.search_result import SearchResult
 from islands.io.certificates import summarise_certificates
-from islands.io.result_text.model_description import describe_choice, describe_findings, describe_units
 from islands.io.result_text.model_table import table
+from islands.io.result_text.statements import Document, describe_choice, describe_findings, describe_units
 from islands.io.result_text.text_layout import LEGEND, term_table, wrap
 from islands.models.equations import named_signals
+from islands.models.protocol import DynamicModel
 
 
-def summary(found: SearchResult) -> str:
-    """Return the summary as lines of at most 80 characters, unless a name is longer."""
+def summary(document: Document, model: DynamicModel) -> str:
+    """Return the summary as lines of at most 80 characters, unless a name is longer.
+
+    Parameters
+    ----------
+    document : mapping
+        Content of ``result.json``.
+    model : DynamicModel
+        The recommended model.
+    """
     lines = [
-        *wrap(describe_choice(found)),
+        *wrap(describe_choice(document)),
         "",
-        *term_table(found.recommended.model),
+        *term_table(model),
         "",
-        *wrap(describe_units(found)),
-        *(line for sentence in describe_findings(found) for line in wrap(sentence)),
+        *wrap(describe_units(document)),
+        *(line for sentence in describe_findings(document) for line in wrap(sentence)),
         "",
-        *table(found),
+        *table(document),
         LEGEND,
     ]
     return "\n".join(lines) + "\n"

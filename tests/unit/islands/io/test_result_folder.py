@@ -11,7 +11,7 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.io.models import read_model, terms_document
-from islands.io.result_folder import content_sha256, result_json, write_result
+from islands.io.result_folder import content_sha256, result_document, result_json, write_result
 from islands.io.result_text.summary_text import summary
 from islands.simulation.outcome import EvaluationOutcome, Status
 from support.assessments import with_changes
@@ -54,8 +54,8 @@ def with_best(findings, **changes):
 def test_a_result_has_every_field_of_the_contract(findings):
     result = loaded(findings)
     assert list(result) == [
-        *("schema", "record", "preprocessing", "seed", "settings", "search", "loop", "recommended"),
-        *("models", "ensemble"),
+        *("schema", "record", "preprocessing", "seed", "settings", "search", "data", "loop"),
+        *("recommended", "models", "ensemble"),
     ]
     assert result["schema"] == "islands.result/1"
     assert list(result["record"]) == [
@@ -63,10 +63,12 @@ def test_a_result_has_every_field_of_the_contract(findings):
     ]
     contract = ["evaluations", "evaluations_per_second", "wall_s", "outcomes", "full_set"]
     assert list(result["search"])[:5] == contract
+    assert set(result["data"]) == {"missing_outputs", "output_range", "noise", "inputs"}
     assert set(result["search"]["full_set"]) == {"candidates", "bytes"}
     for model in result["models"]:
         assert list(model) == [
-            *("rank", "recommended", "size", "equation", "latex", "signals", "terms", "bands", "metrics"),
+            *("rank", "recommended", "size", "equation", "latex", "signals", "named_equation"),
+            *("named_signals", "terms", "bands", "metrics"),
             *("outcomes", "recordings", "warm_up", "information", "constraints", "physics", "residual_tests"),
         ]
         for term in model["terms"]:
@@ -78,7 +80,8 @@ def test_a_result_has_every_field_of_the_contract(findings):
                 assert all(inner is None or set(mode) == inner for mode in modes.values())
         assert set(model["information"]) == {"aic", "bic", "fpe"}
         (check,) = model["constraints"]
-        assert check == {"text": "hysteresis", "target": 0.0, "value": check["value"], "met": True}
+        text = "hysteresis"
+        assert check == {"text": text, "target": 0.0, "value": check["value"], "met": True, "named": text}
         assert check["value"] <= 1e-9
 
 
@@ -218,7 +221,9 @@ def test_the_folder_has_a_file_per_model_a_summary_and_a_result(findings, tmp_pa
     for rank, entry in enumerate(findings.models, start=1):
         assert read_model(tmp_path / "out" / "models" / f"0{rank}.json") == entry.model
     assert (tmp_path / "out" / "result.json").read_text() == result_json(findings)
-    assert (tmp_path / "out" / "summary.txt").read_text() == summary(findings)
+    assert (tmp_path / "out" / "summary.txt").read_text() == summary(
+        result_document(findings), findings.recommended.model
+    )
 
 
 def test_only_the_models_of_an_earlier_result_are_removed(findings, tmp_path):

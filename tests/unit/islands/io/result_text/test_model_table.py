@@ -6,7 +6,9 @@ from math import inf, nan
 import pytest
 
 import islands
-from islands.io.result_text.model_table import columns, number, rows, table
+from islands.io.result_folder import result_document
+from islands.io.result_text import model_table
+from islands.io.result_text.model_table import number
 from islands.simulation.outcome import EvaluationOutcome, Status
 from support.assessments import with_changes
 from support.searches import record
@@ -17,6 +19,14 @@ LOST = EvaluationOutcome(Status.DIVERGED, "|y| left 1e+06 at sample 17")
 @pytest.fixture(scope="module")
 def findings():
     return islands.fit(record(300), library="phi-polynomial", max_terms=4).search_result
+
+
+def columns(found):
+    return model_table.columns(result_document(found))
+
+
+def rows(found):
+    return model_table.rows(result_document(found))
 
 
 def with_first(findings, **changes):
@@ -30,7 +40,7 @@ def first_cells(findings, **changes):
 
 
 def test_the_table_has_a_row_per_model_and_aligned_columns(findings):
-    head, *lines = table(findings)
+    head, *lines = model_table.table(result_document(findings))
     assert head.split("  ")[0] == "rank"
     assert len(lines) == len(findings.models)
     assert len({len(line) for line in (head, *lines)}) == 1
@@ -74,5 +84,5 @@ def test_the_table_distinguishes_divergence_from_an_undefined_number(findings):
 
 def test_a_number_is_shown_in_the_given_format():
     assert number(0.12345, "{:.3f}", True) == "0.123"
-    assert number(inf, "{:.3f}", True) == number(nan, "{:.3f}", True) == "-"
+    assert number(None, "{:.3f}", True) == "-"
     assert number(0.12345, "{:.3f}", False) == "diverged"

@@ -9,7 +9,8 @@ import islands
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.expressions.parsing import parse
-from islands.io.result_text.model_description import describe
+from islands.io.result_folder import result_document
+from islands.io.result_text import statements
 from islands.io.result_text.model_table import table
 from islands.io.result_text.summary_text import method_text, summary
 from islands.models.equations import named_equation, named_term
@@ -32,6 +33,10 @@ def findings():
     return islands.fit(named, library="phi-polynomial", max_terms=4, seed=7).with_wall_time(0.5).search_result
 
 
+def describe(found):
+    return statements.describe(result_document(found))
+
+
 def said(findings, **changes):
     """Return the sentences by first word, for a result with one model whose assessment is changed."""
     changed = with_changes(findings.recommended, **changes)
@@ -48,12 +53,12 @@ def errors(findings, validation, **others):
 
 
 def test_the_summary_begins_with_sentences_and_contains_the_table(findings):
-    text = summary(findings)
+    text = str(islands.Result.from_search(findings))
     lines = text.splitlines()
     first, _equation, *sentences = describe(findings)
     for sentence in (first, *sentences):
         assert sentence.strip() in " ".join(text.split())
-    assert lines[-6:-1] == table(findings)
+    assert lines[-6:-1] == table(result_document(findings))
     assert lines[-1].startswith("* recommended; ranked by")
     assert max(map(len, lines)) <= 80
 
@@ -88,9 +93,9 @@ def test_uses_and_failures_follow_the_free_run(findings):
     assert "prediction one step ahead" in poor["Good for"]
     assert "simulation from the inputs alone: R2 0.300" in poor["Fails at"]
     lost = Metrics(nan, nan, nan, nan)
-    diverged = said(
-        findings, metrics=errors(findings, lost), outcomes={"validation": {"free_run": LOST}} | {}
-    )
+    outcomes = findings.recommended.outcomes
+    outcomes = {**outcomes, "validation": {**outcomes["validation"], "free_run": LOST}}
+    diverged = said(findings, metrics=errors(findings, lost), outcomes=outcomes)
     assert "the free run on the validation data diverges" in diverged["Error"]
 
 
@@ -168,6 +173,34 @@ def test_the_verdict_is_that_of_the_free_run(findings):
     assert found["Fails at"] == "Fails at: none of the checks."
     poor = said(findings, metrics=errors(findings, Metrics(20.0, 0.3, 2.0, 10.0)), residual_structure=fine)
     assert poor["As a simulation"].startswith("As a simulation: unsuitable")
+
+
+def test_the_verdict_has_the_error_against_the_noise_level(findings):
+    noisy = Metrics(20.0, 0.3, 2.0, 10.0)
+    found = statements.describe(with_noise(findings, 1.9, metrics=errors(findings, noisy)))
+    text = " ".join(found)
+    # Nothing can follow an output better than to its noise.
+    assert "RMSE at the noise level of y_um, 1.9 um" in text
+    assert "simulation from the inputs alone: R2" not in text
+    text = " ".join(statements.describe(with_noise(findings, 0.5, metrics=errors(findings, noisy))))
+    assert "As a simulation: unsuitable" in text
+    assert "RMSE 4 times the noise level of y_um, 0.5 um" in text
+    white = ResidualStructure(0.02, 0.02, 0.7, "adequate")
+    one = replace(noisy, rmse=0.8)
+    changed = errors(findings, noisy) | {"validation": {"free_run": noisy, "one_step_ahead": one}}
+    changed["validation"] |= {"multiple_shooting": noisy}
+    document = with_noise(findings, None, metrics=changed, residual_structure=white)
+    assert "RMSE 2.5 times that one step ahead, whose residual is not predictable" in " ".join(
+        statements.describe(document)
+    )
+
+
+def with_noise(findings, noise, **changes):
+    """Return the document of a result with one changed model and a noise level of the output."""
+    changed = with_changes(findings.recommended, **changes)
+    document = result_document(replace(findings, models=(changed,)))
+    document["data"]["noise"] = noise
+    return document
 
 
 def test_an_output_that_escapes_at_an_extreme_is_a_failure_with_the_input(findings):
@@ -251,7 +284,7 @@ def test_constraints_of_the_user_are_stated_with_the_names_of_the_record(finding
     statements = "[u2(k-1)] >= 0; gain(u2) = 0"
     settings = {"library": "polynomial", "degree": 1, "lags": 1, "max_terms": 2, "certificate": 0}
     found = islands.fit(named[:400], constraints=statements, average=1, **settings).search_result
-    lines = summary(found).splitlines()
+    lines = summary(result_document(found), found.recommended.model).splitlines()
     assert "Constraints that the model meets: [valve(k-1)] >= 0; gain(valve) = 0." in lines
     checks = [
         replace(check, value=value, met=False)

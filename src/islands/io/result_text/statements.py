@@ -1,0 +1,762 @@
+"""Statements about the recommended model of a result, from ``result.json`` alone.
+
+Each statement has a name, a predicate on the document and a sentence. Every text about a result consists of
+them, so that a run, its folder, the REST service, the report and a notebook state the same.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import floor
+from typing import Any, Final
+
+from islands.data.preprocessing_steps import Preprocessing
+from islands.data.split import compare_input_ranges
+from islands.models.equations import name_columns
+from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
+from islands.validation.prediction_bands import LEVEL
+
+#: Smallest R2 of a simulation that counts as good.
+GOOD_R2 = 0.9
+
+#: Largest ratio of the free-run error and the noise level at which the error is that of the noise.
+NOISE_RATIO = 1.2
+
+#: Ratio of the errors on validation data and estimation data above which a model does not generalise.
+_LARGE_RATIO = 2.0
+
+#: RMSE as a fraction of the output range that is a rounding error: its ratio to another one says nothing.
+_ROUNDING = 1e-6
+
+#: Least fraction of the validation samples inside a band of 90 %: two standard errors of 20 independent ones.
+LEAST_COVERAGE = 0.75
+
+#: Standard errors below which a parameter is not significant.
+_SIGNIFICANT = 2.0
+
+#: Inclusion probability from which a term is certain.
+_CERTAIN = 0.9
+
+#: Inclusion probability below which most of the weight is on models without the term.
+_UNLIKELY = 0.5
+
+#: Closure of a loop, in per cent of the output range, above which the loop is open.
+_OPEN_PERCENT = 5.0
+
+#: Where to look for missing terms, by correlation test.
+_HINTS = {
+    "xi_xi": "terms in past outputs (larger lags, other powers), or a model of coloured noise",
+    "u_xi": "linear or odd terms in {input}, also at other lags",
+    "xi_xiu": "products of past outputs and {input}",
+    "u2_xi": "even terms in {input}, such as squares or absolute values",
+    "u2_xi2": "terms that grow with {input}, because the size of the residual depends on it",
+}
+
+#: Values of a JSON object.
+Document = Mapping[str, Any]
+
+
+class ResultFacts:
+    """Quantities of a ``result.json`` that the statements read. Those of earlier versions lack some of them.
+
+    Parameters
+    ----------
+    document : mapping
+        Content of ``result.json``.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.record: Document = document["record"]
+        self.data: Document = document.get("data", {})
+        # Results of earlier versions recommend no model.
+        self.recommended: Document = document.get("recommended", {"rank": 1, "reasons": ()})
+        self.model: Document = document["models"][self.recommended["rank"] - 1]
+        self.physics: Document = self.model["physics"]
+        self.residual: Document = self.model["residual_tests"]
+
+    def error(self, mode: str = "free_run", part: str = "validation") -> Document:
+        """Return the errors of a simulation; null for a divergence."""
+        errors: Document = self.model["metrics"][part][mode]
+        return errors
+
+    def write_amount(self, value: float) -> str:
+        """Write a value of the output with its unit."""
+        return write_amount(value, self.record["units"]["output"])
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the output and of every input in equations."""
+        columns = self.record["names"]
+        return name_columns(columns["output"], columns["inputs"])
+
+    @property
+    def coverage(self) -> float | None:
+        """Fraction of the validation samples in the band."""
+        found: float | None = (self.model.get("bands") or {}).get("coverage")
+        return found
+
+    @property
+    def verdict(self) -> str | None:
+        """Verdict on the residual of the free run. Results of earlier versions have none."""
+        found: str | None = self.residual.get("verdict")
+        return found
+
+    def share(self, mode: str) -> float | None:
+        """Return the predictable share of a residual, null after a divergence."""
+        found: float | None = self.residual.get("predictable_share", {}).get(mode)
+        return found
+
+    @property
+    def requires_property_1(self) -> bool:
+        """Whether the search constrains the parameters of models of hysteresis."""
+        return "hysteresis" in self.document["settings"]["constraints"]
+
+    @property
+    def claims_hysteresis(self) -> bool:
+        """Whether the search is for models of hysteresis, or found a model with Property 1."""
+        models = self.document["models"]
+        return self.requires_property_1 or any(bool(entry["physics"]["property_1"]) for entry in models)
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether holds and excursions are bounded and, if required, Property 1 holds."""
+        tests = (*self.physics["holds"], *self.physics["excursions"])
+        bounded = all(test["bounded"] for test in tests)
+        return bounded and bool(self.physics["property_1"] or not self.requires_property_1)
+
+    @property
+    def simulates(self) -> bool:
+        """Whether the free run follows the output: R2 is good, or the error is that of the noise."""
+        return follows_output(self.error(), self.data.get("noise"))
+
+    @cached_property
+    def extrapolation(self) -> list[str]:
+        """Inputs of the validation data that leave the range of the estimation data."""
+        if "inputs" not in self.data:
+            return []
+        ranges, columns = self.data["inputs"], self.record
+        return compare_input_ranges(
+            columns["names"]["inputs"], columns["units"]["inputs"], ranges["estimation"], ranges["validation"]
+        )
+
+    @property
+    def error_ratio(self) -> float:
+        """Free-run error on the validation data divided by that on the estimation data; 0 for rounding."""
+        estimated, validated = (self.error(part=part)["rmse"] for part in ("estimation", "validation"))
+        rounding = _ROUNDING * self.data.get("output_range", 0.0)
+        return float(validated / estimated) if estimated and (validated or 0.0) > rounding else 0.0
+
+    @property
+    def generalises_poorly(self) -> bool:
+        """Whether the error on the validation data is much larger than that on the estimation data."""
+        return self.error_ratio > _LARGE_RATIO
+
+    @cached_property
+    def doubtful(self) -> list[tuple[str, float]]:
+        """Terms that are not certain, each with the probability of its inclusion."""
+        return list_doubtful(self.model["terms"])
+
+    @cached_property
+    def insignificant(self) -> list[str]:
+        """Terms whose parameters are within two standard errors of zero."""
+        return list_insignificant(self.model["terms"])
+
+    @property
+    def constraints(self) -> list[Document]:
+        """Constraints of the user; the physics checks state whether Property 1 holds."""
+        return [check for check in self.model["constraints"] if check["text"] != "hysteresis"]
+
+    @property
+    def implausible(self) -> list[Document]:
+        """Extremes of the inputs at which the output diverges or is far from its range."""
+        # Results of earlier versions have no extremes, or do not state which are plausible.
+        return [test for test in self.physics.get("extremes", ()) if not test.get("plausible", True)]
+
+    @property
+    def diverging(self) -> list[str]:
+        """Names of the excursions at which the output diverges."""
+        return [test["name"] for test in self.physics["excursions"] if not test["bounded"]]
+
+    @property
+    def lost_holds(self) -> int:
+        """Number of holds in which the output diverges."""
+        return sum(not hold["bounded"] for hold in self.physics["holds"])
+
+    @property
+    def open_loops(self) -> list[Document]:
+        """Excursions of a model of hysteresis whose loops do not close."""
+        if not self.claims_hysteresis:
+            return []
+        tests = self.physics["excursions"]
+        return [
+            test for test in tests if test["bounded"] and (test["closure_percent"] or 0.0) > _OPEN_PERCENT
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """A statement about a result.
+
+    Attributes
+    ----------
+    name : str
+    holds : callable
+        Predicate: whether the facts of a result make the statement true.
+    write : callable
+        Text of a statement that holds: a sentence, or a part of one.
+    """
+
+    name: str
+    holds: Callable[[ResultFacts], object]
+    write: Callable[[ResultFacts], str]
+
+
+def find_statements(statements: Iterable[Statement], facts: ResultFacts) -> list[Statement]:
+    """Return the statements that hold."""
+    return [each for each in statements if each.holds(facts)]
+
+
+def write_amount(value: float, unit: str) -> str:
+    """Write a value with its unit."""
+    return f"{value:.4g} {unit}".rstrip()
+
+
+def write_percent(share: float) -> str:
+    """Write a share in per cent."""
+    return f"{100 * share:.0f} %"
+
+
+def round_down(share: float) -> str:
+    """Write a share so that one below a limit never shows the limit."""
+    return f"{floor(100 * share) / 100:.2f}"
+
+
+def follows_output(error: Document, noise: float | None) -> bool:
+    """Return whether a finite free run follows the output: R2 is good, or the error is that of the noise."""
+    rmse, r2 = error["rmse"], error["r2"]
+    if rmse is None:
+        return False
+    # R2 is undefined for a constant output.
+    return r2 is None or r2 >= GOOD_R2 or (noise is not None and rmse <= NOISE_RATIO * noise)
+
+
+def list_doubtful(terms: Iterable[Document]) -> list[tuple[str, float]]:
+    """Return the terms that are not certain, each with the probability of its inclusion."""
+    shares = [(term["term"], term.get("inclusion")) for term in terms if "term" in term]
+    return [(text, share) for text, share in shares if share is not None and share < _CERTAIN]
+
+
+def list_insignificant(terms: Iterable[Document]) -> list[str]:
+    """Return the terms whose parameters are within two standard errors of zero."""
+    return [
+        term.get("term", term["regressor"])
+        for term in terms
+        if term["standard_error"] is not None
+        and abs(term["parameter"]) < _SIGNIFICANT * term["standard_error"]
+    ]
+
+
+def describe(document: Document) -> list[str]:
+    """Describe the recommended model in sentences: equation, error, uses, failures and next steps.
+
+    The equation and the units are indented.
+
+    Parameters
+    ----------
+    document : mapping
+        Content of ``result.json``.
+    """
+    facts = ResultFacts(document)
+    return [
+        describe_choice(document),
+        f"    {facts.model.get('named_equation', facts.model['equation'])}",
+        f"    {describe_units(document)}",
+        *describe_findings(document),
+    ]
+
+
+def describe_choice(document: Document) -> str:
+    """State which model is recommended, and the first reason."""
+    facts = ResultFacts(document)
+    rank, reasons = facts.recommended["rank"], facts.recommended["reasons"]
+    text = f"Recommended: model {rank} of {len(document['models'])}, size {facts.model['size']}"
+    return f"{text}: {reasons[0]}." if reasons else f"{text}."
+
+
+def describe_units(document: Document) -> str:
+    """State the units of the columns, the signals that the equation reads and direct feedthrough."""
+    facts = ResultFacts(document)
+    units = facts.record["units"]
+    pairs = zip(facts.names, (units["output"], *units["inputs"]), strict=True)
+    listed = ", ".join(f"{name} in {unit}" for name, unit in pairs if unit)
+    head = f"{'; '.join(filter(None, [listed, _describe_rate(facts)]))}."
+    return " ".join([head, *_write_all(_REMARKS, facts)])
+
+
+def describe_findings(document: Document) -> list[str]:
+    """Describe errors, uncertainty, uses, failures and next steps of the recommended model."""
+    facts = ResultFacts(document)
+    good, bad = _write_all(USES, facts), _write_all(FAILURES, facts)
+    return [
+        *_write_all(MEASURES, facts),
+        *_write_all(VERDICTS, facts),
+        f"Good for: {'; '.join(good) or 'no use that the checks confirm'}.",
+        f"Fails at: {'; '.join(bad) or 'none of the checks'}.",
+        f"Next: {'; '.join(_write_all(NEXT_STEPS, facts))}.",
+    ]
+
+
+def _write_all(statements: Iterable[Statement], facts: ResultFacts) -> list[str]:
+    return [each.write(facts) for each in find_statements(statements, facts)]
+
+
+def _describe_rate(facts: ResultFacts) -> str:
+    model, done = facts.model, facts.document["preprocessing"]
+    signals, steps = model.get("named_signals", model.get("signals", "")), done.get("steps")
+    filtered = steps is not None and Preprocessing.from_document(steps).has_rate_steps
+    if done["average"] == 1 and not filtered:
+        return "; ".join(filter(None, [signals, f"k counts samples of {done['dt']:g} s"]))
+    dt = facts.record["dt"] if steps is None else steps["dt"]
+    return f"{signals}, and simulate prepares a record of {dt:g} s in the same way"
+
+
+def _describe_feedthrough(facts: ResultFacts) -> str:
+    inputs = ", ".join(facts.document["preprocessing"]["feedthrough"])
+    return f"Direct feedthrough: the output responds to {inputs} within the sample, so models read it at k."
+
+
+def _describe_error(facts: ResultFacts) -> str:
+    free = facts.error()
+    parts = [f"RMSE {facts.write_amount(free['rmse'])}"]
+    # Both are undefined for a constant output.
+    if free["mape"] is not None:
+        parts.append(f"mean absolute error {free['mape']:.3g} % of the output range")
+    if free["r2"] is not None:
+        parts.append(f"R2 {free['r2']:.5f}")
+    head = f"Error: free run on the validation data, from the inputs alone, {', '.join(parts)}"
+    return f"{head}; one step ahead {_describe_one_step(facts)}."
+
+
+def _describe_one_step(facts: ResultFacts) -> str:
+    rmse = facts.error("one_step_ahead")["rmse"]
+    return "it diverges" if rmse is None else f"RMSE {facts.write_amount(rmse)}"
+
+
+def _describe_recordings(facts: ResultFacts) -> str:
+    errors = facts.model["recordings"]["validation"].items()
+    listed = [
+        f"{name} {'diverges' if each['rmse'] is None else facts.write_amount(each['rmse'])}"
+        for name, each in errors
+    ]
+    return f"RMSE of the free run by recording: {', '.join(listed)}."
+
+
+def _describe_missing_outputs(facts: ResultFacts) -> str:
+    return (
+        f"Missing outputs: {facts.data['missing_outputs']} of {facts.record['samples']} samples are skipped, "
+        "and every simulation is started again after them."
+    )
+
+
+def _describe_uncertainty(facts: ResultFacts) -> str:
+    half = facts.write_amount(typical_half_width(facts.model["bands"]))
+    text = f"Uncertainty: the {100 * LEVEL:g} % prediction band of the free run has a median half-width of "
+    text += half
+    doubtful = [f"{term} {round_down(share)}" for term, share in facts.doubtful]
+    if doubtful:
+        return f"{text}; doubtful terms, with the probability of their inclusion: {', '.join(doubtful)}."
+    return f"{text}; every term has an inclusion probability of {_CERTAIN:g} or more."
+
+
+def typical_half_width(bands: Document) -> float:
+    """Return the median half-width of the band of the default level."""
+    half: float = bands["factors"][bands["levels"].index(LEVEL)] * bands["width"]
+    return half
+
+
+def _describe_met_constraints(facts: ResultFacts) -> str:
+    met = [_name_constraint(check) for check in facts.constraints if check["met"]]
+    return f"Constraints that the model meets: {'; '.join(met)}."
+
+
+def _name_constraint(check: Document) -> str:
+    named: str = check.get("named", check["text"])
+    return named
+
+
+def _describe_unmet_constraint(check: Document) -> str:
+    value = "undefined" if check["value"] is None else f"{check['value']:.6g}"
+    return f"the constraint {_name_constraint(check)} (value {value})"
+
+
+def _describe_verdict(word: str) -> Callable[[ResultFacts], str]:
+    """Return a writer of the verdict, with the measured quantities of the free run in brackets."""
+
+    def write(facts: ResultFacts) -> str:
+        measured = "; ".join(_write_all(VERDICT_DETAILS, facts))
+        return f"As a simulation: {word} ({measured})." if measured else f"As a simulation: {word}."
+
+    return write
+
+
+def _has_limits(facts: ResultFacts) -> bool:
+    return bool(find_statements(FAILURES, facts))
+
+
+def _is_above_limit(facts: ResultFacts) -> bool:
+    """Return whether a visible part of the residual of the free run is predictable."""
+    return facts.verdict not in (ADEQUATE, None) and facts.residual["predictable_percent"] is not None
+
+
+def _exceeds(share: float | None) -> bool:
+    return share is None or share > LARGEST_SHARE
+
+
+def _is_one_step_unpredictable(facts: ResultFacts) -> bool:
+    """Return whether the error one step ahead is the smallest that the data show."""
+    return not _exceeds(facts.share("one_step_ahead")) and bool(facts.error("one_step_ahead")["rmse"])
+
+
+def _describe_noise_ratio(facts: ResultFacts) -> str:
+    noise = facts.data["noise"]
+    ratio = facts.error()["rmse"] / noise
+    # The level has an uncertainty: an error below it is no contradiction.
+    times = "at" if ratio <= NOISE_RATIO else f"{ratio:.3g} times"
+    return f"RMSE {times} the noise level of {facts.names[0]}, {facts.write_amount(noise)}"
+
+
+def _describe_one_step_ratio(facts: ResultFacts) -> str:
+    ratio = facts.error()["rmse"] / facts.error("one_step_ahead")["rmse"]
+    return f"RMSE {ratio:.3g} times that one step ahead, whose residual is not predictable"
+
+
+def _describe_reason(facts: ResultFacts) -> str:
+    reason: str = facts.recommended["reasons"][1]
+    return reason
+
+
+def _has_physics_reason(facts: ResultFacts) -> bool:
+    return len(facts.recommended["reasons"]) > 1
+
+
+def _describe_structure(facts: ResultFacts) -> str:
+    return (
+        f"{write_percent(facts.share('free_run') or 0.0)} of the free-run residual is predictable "
+        f"(RMS {facts.residual['predictable_percent']:.2g} % of the output range)"
+    )
+
+
+def _describe_implausible(facts: ResultFacts) -> str:
+    return "; ".join(
+        f"the output {_describe_escape(test)} at {_describe_level(facts, test['level'])} "
+        f"({abs(test['level']):g} of the recorded amplitude)"
+        for test in facts.implausible
+    )
+
+
+def _describe_escape(test: Document) -> str:
+    if not test["bounded"]:
+        return "diverges"
+    if test["ranges"] is None:
+        return "changes, but is constant in the record,"
+    return f"leaves its recorded range by {test['ranges']:.3g} ranges"
+
+
+def _describe_level(facts: ResultFacts, level: float) -> str:
+    """Return the values of the inputs at a level of the physics checks: ``u = -1 V, valve = 3``."""
+    if "inputs" not in facts.data:
+        return f"{level:g} of the amplitude of the inputs"
+    values = [(low + high) / 2 + level * (high - low) / 2 for low, high in facts.data["inputs"]["estimation"]]
+    parts = zip(facts.names[1:], values, facts.record["units"]["inputs"], strict=True)
+    return ", ".join(f"{name} = {write_amount(value, unit)}" for name, value, unit in parts)
+
+
+def _describe_open_loops(facts: ResultFacts) -> str:
+    worst = max(facts.open_loops, key=lambda test: test["closure_percent"])
+    return f"loops do not close at {worst['name']}: {worst['closure_percent']:.3g} % of the output range"
+
+
+def _largest_size(facts: ResultFacts) -> int:
+    return max(int(entry["size"]) for entry in facts.document["models"])
+
+
+def _may_grow(facts: ResultFacts) -> bool:
+    is_largest = facts.model["size"] == _largest_size(facts)
+    return _has_structure(facts) and is_largest and "max_terms" in facts.document["settings"]
+
+
+def _has_structure(facts: ResultFacts) -> bool:
+    return facts.verdict not in (ADEQUATE, None)
+
+
+def _describe_longer_record(facts: ResultFacts) -> str:
+    weak = facts.insignificant
+    more = f" (and of {len(weak) - 1} more)" if len(weak) > 1 else ""
+    return (
+        f"try a longer record or a smaller model, since the parameter of {weak[0]}{more} is within "
+        "two standard errors of zero"
+    )
+
+
+def _find_unlikely(facts: ResultFacts) -> tuple[str, float]:
+    """Return the least probable term, with a probability of 1 if every term is certain."""
+    return min(facts.doubtful, key=lambda each: each[1], default=("", 1.0))
+
+
+def _describe_unlikely(facts: ResultFacts) -> str:
+    term, share = _find_unlikely(facts)
+    return (
+        f"try a longer record, since models without {term} are about as good (probability of its "
+        f"inclusion {round_down(share)})"
+    )
+
+
+def _suggest_terms(facts: ResultFacts) -> str:
+    """Return the hint of the test with an input that exceeds its limit by most, or of the one without."""
+    past, *tests = facts.residual["tests"]
+    # The residual of a slow record is correlated in time whatever term is missing.
+    excess = [test["largest"] / test["limit"] if test["largest"] and test["limit"] else 0.0 for test in tests]
+    worst = tests[excess.index(max(excess))] if max(excess) > 1.0 else past
+    name = "" if worst["input"] is None else facts.names[1 + worst["input"]]
+    return f"try {_HINTS[worst['name']].format(input=name)}"
+
+
+#: Remarks on the equation.
+_REMARKS: Final = (
+    Statement(
+        "feedthrough",
+        lambda facts: facts.document["preprocessing"].get("feedthrough"),
+        _describe_feedthrough,
+    ),
+    Statement(
+        "reading",
+        lambda facts: facts.record.get("reading"),
+        lambda facts: " ".join(f"Reading: {step}." for step in facts.record["reading"]),
+    ),
+)
+
+#: Measured errors, uncertainty, and what the model meets.
+MEASURES: Final = (
+    Statement("error", lambda facts: facts.error()["rmse"] is not None, _describe_error),
+    Statement(
+        "divergence",
+        lambda facts: facts.error()["rmse"] is None,
+        lambda facts: (
+            "Error: the free run on the validation data diverges; one step ahead "
+            f"{_describe_one_step(facts)}."
+        ),
+    ),
+    Statement(
+        "recordings",
+        lambda facts: facts.model.get("recordings", {}).get("validation"),
+        _describe_recordings,
+    ),
+    Statement("missing-outputs", lambda facts: facts.data.get("missing_outputs"), _describe_missing_outputs),
+    Statement(
+        "uncertainty",
+        lambda facts: facts.model.get("bands") and facts.document.get("ensemble") is not None,
+        _describe_uncertainty,
+    ),
+    Statement(
+        "met-constraints",
+        lambda facts: any(check["met"] for check in facts.constraints),
+        _describe_met_constraints,
+    ),
+    Statement(
+        "preset",
+        lambda facts: facts.document["settings"].get("choice", {}).get("reasons"),
+        lambda facts: " ".join(facts.document["settings"]["choice"]["reasons"]),
+    ),
+)
+
+#: Measured quantities beside the verdict.
+VERDICT_DETAILS: Final = (
+    Statement(
+        "predictable-share",
+        lambda facts: facts.share("free_run") is not None,
+        lambda facts: (
+            f"{write_percent(facts.share('free_run') or 0.0)} of the residual of the free run is predictable"
+        ),
+    ),
+    Statement(
+        "noise-ratio",
+        lambda facts: facts.data.get("noise") and facts.error()["rmse"] is not None,
+        _describe_noise_ratio,
+    ),
+    Statement(
+        "one-step-ratio",
+        lambda facts: (
+            not facts.data.get("noise")
+            and facts.error()["rmse"] is not None
+            and _is_one_step_unpredictable(facts)
+        ),
+        _describe_one_step_ratio,
+    ),
+    Statement(
+        "coverage",
+        lambda facts: facts.coverage is not None,
+        lambda facts: (
+            f"{write_percent(facts.coverage or 0.0)} of the validation samples are in the "
+            f"{100 * LEVEL:g} % band"
+        ),
+    ),
+    Statement(
+        "one-step-share",
+        lambda facts: facts.share("one_step_ahead") is not None,
+        lambda facts: f"one step ahead, {write_percent(facts.share('one_step_ahead') or 0.0)} is predictable",
+    ),
+)
+
+#: What the model can be used for.
+USES: Final = (
+    Statement(
+        "simulation",
+        lambda facts: facts.simulates and not _has_limits(facts),
+        lambda _: "simulation from the inputs alone",
+    ),
+    Statement(
+        "simulation-within-limits",
+        lambda facts: facts.simulates and _has_limits(facts),
+        lambda _: "simulation from the inputs alone, within the limits below",
+    ),
+    Statement(
+        "prediction",
+        lambda facts: not facts.simulates and (facts.error("one_step_ahead")["r2"] or 0.0) >= GOOD_R2,
+        lambda _: "prediction one step ahead",
+    ),
+    Statement(
+        "adequate-residual",
+        lambda facts: facts.verdict == ADEQUATE and not _exceeds(facts.share("free_run")),
+        lambda _: (
+            "no structure is left in the free-run residual (at most "
+            f"{write_percent(LARGEST_SHARE)} is predictable)"
+        ),
+    ),
+    Statement(
+        "rounding-residual",
+        lambda facts: facts.verdict == ADEQUATE and _exceeds(facts.share("free_run")),
+        lambda _: "the residual is a rounding error",
+    ),
+    Statement("sound", lambda facts: _has_physics_reason(facts) and facts.is_sound, _describe_reason),
+)
+
+#: Checks that the model fails.
+FAILURES: Final = (
+    Statement("unsound", lambda facts: _has_physics_reason(facts) and not facts.is_sound, _describe_reason),
+    Statement(
+        "unmet-constraints",
+        lambda facts: any(not check["met"] for check in facts.constraints),
+        lambda facts: "; ".join(
+            _describe_unmet_constraint(check) for check in facts.constraints if not check["met"]
+        ),
+    ),
+    Statement(
+        "no-simulation",
+        lambda facts: facts.error()["rmse"] is None,
+        lambda _: "simulation from the inputs alone: the free run diverges",
+    ),
+    Statement(
+        "poor-simulation",
+        lambda facts: facts.error()["rmse"] is not None and not facts.simulates,
+        lambda facts: f"simulation from the inputs alone: R2 {facts.error()['r2']:.3f}",
+    ),
+    Statement(
+        "diverging-excursions",
+        lambda facts: facts.diverging,
+        lambda facts: f"diverges at {', '.join(facts.diverging)}",
+    ),
+    Statement(
+        "diverging-holds",
+        lambda facts: facts.lost_holds,
+        lambda facts: f"diverges in {facts.lost_holds} of {len(facts.physics['holds'])} holds of the inputs",
+    ),
+    Statement("implausible-extremes", lambda facts: facts.implausible, _describe_implausible),
+    Statement(
+        "drift",
+        lambda facts: (
+            facts.requires_property_1
+            and not facts.physics["property_1"]
+            and facts.physics["hold_drift_percent"] is not None
+        ),
+        lambda facts: (
+            f"the output drifts by {facts.physics['hold_drift_percent']:.3g} % of its range at constant input"
+        ),
+    ),
+    Statement("open-loops", lambda facts: facts.open_loops, _describe_open_loops),
+    Statement("predictable-residual", _is_above_limit, _describe_structure),
+    Statement(
+        "low-coverage",
+        lambda facts: facts.coverage is not None and facts.coverage < LEAST_COVERAGE,
+        lambda facts: (
+            f"the {100 * LEVEL:g} % prediction band contains {write_percent(facts.coverage or 0.0)} of "
+            "the validation samples"
+        ),
+    ),
+    Statement(
+        "error-ratio",
+        lambda facts: facts.generalises_poorly,
+        lambda facts: (
+            f"the free-run error on the validation data is {facts.error_ratio:.2g} times that on the "
+            "estimation data"
+        ),
+    ),
+    Statement(
+        "extrapolation",
+        lambda facts: facts.extrapolation,
+        lambda facts: "; ".join(f"extrapolation: {each}" for each in facts.extrapolation),
+    ),
+)
+
+#: The verdict on the use as a simulation; one of them holds.
+VERDICTS: Final = (
+    Statement("good", lambda facts: facts.simulates and not _has_limits(facts), _describe_verdict("good")),
+    Statement(
+        "usable",
+        lambda facts: facts.simulates and _has_limits(facts),
+        _describe_verdict("usable, with limits"),
+    ),
+    Statement("unsuitable", lambda facts: not facts.simulates, _describe_verdict("unsuitable")),
+)
+
+#: What to do next.
+NEXT_STEPS: Final = (
+    Statement("more-terms", _may_grow, lambda facts: f"allow more than {_largest_size(facts)} terms"),
+    Statement(
+        "free-run-estimate",
+        lambda facts: _has_structure(facts) and not _exceeds(facts.share("one_step_ahead")),
+        lambda _: (
+            "try an estimate that minimises the error of the free run (--estimator free-run), or measure the "
+            "disturbance: one step ahead, no structure is left"
+        ),
+    ),
+    Statement(
+        "other-terms",
+        lambda facts: _has_structure(facts) and _exceeds(facts.share("one_step_ahead")),
+        _suggest_terms,
+    ),
+    Statement(
+        "wider-record",
+        lambda facts: facts.generalises_poorly or facts.extrapolation,
+        lambda _: "estimate from a record that covers the amplitudes and rates of the validation data",
+    ),
+    Statement("insignificant", lambda facts: facts.insignificant, _describe_longer_record),
+    Statement(
+        "unlikely",
+        lambda facts: not facts.insignificant and _find_unlikely(facts)[1] < _UNLIKELY,
+        _describe_unlikely,
+    ),
+    Statement(
+        "test",
+        lambda _: True,
+        lambda _: "check the model on a record that was not used (islands simulate)",
+    ),
+)
+
+#: All statements, in the order of the text.
+STATEMENTS: Final = (*_REMARKS, *MEASURES, *VERDICT_DETAILS, *VERDICTS, *USES, *FAILURES, *NEXT_STEPS)
+
+
+def name_statements(document: Document) -> list[str]:
+    """Return the names of the statements that hold for a result."""
+    return [each.name for each in find_statements(STATEMENTS, ResultFacts(document))]
