@@ -23,7 +23,7 @@ _PUBLIC = {
     "effects.catalogue": ("EFFECTS",),
     "effects.interface.context": ("Parameter",),
     "effects.interface.effect": ("Effect", "Site"),
-    "errors": ("IslandsError", "ModelError", "RecordError", "SettingsError"),
+    "errors": ("ExtrapolationWarning", "IslandsError", "ModelError", "RecordError", "SettingsError"),
     "estimation.estimator_table": ("ESTIMATORS",),
     "evolution.migration.topology": ("TOPOLOGIES",),
     "evolution.presets": ("PRESETS",),

@@ -14,6 +14,7 @@ from islands.effects.catalogue import EFFECTS as EFFECTS
 from islands.effects.interface.context import Parameter as Parameter
 from islands.effects.interface.effect import Effect as Effect
 from islands.effects.interface.effect import Site as Site
+from islands.errors import ExtrapolationWarning as ExtrapolationWarning
 from islands.errors import IslandsError as IslandsError
 from islands.errors import ModelError as ModelError
 from islands.errors import RecordError as RecordError

@@ -30,6 +30,10 @@ class SettingsError(IslandsError):
     """A setting is unknown, out of range, or contradicts another setting."""
 
 
+class ExtrapolationWarning(UserWarning):
+    """An input of the validation data leaves the range of the estimation data."""
+
+
 @contextmanager
 def command_line_names() -> Iterator[None]:
     """Let messages name options as on the command line, in this process."""

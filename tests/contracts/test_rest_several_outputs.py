@@ -80,6 +80,8 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
         tuple(islands.read_record(tmp_path / "masses.csv", "u", name) for name in ("y1", "y2"))
     )
     expected = identify_coupled(files, seed=3, **SETTINGS)
+    # The same statements over REST, on the page and from the library.
+    assert done.summary["words"].splitlines() == expected.sentences()
     loaded = islands.load(tmp_path / "result")
     assert loaded.model == expected.model
     for one, other in zip(loaded.bands(files), expected.bands(files), strict=True):

@@ -12,15 +12,18 @@ from hypothesis import strategies as st
 import islands
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.io.result_folder import result_document
+from islands.io.result_folder import finite, residual_structure_document, result_document
+from islands.io.result_text.coupled_statements import describe_coupled
 from islands.io.result_text.statements import describe
 from islands.io.result_text.summary_text import summary
+from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
 from islands.validation.predictable_residual import VERDICTS, ResidualStructure
 from support.assessments import with_changes
+from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.portfolio_records import KINDS
 from support.searches import record
 from support.statements import EXCLUSIVE, find_contradictions
@@ -54,6 +57,7 @@ CHOICES = st.fixed_dictionaries(
         "coverage": st.sampled_from([None, 0.5, 0.74, 0.76, 0.9]),
         "widening": st.sampled_from([1.0, 3.0]),
         "ensemble": st.sampled_from(["none", "certain", "doubtful"]),
+        "noise": st.sampled_from([None, 0.01, 0.1]),
     }
 )
 
@@ -122,6 +126,7 @@ def make_result(choices):
 def test_no_two_sentences_of_a_result_contradict_each_other(choices):
     result = make_result(choices)
     document = result_document(result)
+    document["data"]["noise"] = choices["noise"]
     assert not find_contradictions(" ".join(describe(document)))
     assert not find_contradictions(summary(document, result.recommended.model))
 
@@ -130,6 +135,66 @@ def test_no_two_sentences_of_a_result_contradict_each_other(choices):
 def test_the_sentences_of_the_report_do_not_contradict_each_other(choices):
     page = identification_report("job", make_result(choices), {}).decode()
     assert not find_contradictions(page)
+
+
+@cache
+def found_together():
+    data = make_coupled_record(TWO_MASSES, samples=200, noise=0.01)
+    fitted = islands.fit_coupled(data, library="polynomial", degree=1, max_terms=4, certificate=0, average=1)
+    return fitted.model, fitted.document()
+
+
+#: Measured quantities of an output of several.
+OUTPUTS = st.fixed_dictionaries(
+    {
+        "shares": st.tuples(SHARES, SHARES),
+        "percent": st.sampled_from([1e-6, 0.5, 1.5]),
+        "r2": st.tuples(*[st.sampled_from([0.3, 0.95])] * 2),
+        "rmse": st.tuples(*[RMSES] * 3),
+        "noise": st.sampled_from([None, 0.01, 0.1]),
+        "coverage": st.sampled_from([None, 0.5, 0.9]),
+    }
+)
+
+
+def change_output(output, choices, lost):
+    """Return the entry of an output with chosen quantities."""
+    residual = make_structure(choices["shares"], choices["percent"], lost)
+    errors = [
+        {"mape": 1.0, "r2": r2, "rmse": rmse, "fit_percent": 9.0}
+        for r2, rmse in zip((*choices["r2"], 0.95), choices["rmse"], strict=True)
+    ]
+    free, one, trained = errors
+    free = dict.fromkeys(free) if lost else free
+    return {
+        **output,
+        "metrics": {
+            "estimation": output["metrics"]["estimation"] | {"free_run": trained},
+            "validation": {"free_run": free, "one_step_ahead": one},
+        },
+        "residual": finite(residual_structure_document(residual)),
+        "bands": None if lost else output["bands"] | {"coverage": choices["coverage"]},
+        "data": output["data"] | {"noise": choices["noise"]},
+    }
+
+
+@given(st.tuples(OUTPUTS, OUTPUTS), st.booleans(), st.sampled_from([1.0, 3.0]))
+def test_no_two_sentences_about_several_outputs_contradict_each_other(choices, lost, widening):
+    model, base = found_together()
+    outputs = [
+        change_output(output, each, lost) for output, each in zip(base["outputs"], choices, strict=True)
+    ]
+    (ranges,) = base["inputs"]["estimation"]
+    wide = {**base["inputs"], "validation": [[widening * each for each in ranges]]}
+    document = {**base, "outputs": outputs, "inputs": wide}
+    sentences = describe_coupled(document)
+    assert not find_contradictions(" ".join(sentences))
+    (verdict,) = (each for each in sentences if each.startswith("As a simulation"))
+    follows = [each["r2"][0] > 0.9 or (each["noise"] or 0.0) * 1.2 >= each["rmse"][0] for each in choices]
+    simulates = not lost and all(follows)
+    assert verdict.startswith("As a simulation: unsuitable") != simulates
+    page = coupled_report("job", model, document, base["models"][0]["terms"], sentences, [b"<svg/>"] * 2)
+    assert not find_contradictions(page.decode())
 
 
 @pytest.mark.ci
@@ -168,6 +233,12 @@ def test_the_checker_finds_the_contradictions_that_were_printed():
     )
     assert find_contradictions(
         "93 % of the residual of the free run is predictable; 94 % of the free-run residual is predictable"
+    )
+    assert find_contradictions(
+        "no structure is left in the residual of y1 and y2. 94 % of the residual of y2 is predictable"
+    )
+    assert find_contradictions(
+        "RMSE at the noise level of y. Fails at: simulation from the inputs alone: R2 0.3"
     )
     assert len(set(EXCLUSIVE)) == len(EXCLUSIVE)
     assert not find_contradictions("As a simulation: good. Fails at: none of the checks. ")

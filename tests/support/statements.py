@@ -25,6 +25,14 @@ EXCLUSIVE = (
     (r"no model passes the physics checks", r"Good for: .*bounded at inputs held.* Fails at:"),
     (r"the output (diverges|leaves its recorded range) .*1\.2 of the rec", r"Good for: .*up to 1\.2 times"),
     (r"the output (diverges|leaves its recorded range) .*\(1 of the rec", r"Good for: .*up to 1(\.2)? times"),
+    (r"the free run on the validation data diverges", r"RMSE \S+( times)? the noise level of"),
+    (r"RMSE at the noise level of", r"simulation from the inputs alone: R2"),
+    (r"the common free run on the validation data diverges", r"As a simulation: (good|usable)"),
+    (r"the common free run on the validation data diverges", r"Good for: [^.]*simulation from the inputs"),
+    (r"As a simulation: (good|usable)", r"Fails at: .*simulation from the inputs alone: the free run"),
+    (r"Fails at: none of the checks", r"try other terms or more lags"),
+    (r"Fails at: none of the checks", r"% of the residual of \w+ is predictable \(RMS"),
+    (r"Good for: no use that", r"no structure is left in the"),
     (r"drifts by [\d.e+]+ % of its range at constant input", r"Good for: .*Property 1 holds.* Fails at:"),
 )
 
@@ -40,6 +48,12 @@ def find_contradictions(text: str) -> list[str]:
     joined = " ".join(re.sub(r"<[^<>]*>", " ", text).split())
     found = [
         f"{one} / {other}" for one, other in EXCLUSIVE if re.search(one, joined) and re.search(other, joined)
+    ]
+    found += [
+        f"{name} has no structure, and a predictable residual"
+        for listed in re.findall(r"no structure is left in the residual of ([^.;]*)", joined)
+        for name in listed.split(" and ")
+        if re.search(rf"% of the residual of {re.escape(name)} is predictable", joined)
     ]
     return found + [
         f"{pattern}: {values}" for pattern in REPEATED if len(values := set(re.findall(pattern, joined))) > 1

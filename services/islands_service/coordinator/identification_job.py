@@ -10,6 +10,7 @@ from typing import Any
 
 from islands.data.coupled_record import couple
 from islands.data.dataset import Dataset
+from islands.data.split import describe_search_extrapolation
 from islands.evolution.engine import Engine
 from islands.evolution.presets import AUTO
 from islands.evolution.search_result import SearchResult
@@ -26,6 +27,7 @@ from islands.facade.results.identification import Result
 from islands.io.checkpoints import history_document
 from islands.io.models import NARX, model_json
 from islands.io.result_folder import result_document
+from islands.io.result_text.coupled_statements import describe_coupled
 from islands.io.result_text.statements import describe
 from islands.progress import PhasedProgress, ProgressCallback, StoppedError, TimeLeft
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
@@ -63,7 +65,11 @@ def run_identification_job(run: JobRun) -> JobOutcome:
     checkpoints = JobCheckpoints(run.job, run.blobs)
     start = checkpoints.read()
     stop = SearchStop(run.check)
-    reporter = ProgressReporter(run, checkpoints, stop, start, spec, record.samples)
+    warnings = [
+        f"validation extrapolates: {statement}"
+        for statement in describe_search_extrapolation(record, validation, len(spec.outputs))
+    ]
+    reporter = ProgressReporter(run, checkpoints, stop, start, spec, record.samples, warnings)
     try:
         if len(spec.outputs) > 1:
             coupled = _identify_outputs(record, validation, spec, start, run.engine, reporter, stop)
@@ -193,13 +199,14 @@ def _identify_outputs(
 def make_coupled_outcome(found: CoupledResult, note: str = "", ended_by: str = "") -> JobOutcome:
     """Return the part of a result of several outputs that the store keeps; see `make_outcome`."""
     document = found.document()
+    words = describe_coupled(document)
     (model,) = models = document.pop("models")
     searches = [result.search_result.search for result in found.results]
     summary = {
         "models": 1,
         "rank": 1,
         "reasons": [],
-        "words": "\n".join([*found.sentences(), *([f"Note: {note}."] if note else [])]),
+        "words": "\n".join([*words, *([f"Note: {note}."] if note else [])]),
         "equation": "; ".join(found.equation.splitlines()),
         "size": model["size"],
         "metrics": model["metrics"]["validation"]["free_run"],
@@ -267,7 +274,9 @@ class ProgressReporter:
         start: JobStart,
         spec: Identification,
         samples: int,
+        warnings: Sequence[str] = (),
     ) -> None:
+        self._warnings = {"warnings": list(warnings)} if warnings else {}
         self._outputs = len(spec.outputs)
         self._phases = _make_progress(self._keep_stage, spec, samples)
         self._run, self._checkpoints, self._stop = run, checkpoints, stop
@@ -316,7 +325,12 @@ class ProgressReporter:
         now = monotonic()
         assert fraction is not None
         self._left.update(fraction, now)
-        self._stage = {"phase": message, "fraction": fraction, "seconds_left": self._left.at(now)}
+        self._stage = {
+            "phase": message,
+            "fraction": fraction,
+            "seconds_left": self._left.at(now),
+            **self._warnings,
+        }
 
     def _reached_before(self) -> dict[str, Any]:
         """Return the progress of earlier attempts, without their note."""

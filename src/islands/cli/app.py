@@ -1,6 +1,7 @@
 """Application of commands: their table, and error handling, one line on standard error and exit code 2."""
 
 import sys
+import warnings
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
@@ -15,7 +16,13 @@ from islands.cli.console import errors, exit_with_closed_output
 from islands.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
 from islands.cli.stop_requests import exit_code, ignore_signals, raise_on_signals
 from islands.distribution import describe_missing_extra, read_version
-from islands.errors import IslandsError, SettingsError, command_line_names, suggest
+from islands.errors import (
+    ExtrapolationWarning,
+    IslandsError,
+    SettingsError,
+    command_line_names,
+    suggest,
+)
 from islands.processes.settings import limit_threads
 
 
@@ -86,7 +93,9 @@ class Commands(TyperGroup):
         """Run the command. Report an error in one line; exit with code 2, or 130 or 143 after a signal."""
         try:
             try:
-                with command_line_names():
+                with command_line_names(), warnings.catch_warnings():
+                    # The commands state it before they compile kernels.
+                    warnings.simplefilter("ignore", ExtrapolationWarning)
                     return super().invoke(ctx)
             except ModuleNotFoundError as error:
                 raise explain_missing_package(error, str(ctx.invoked_subcommand)) from error

@@ -10,7 +10,7 @@ from islands.data.dataset import Dataset, join
 from islands.data.input_lead import advance_inputs
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
-from islands.data.split import describe_extrapolation, split_data
+from islands.data.split import describe_search_extrapolation
 from islands.errors import SettingsError
 from islands.io.records import read_dataset
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
@@ -32,9 +32,9 @@ def advance_as_named(record: Dataset, inputs: Sequence[str]) -> Dataset:
     return advance_inputs(record, [place for place, (given, own) in enumerate(early) if given and not own])
 
 
-def state_extrapolation(data: Dataset, held_out: Dataset | float) -> None:
+def state_extrapolation(data: Dataset, held_out: Dataset | float, outputs: int = 1) -> None:
     """Print, before a search, which inputs of the validation data leave the range of the estimation data."""
-    for statement in describe_extrapolation(split_data(data, held_out)):
+    for statement in describe_search_extrapolation(data, held_out, outputs):
         print_message(f"Validation extrapolates: {statement}.")
 
 

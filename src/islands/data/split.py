@@ -1,5 +1,6 @@
 """Split of the data into an estimation part and a validation part."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -12,7 +13,7 @@ from islands.data.compatibility import Reference, match_record
 from islands.data.dataset import Dataset, join
 from islands.data.magnitudes import check_magnitudes
 from islands.data.missing_outputs import skip_missing_outputs
-from islands.errors import SettingsError
+from islands.errors import ExtrapolationWarning, SettingsError
 
 #: Fraction of a record, at its end, that a diagnosis reserves for hold-out validation.
 HOLDOUT_FRACTION = 0.25
@@ -116,6 +117,36 @@ def describe_extrapolation(parts: Split) -> list[str]:
     record = parts.estimation
     ranges = map(measure_input_ranges, (parts.estimation, parts.validation))
     return compare_input_ranges(record.input_names, record.input_units, *ranges)
+
+
+def describe_search_extrapolation(
+    record: Dataset, validation: Dataset | float, outputs: int = 1
+) -> list[str]:
+    """State, before a search, which inputs of the validation data leave the range of the estimation data.
+
+    Parameters
+    ----------
+    record : Dataset
+    validation : Dataset or float
+        Validation data, or their fraction of the record.
+    outputs : int
+        Number of outputs; those after the first are the last inputs of both records.
+
+    Raises
+    ------
+    RecordError, SettingsError
+        As `split_data`.
+    """
+    inputs = record.inputs - outputs + 1
+    held_out = validation.first_inputs(inputs) if isinstance(validation, Dataset) else validation
+    return describe_extrapolation(split_data(record.first_inputs(inputs), held_out))
+
+
+def warn_of_extrapolation(parts: Split) -> None:
+    """Warn the caller of a search of every input whose validation data leave the range of the estimation."""
+    for statement in describe_extrapolation(parts):
+        # The search is the caller of this function.
+        warnings.warn(f"validation extrapolates: {statement}", ExtrapolationWarning, stacklevel=3)
 
 
 def compare_input_ranges(

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
-from islands.data.split import split_data
+from islands.data.split import split_data, warn_of_extrapolation
 from islands.errors import SettingsError
 from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
@@ -125,6 +125,11 @@ def fit(
         ``stop`` returned true before the first model.
     RecordError
         The record is too short or incomplete, or the validation data has other columns or sampling time.
+
+    Warns
+    -----
+    ExtrapolationWarning
+        An input of the validation data leaves the range of the estimation data.
     """
     record, validation = read_data(record, y, dt, inputs, output, validation)
     settings = FitSettings(
@@ -136,6 +141,7 @@ def fit(
         certificate=certificate,
     )
     split = split_data(record, validation)
+    warn_of_extrapolation(split)
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     if model != NARX:
         given = library, degree, lags, delays, constraints, settings

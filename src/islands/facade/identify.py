@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from islands.data.averaging import count_means
 from islands.data.dataset import Dataset
-from islands.data.split import split_data
+from islands.data.split import split_data, warn_of_extrapolation
 from islands.errors import RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.deviations import (
@@ -137,10 +137,17 @@ def identify(
         The record is too short or incomplete, or the validation data do not match it.
     ModelError
         The function of a primitive of your own does not compile.
+
+    Warns
+    -----
+    ExtrapolationWarning
+        An input of the validation data leaves the range of the estimation data.
     """
     record, validation = read_data(record, y, dt, inputs, output, validation)
     if seed < 0:
         raise SettingsError(f"a seed is not negative, got {seed}")
+    parts = split_data(record, validation)
+    warn_of_extrapolation(parts)
     steps = Steps(progress, stop)
     if preset == AUTO:
         try:
@@ -155,7 +162,7 @@ def identify(
         row_address(entry)  # compile it before the search starts
     steps("sampling rate and direct feedthrough", 0.0)
     trial, least = make_trial_library(settings), settings.maximum_lag + _MIN_RESIDUALS
-    split, count = select_rate(split_data(record, validation), settings.average, trial, least, steps)
+    split, count = select_rate(parts, settings.average, trial, least, steps)
     split = select_feedthrough(split, settings.feedthrough, trial.at_rate(count))
     _check_validation_length(split.validation, settings)
     offsets = _find_search_offsets(split.estimation, settings)

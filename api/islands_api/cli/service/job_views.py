@@ -46,6 +46,8 @@ def show_job(job: JobView, as_json: bool) -> None:
         output.print(_describe_phase(job), markup=False)
     if status.get("note") and job.state not in TERMINAL:
         output.print(status["note"], markup=False)
+    for warning in status.get("warnings", ()):
+        output.print("\n".join(wrap(f"Warning: {warning}.")), markup=False)
     if job.kind != IDENTIFICATION:
         show_findings(job)
     elif job.summary is not None:

@@ -117,6 +117,7 @@ function makeJobFacts(job, unit) {
     ["Time left", running && Number.isFinite(left) ? makeCountdown(left) : null],
     ["Run time", formatRunTime(job)],
     ["Note", running && progress.note ? progress.note : null],
+    ["Warning", progress.warnings?.join("; ")],
     ["Duration", job.finished && job.started ? formatDuration(getSeconds(job)) : null],
     ["Stopped by", job.summary?.ended_by],
     ["Attempt", job.attempt > 1 ? String(job.attempt) : null],

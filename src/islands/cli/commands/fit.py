@@ -113,8 +113,7 @@ def fit(
         show("reading", 0.0)
         data = recordings.read(rows)
         held_out = recordings.read_held_out(validation, rows)
-    if len(outputs) == 1:
-        state_extrapolation(data, held_out)
+    state_extrapolation(data, held_out, len(outputs))
     compile_kernels()
     with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()

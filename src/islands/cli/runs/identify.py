@@ -261,8 +261,9 @@ def _read_data(job: dict[str, Any], lag: int) -> tuple[Any, Any, Any]:
         return record, held_out, test_data
     names = measured_names(job["inputs"], steps)
     recordings = Recordings(paths, names, job["output"], job["dt"], reading)
-    data, *others = _read_parts(recordings, job, lag)
-    record, held_out, test_data = couple_data(data, others, outputs, steps, job["inputs"])
+    data, validation, test = _read_parts(recordings, job, lag)
+    state_extrapolation(data, validation, outputs)
+    record, held_out, test_data = couple_data(data, [validation, test], outputs, steps, job["inputs"])
     return record, held_out, test_data
 
 

@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -12,12 +11,14 @@ import numpy as np
 
 from islands.data.coupled_record import CoupledRecord, CoupledSplit, match_coupled
 from islands.data.signal_map import match_rate
+from islands.data.split import measure_input_ranges
 from islands.errors import ModelError
 from islands.export import export_or_write
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.facade.results.identification import Result
 from islands.figures.names import FREE_RUN, OVERVIEW
+from islands.inspection.noise import measure_output_noise
 from islands.io.ensembles import (
     bands_document,
     bands_from_document,
@@ -25,12 +26,19 @@ from islands.io.ensembles import (
     ensemble_from_document,
 )
 from islands.io.models import model_json
-from islands.io.result_folder import finite, record_document, terms_in_result
+from islands.io.result_folder import (
+    finite,
+    record_document,
+    residual_structure_document,
+    terms_in_result,
+)
+from islands.io.result_text.coupled_statements import describe_coupled
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.models.coupled_narx import CoupledModel, coupled_equation, coupled_signals
 from islands.progress import Steps
 from islands.simulation.predictors import Simulation, free_run, one_step_ahead
 from islands.validation.metrics import Metrics, metrics
+from islands.validation.predictable_residual import ResidualStructure, measure_structure
 from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands
 
 if TYPE_CHECKING:
@@ -278,6 +286,11 @@ class CoupledResult(FittedCoupledModel):
                     "folder": f"outputs/{list_folders(self.model.output_names)[place]}",
                     "rank": self.ranks[place],
                     "bands": bands_document(self.prediction_bands[place] if self.prediction_bands else None),
+                    "data": {
+                        "noise": measure_output_noise(self.split.estimation.records[place]),
+                        "output_range": self.split.validation.records[place].output_range,
+                    },
+                    "residual": residual_structure_document(self._measure_residual(place)),
                     "metrics": {
                         part: {mode: asdict(each) for mode, each in by_mode.items()}
                         for part, by_mode in metrics[name].items()
@@ -285,6 +298,10 @@ class CoupledResult(FittedCoupledModel):
                 }
                 for place, name in enumerate(self.model.output_names)
             ],
+            "inputs": {
+                "estimation": measure_input_ranges(self.split.estimation.records[0]),
+                "validation": measure_input_ranges(self.split.validation.records[0]),
+            },
             "models": [self._model_document(metrics)],
             "ensemble": ensemble_document(ensemble),
             "estimation": record_document(self.split.estimation.records[0]) | {"names": self._names()},
@@ -292,6 +309,22 @@ class CoupledResult(FittedCoupledModel):
         }
         described: dict[str, Any] = finite(document)
         return described
+
+    def _measure_residual(self, place: int) -> ResidualStructure:
+        """Measure the residuals of an output on the longest recording of the validation data."""
+        data = self.split.validation
+        first, last = max(data.bounds, key=lambda bounds: bounds[1] - bounds[0])
+        recording = data.map(lambda each: each[first:last])
+        record, warm_up = recording.records[place], self.warm_up
+        one = one_step_ahead(self.model.models[place], recording.separate(place), warm_up)
+        free = self.simulate(recording)
+        one_step, simulated = (
+            (record.y - y)[warm_up:] if outcome else None
+            for y, outcome in ((one.y, one.outcome), (free.y[:, place], free.outcome))
+        )
+        return measure_structure(
+            one_step, simulated, record.u[warm_up:], record.y[warm_up:], data.records[place].output_range
+        )
 
     def _model_document(self, metrics: _Metrics) -> dict[str, Any]:
         ensemble = self.prediction_bands[0].ensemble if self.prediction_bands else None
@@ -317,32 +350,7 @@ class CoupledResult(FittedCoupledModel):
 
     def sentences(self) -> list[str]:
         """Return the result in sentences; the second one is the equations."""
-        refined = "were refined together" if self.refined else "are those of separate searches"
-        counts = f"One equation for each of {len(self.model.models)} outputs, {self.model.size} terms"
-        metrics = self.metrics
-        return [
-            f"{counts}; the parameters {refined}.",
-            "; ".join(self.equation.splitlines()),
-            *(self._describe_output(place, metrics) for place in range(len(self.model.models))),
-        ]
-
-    def _describe_output(self, place: int, metrics: _Metrics) -> str:
-        name, record = self.model.output_names[place], self.split.validation.records[place]
-        errors = metrics[name]["validation"]
-        free, one = errors["free_run"], errors["one_step_ahead"]
-        unit = f" {record.output_unit}".rstrip()
-        if not isfinite(free.rmse):
-            return f"{name}: the common free run on the validation data diverges."
-        text = (
-            f"{name}: the common free run on the validation data has an error of {free.mape:.3g} % of the "
-            f"range (RMSE {free.rmse:.4g}{unit}, R2 {free.r2:.4f}), one step ahead RMSE {one.rmse:.4g}{unit}"
-        )
-        if self.prediction_bands:
-            half = self.prediction_bands[place].typical_half_width(LEVEL)
-            text += (
-                f"; a new measurement is within {half:.3g}{unit} of it in {100 * LEVEL:g} % of the samples"
-            )
-        return f"{text}."
+        return describe_coupled(self.document())
 
     def _names(self) -> dict[str, list[str]]:
         return {"inputs": list(self.model.input_names), "outputs": list(self.model.output_names)}
@@ -365,7 +373,9 @@ class CoupledResult(FittedCoupledModel):
                 f"{name:20} {f'{free.rmse:.4g}{unit}':>18} {free.mape:10.3g} {free.r2:8.4f} "
                 f"{f'{one.rmse:.4g}{unit}':>18}"
             )
-        return "\n".join(lines)
+        # The errors are in the table.
+        verdict = self.sentences()[2 + len(self.model.models) :]
+        return "\n".join([*lines, "", *(line for sentence in verdict for line in wrap(sentence))])
 
 
 def _average(metrics: Sequence[Metrics]) -> dict[str, float]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import floor
-from typing import Any, Final
+from typing import Any, Final, Generic, TypeVar
 
 from islands.data.preprocessing_steps import Preprocessing
 from islands.data.split import compare_input_ranges
@@ -17,10 +17,10 @@ from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
 from islands.validation.prediction_bands import LEVEL
 
 #: Smallest R2 of a simulation that counts as good.
-GOOD_R2 = 0.9
+_GOOD_R2 = 0.9
 
 #: Largest ratio of the free-run error and the noise level at which the error is that of the noise.
-NOISE_RATIO = 1.2
+_NOISE_RATIO = 1.2
 
 #: Ratio of the errors on validation data and estimation data above which a model does not generalise.
 _LARGE_RATIO = 2.0
@@ -29,7 +29,7 @@ _LARGE_RATIO = 2.0
 _ROUNDING = 1e-6
 
 #: Least fraction of the validation samples inside a band of 90 %: two standard errors of 20 independent ones.
-LEAST_COVERAGE = 0.75
+_LEAST_COVERAGE = 0.75
 
 #: Standard errors below which a parameter is not significant.
 _SIGNIFICANT = 2.0
@@ -55,8 +55,96 @@ _HINTS = {
 #: Values of a JSON object.
 Document = Mapping[str, Any]
 
+F = TypeVar("F")
 
-class ResultFacts:
+
+class RunFacts:
+    """Quantities of the free run of one output.
+
+    Parameters
+    ----------
+    metrics : mapping
+        Errors by part and simulation; null for a divergence.
+    unit : str
+        Unit of the output.
+    bands, residual, data : mapping
+        Prediction bands, residual tests and facts about the data; empty if they are unknown.
+    """
+
+    def __init__(
+        self, metrics: Document, unit: str, bands: Document, residual: Document, data: Document
+    ) -> None:
+        self.metrics, self.unit, self.bands, self.residual, self.data = metrics, unit, bands, residual, data
+
+    def error(self, mode: str = "free_run", part: str = "validation") -> Document:
+        """Return the errors of a simulation; null for a divergence."""
+        errors: Document = self.metrics[part][mode]
+        return errors
+
+    def write_amount(self, value: float) -> str:
+        """Write a value of the output with its unit."""
+        return write_amount(value, self.unit)
+
+    @property
+    def coverage(self) -> float | None:
+        """Fraction of the validation samples in the band."""
+        found: float | None = self.bands.get("coverage")
+        return found
+
+    @property
+    def is_covered(self) -> bool:
+        """Whether the band contains enough of the validation samples, as far as that is known."""
+        return self.coverage is None or self.coverage >= _LEAST_COVERAGE
+
+    @property
+    def verdict(self) -> str | None:
+        """Verdict on the residual of the free run. Results of earlier versions have none."""
+        found: str | None = self.residual.get("verdict")
+        return found
+
+    def share(self, mode: str) -> float | None:
+        """Return the predictable share of a residual; null after a divergence."""
+        found: float | None = self.residual.get("predictable_share", {}).get(mode)
+        return found
+
+    @property
+    def has_structure(self) -> bool:
+        """Whether the residual of the free run has a predictable part, or the free run diverges."""
+        return self.verdict not in (ADEQUATE, None)
+
+    @property
+    def has_visible_structure(self) -> bool:
+        """Whether the residual of the free run has a predictable part."""
+        return self.has_structure and self.residual["predictable_percent"] is not None
+
+    @property
+    def simulates(self) -> bool:
+        """Whether the free run follows the output: R2 is good, or the error is that of the noise."""
+        rmse, r2, noise = self.error()["rmse"], self.error()["r2"], self.data.get("noise")
+        if rmse is None:
+            return False
+        # R2 is undefined for a constant output.
+        return r2 is None or r2 >= _GOOD_R2 or (noise is not None and rmse <= _NOISE_RATIO * noise)
+
+    @property
+    def predicts(self) -> bool:
+        """Whether the prediction one step ahead follows the output."""
+        return (self.error("one_step_ahead")["r2"] or 0.0) >= _GOOD_R2
+
+    @property
+    def error_ratio(self) -> float:
+        """Free-run error on the validation data divided by that on the estimation data; 0 for rounding."""
+        estimated, validated = (self.error(part=part)["rmse"] for part in ("estimation", "validation"))
+        rounding = _ROUNDING * self.data.get("output_range", 0.0)
+        return float(validated / estimated) if estimated and (validated or 0.0) > rounding else 0.0
+
+    @property
+    def generalises_poorly(self) -> bool:
+        """Whether the error on the validation data is much larger than that on the estimation data."""
+        return self.error_ratio > _LARGE_RATIO
+
+
+class ResultFacts(RunFacts):
     """Quantities of a ``result.json`` that the statements read. Those of earlier versions lack some of them.
 
     Parameters
@@ -68,44 +156,19 @@ class ResultFacts:
     def __init__(self, document: Document) -> None:
         self.document = document
         self.record: Document = document["record"]
-        self.data: Document = document.get("data", {})
         # Results of earlier versions recommend no model.
         self.recommended: Document = document.get("recommended", {"rank": 1, "reasons": ()})
         self.model: Document = document["models"][self.recommended["rank"] - 1]
         self.physics: Document = self.model["physics"]
-        self.residual: Document = self.model["residual_tests"]
-
-    def error(self, mode: str = "free_run", part: str = "validation") -> Document:
-        """Return the errors of a simulation; null for a divergence."""
-        errors: Document = self.model["metrics"][part][mode]
-        return errors
-
-    def write_amount(self, value: float) -> str:
-        """Write a value of the output with its unit."""
-        return write_amount(value, self.record["units"]["output"])
+        model, unit = self.model, self.record["units"]["output"]
+        bands, data = model.get("bands") or {}, document.get("data", {})
+        super().__init__(model["metrics"], unit, bands, model["residual_tests"], data)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the output and of every input in equations."""
         columns = self.record["names"]
         return name_columns(columns["output"], columns["inputs"])
-
-    @property
-    def coverage(self) -> float | None:
-        """Fraction of the validation samples in the band."""
-        found: float | None = (self.model.get("bands") or {}).get("coverage")
-        return found
-
-    @property
-    def verdict(self) -> str | None:
-        """Verdict on the residual of the free run. Results of earlier versions have none."""
-        found: str | None = self.residual.get("verdict")
-        return found
-
-    def share(self, mode: str) -> float | None:
-        """Return the predictable share of a residual, null after a divergence."""
-        found: float | None = self.residual.get("predictable_share", {}).get(mode)
-        return found
 
     @property
     def requires_property_1(self) -> bool:
@@ -125,11 +188,6 @@ class ResultFacts:
         bounded = all(test["bounded"] for test in tests)
         return bounded and bool(self.physics["property_1"] or not self.requires_property_1)
 
-    @property
-    def simulates(self) -> bool:
-        """Whether the free run follows the output: R2 is good, or the error is that of the noise."""
-        return follows_output(self.error(), self.data.get("noise"))
-
     @cached_property
     def extrapolation(self) -> list[str]:
         """Inputs of the validation data that leave the range of the estimation data."""
@@ -139,18 +197,6 @@ class ResultFacts:
         return compare_input_ranges(
             columns["names"]["inputs"], columns["units"]["inputs"], ranges["estimation"], ranges["validation"]
         )
-
-    @property
-    def error_ratio(self) -> float:
-        """Free-run error on the validation data divided by that on the estimation data; 0 for rounding."""
-        estimated, validated = (self.error(part=part)["rmse"] for part in ("estimation", "validation"))
-        rounding = _ROUNDING * self.data.get("output_range", 0.0)
-        return float(validated / estimated) if estimated and (validated or 0.0) > rounding else 0.0
-
-    @property
-    def generalises_poorly(self) -> bool:
-        """Whether the error on the validation data is much larger than that on the estimation data."""
-        return self.error_ratio > _LARGE_RATIO
 
     @cached_property
     def doubtful(self) -> list[tuple[str, float]]:
@@ -195,7 +241,7 @@ class ResultFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class Statement:
+class Statement(Generic[F]):
     """A statement about a result.
 
     Attributes
@@ -208,11 +254,11 @@ class Statement:
     """
 
     name: str
-    holds: Callable[[ResultFacts], object]
-    write: Callable[[ResultFacts], str]
+    holds: Callable[[F], object]
+    write: Callable[[F], str]
 
 
-def find_statements(statements: Iterable[Statement], facts: ResultFacts) -> list[Statement]:
+def find_statements(statements: Iterable[Statement[F]], facts: F) -> list[Statement[F]]:
     """Return the statements that hold."""
     return [each for each in statements if each.holds(facts)]
 
@@ -230,15 +276,6 @@ def write_percent(share: float) -> str:
 def round_down(share: float) -> str:
     """Write a share so that one below a limit never shows the limit."""
     return f"{floor(100 * share) / 100:.2f}"
-
-
-def follows_output(error: Document, noise: float | None) -> bool:
-    """Return whether a finite free run follows the output: R2 is good, or the error is that of the noise."""
-    rmse, r2 = error["rmse"], error["r2"]
-    if rmse is None:
-        return False
-    # R2 is undefined for a constant output.
-    return r2 is None or r2 >= GOOD_R2 or (noise is not None and rmse <= NOISE_RATIO * noise)
 
 
 def list_doubtful(terms: Iterable[Document]) -> list[tuple[str, float]]:
@@ -291,23 +328,24 @@ def describe_units(document: Document) -> str:
     pairs = zip(facts.names, (units["output"], *units["inputs"]), strict=True)
     listed = ", ".join(f"{name} in {unit}" for name, unit in pairs if unit)
     head = f"{'; '.join(filter(None, [listed, _describe_rate(facts)]))}."
-    return " ".join([head, *_write_all(_REMARKS, facts)])
+    return " ".join([head, *write_statements(_REMARKS, facts)])
 
 
 def describe_findings(document: Document) -> list[str]:
     """Describe errors, uncertainty, uses, failures and next steps of the recommended model."""
     facts = ResultFacts(document)
-    good, bad = _write_all(USES, facts), _write_all(FAILURES, facts)
+    good, bad = write_statements(USES, facts), write_statements(FAILURES, facts)
     return [
-        *_write_all(MEASURES, facts),
-        *_write_all(VERDICTS, facts),
+        *write_statements(MEASURES, facts),
+        *write_statements(VERDICTS, facts),
         f"Good for: {'; '.join(good) or 'no use that the checks confirm'}.",
         f"Fails at: {'; '.join(bad) or 'none of the checks'}.",
-        f"Next: {'; '.join(_write_all(NEXT_STEPS, facts))}.",
+        f"Next: {'; '.join(write_statements(NEXT_STEPS, facts))}.",
     ]
 
 
-def _write_all(statements: Iterable[Statement], facts: ResultFacts) -> list[str]:
+def write_statements(statements: Iterable[Statement[F]], facts: F) -> list[str]:
+    """Return the texts of the statements that hold."""
     return [each.write(facts) for each in find_statements(statements, facts)]
 
 
@@ -360,7 +398,7 @@ def _describe_missing_outputs(facts: ResultFacts) -> str:
 
 
 def _describe_uncertainty(facts: ResultFacts) -> str:
-    half = facts.write_amount(typical_half_width(facts.model["bands"]))
+    half = facts.write_amount(typical_half_width(facts.bands))
     text = f"Uncertainty: the {100 * LEVEL:g} % prediction band of the free run has a median half-width of "
     text += half
     doubtful = [f"{term} {round_down(share)}" for term, share in facts.doubtful]
@@ -394,7 +432,7 @@ def _describe_verdict(word: str) -> Callable[[ResultFacts], str]:
     """Return a writer of the verdict, with the measured quantities of the free run in brackets."""
 
     def write(facts: ResultFacts) -> str:
-        measured = "; ".join(_write_all(VERDICT_DETAILS, facts))
+        measured = "; ".join(write_statements(VERDICT_DETAILS, facts))
         return f"As a simulation: {word} ({measured})." if measured else f"As a simulation: {word}."
 
     return write
@@ -404,31 +442,45 @@ def _has_limits(facts: ResultFacts) -> bool:
     return bool(find_statements(FAILURES, facts))
 
 
-def _is_above_limit(facts: ResultFacts) -> bool:
-    """Return whether a visible part of the residual of the free run is predictable."""
-    return facts.verdict not in (ADEQUATE, None) and facts.residual["predictable_percent"] is not None
-
-
-def _exceeds(share: float | None) -> bool:
+def exceeds_limit(share: float | None) -> bool:
+    """Return whether more than the limit of a residual is predictable, or the share is unknown."""
     return share is None or share > LARGEST_SHARE
 
 
-def _is_one_step_unpredictable(facts: ResultFacts) -> bool:
-    """Return whether the error one step ahead is the smallest that the data show."""
-    return not _exceeds(facts.share("one_step_ahead")) and bool(facts.error("one_step_ahead")["rmse"])
+def describe_error_level(facts: RunFacts, name: str) -> str:
+    """State the error of a bounded free run against the noise level of the output, or one step ahead.
+
+    Parameters
+    ----------
+    facts : RunFacts
+    name : str
+        Name of the output.
+
+    Returns
+    -------
+    str
+        Empty if neither is known, the free run diverges, or its error is a rounding error.
+    """
+    rmse, noise = facts.error()["rmse"], facts.data.get("noise")
+    # The ratio of two rounding errors says nothing.
+    if rmse is None or rmse <= _ROUNDING * facts.data.get("output_range", 0.0):
+        return ""
+    if noise:
+        ratio = rmse / noise
+        # The level has an uncertainty: an error below it is no contradiction.
+        times = "at" if ratio <= _NOISE_RATIO else f"{ratio:.3g} times"
+        return f"RMSE {times} the noise level of {name}, {facts.write_amount(noise)}"
+    one_step = facts.error("one_step_ahead")["rmse"]
+    # An unpredictable error one step ahead is the smallest that the data show.
+    if one_step and not exceeds_limit(facts.share("one_step_ahead")):
+        return f"RMSE {rmse / one_step:.3g} times the unpredictable error one step ahead"
+    return ""
 
 
-def _describe_noise_ratio(facts: ResultFacts) -> str:
-    noise = facts.data["noise"]
-    ratio = facts.error()["rmse"] / noise
-    # The level has an uncertainty: an error below it is no contradiction.
-    times = "at" if ratio <= NOISE_RATIO else f"{ratio:.3g} times"
-    return f"RMSE {times} the noise level of {facts.names[0]}, {facts.write_amount(noise)}"
-
-
-def _describe_one_step_ratio(facts: ResultFacts) -> str:
-    ratio = facts.error()["rmse"] / facts.error("one_step_ahead")["rmse"]
-    return f"RMSE {ratio:.3g} times that one step ahead, whose residual is not predictable"
+def describe_excess(facts: RunFacts) -> str:
+    """State how much larger the free-run error on the validation data is than that on the estimation data."""
+    ratio = f"{facts.error_ratio:.2g}"
+    return f"the free-run error on the validation data is {ratio} times that on the estimation data"
 
 
 def _describe_reason(facts: ResultFacts) -> str:
@@ -483,11 +535,7 @@ def _largest_size(facts: ResultFacts) -> int:
 
 def _may_grow(facts: ResultFacts) -> bool:
     is_largest = facts.model["size"] == _largest_size(facts)
-    return _has_structure(facts) and is_largest and "max_terms" in facts.document["settings"]
-
-
-def _has_structure(facts: ResultFacts) -> bool:
-    return facts.verdict not in (ADEQUATE, None)
+    return facts.has_structure and is_largest and "max_terms" in facts.document["settings"]
 
 
 def _describe_longer_record(facts: ResultFacts) -> str:
@@ -523,7 +571,7 @@ def _suggest_terms(facts: ResultFacts) -> str:
 
 
 #: Remarks on the equation.
-_REMARKS: Final = (
+_REMARKS: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement(
         "feedthrough",
         lambda facts: facts.document["preprocessing"].get("feedthrough"),
@@ -537,7 +585,7 @@ _REMARKS: Final = (
 )
 
 #: Measured errors, uncertainty, and what the model meets.
-MEASURES: Final = (
+MEASURES: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement("error", lambda facts: facts.error()["rmse"] is not None, _describe_error),
     Statement(
         "divergence",
@@ -555,7 +603,7 @@ MEASURES: Final = (
     Statement("missing-outputs", lambda facts: facts.data.get("missing_outputs"), _describe_missing_outputs),
     Statement(
         "uncertainty",
-        lambda facts: facts.model.get("bands") and facts.document.get("ensemble") is not None,
+        lambda facts: facts.bands and facts.document.get("ensemble") is not None,
         _describe_uncertainty,
     ),
     Statement(
@@ -570,8 +618,8 @@ MEASURES: Final = (
     ),
 )
 
-#: Measured quantities beside the verdict.
-VERDICT_DETAILS: Final = (
+#: Measured quantities of the verdict.
+VERDICT_DETAILS: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement(
         "predictable-share",
         lambda facts: facts.share("free_run") is not None,
@@ -580,18 +628,9 @@ VERDICT_DETAILS: Final = (
         ),
     ),
     Statement(
-        "noise-ratio",
-        lambda facts: facts.data.get("noise") and facts.error()["rmse"] is not None,
-        _describe_noise_ratio,
-    ),
-    Statement(
-        "one-step-ratio",
-        lambda facts: (
-            not facts.data.get("noise")
-            and facts.error()["rmse"] is not None
-            and _is_one_step_unpredictable(facts)
-        ),
-        _describe_one_step_ratio,
+        "error-level",
+        lambda facts: describe_error_level(facts, facts.names[0]),
+        lambda facts: describe_error_level(facts, facts.names[0]),
     ),
     Statement(
         "coverage",
@@ -609,7 +648,7 @@ VERDICT_DETAILS: Final = (
 )
 
 #: What the model can be used for.
-USES: Final = (
+USES: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement(
         "simulation",
         lambda facts: facts.simulates and not _has_limits(facts),
@@ -622,12 +661,12 @@ USES: Final = (
     ),
     Statement(
         "prediction",
-        lambda facts: not facts.simulates and (facts.error("one_step_ahead")["r2"] or 0.0) >= GOOD_R2,
+        lambda facts: not facts.simulates and facts.predicts,
         lambda _: "prediction one step ahead",
     ),
     Statement(
         "adequate-residual",
-        lambda facts: facts.verdict == ADEQUATE and not _exceeds(facts.share("free_run")),
+        lambda facts: facts.verdict == ADEQUATE and not exceeds_limit(facts.share("free_run")),
         lambda _: (
             "no structure is left in the free-run residual (at most "
             f"{write_percent(LARGEST_SHARE)} is predictable)"
@@ -635,14 +674,14 @@ USES: Final = (
     ),
     Statement(
         "rounding-residual",
-        lambda facts: facts.verdict == ADEQUATE and _exceeds(facts.share("free_run")),
+        lambda facts: facts.verdict == ADEQUATE and exceeds_limit(facts.share("free_run")),
         lambda _: "the residual is a rounding error",
     ),
     Statement("sound", lambda facts: _has_physics_reason(facts) and facts.is_sound, _describe_reason),
 )
 
 #: Checks that the model fails.
-FAILURES: Final = (
+FAILURES: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement("unsound", lambda facts: _has_physics_reason(facts) and not facts.is_sound, _describe_reason),
     Statement(
         "unmet-constraints",
@@ -684,23 +723,16 @@ FAILURES: Final = (
         ),
     ),
     Statement("open-loops", lambda facts: facts.open_loops, _describe_open_loops),
-    Statement("predictable-residual", _is_above_limit, _describe_structure),
+    Statement("predictable-residual", lambda facts: facts.has_visible_structure, _describe_structure),
     Statement(
         "low-coverage",
-        lambda facts: facts.coverage is not None and facts.coverage < LEAST_COVERAGE,
+        lambda facts: not facts.is_covered,
         lambda facts: (
             f"the {100 * LEVEL:g} % prediction band contains {write_percent(facts.coverage or 0.0)} of "
             "the validation samples"
         ),
     ),
-    Statement(
-        "error-ratio",
-        lambda facts: facts.generalises_poorly,
-        lambda facts: (
-            f"the free-run error on the validation data is {facts.error_ratio:.2g} times that on the "
-            "estimation data"
-        ),
-    ),
+    Statement("error-ratio", lambda facts: facts.generalises_poorly, describe_excess),
     Statement(
         "extrapolation",
         lambda facts: facts.extrapolation,
@@ -709,7 +741,7 @@ FAILURES: Final = (
 )
 
 #: The verdict on the use as a simulation; one of them holds.
-VERDICTS: Final = (
+VERDICTS: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement("good", lambda facts: facts.simulates and not _has_limits(facts), _describe_verdict("good")),
     Statement(
         "usable",
@@ -720,11 +752,11 @@ VERDICTS: Final = (
 )
 
 #: What to do next.
-NEXT_STEPS: Final = (
+NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement("more-terms", _may_grow, lambda facts: f"allow more than {_largest_size(facts)} terms"),
     Statement(
         "free-run-estimate",
-        lambda facts: _has_structure(facts) and not _exceeds(facts.share("one_step_ahead")),
+        lambda facts: facts.has_structure and not exceeds_limit(facts.share("one_step_ahead")),
         lambda _: (
             "try an estimate that minimises the error of the free run (--estimator free-run), or measure the "
             "disturbance: one step ahead, no structure is left"
@@ -732,7 +764,7 @@ NEXT_STEPS: Final = (
     ),
     Statement(
         "other-terms",
-        lambda facts: _has_structure(facts) and _exceeds(facts.share("one_step_ahead")),
+        lambda facts: facts.has_structure and exceeds_limit(facts.share("one_step_ahead")),
         _suggest_terms,
     ),
     Statement(

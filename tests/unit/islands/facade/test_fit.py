@@ -1,6 +1,7 @@
 """`islands.fit`, and the methods of its result."""
 
 import json
+import warnings
 from contextlib import nullcontext
 
 import numpy as np
@@ -10,8 +11,8 @@ import islands
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.figures.names import ALL_FIGURES
-from islands.io.result_folder import record_document, result_json
-from islands.io.result_text.summary_text import summary
+from islands.io.result_folder import record_document, result_document, result_json
+from islands.io.result_text.statements import describe
 from islands.models.equations import equation, latex_equation
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 from support.undrawn import undrawn_figures
@@ -52,6 +53,25 @@ def result():
 # Attributes and methods of a result.
 
 
+def test_an_extrapolating_validation_is_a_warning_before_the_fit() -> None:
+    data = tank()
+    wide = Dataset(3.0 * data.u[:100], data.y[:100], data.dt)
+
+    def refuse(*_):
+        raise AssertionError("the fit began before the warning")
+
+    message = "validation extrapolates: u is .* in the validation data and .* in the estimation data"
+    with pytest.warns(islands.ExtrapolationWarning, match=message), pytest.raises(AssertionError):
+        islands.fit(data, validation=wide, progress=refuse)
+    with pytest.warns(islands.ExtrapolationWarning, match=message), pytest.raises(AssertionError):
+        islands.identify(data, validation=wide, progress=refuse)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        within = Dataset(0.9 * data.u[:100], data.y[:100], data.dt)
+        settings = {"library": "polynomial", "degree": 1, "lags": 1, "certificate": 0, "average": 1}
+        islands.fit(data, validation=within, **settings)
+
+
 def test_best_model_has_the_documented_attributes(result):
     best = result.best
     assert best.equation.startswith("y(k) = 1*y(k-1) ")
@@ -70,7 +90,8 @@ def test_models_are_ordered_by_error_and_have_ranks(result):
     errors = [model.metrics["validation"]["free_run"].rmse for model in result.models]
     assert errors == sorted(errors)
     assert sorted(model.model.size for model in result.models) == [1, 2, 3, 4, 5]
-    assert str(result) == summary(result.search_result)
+    sentences = describe(result_document(result.search_result))
+    assert " ".join(sentences[-1].split()) in " ".join(str(result).split())
 
 
 def test_model_simulates_a_record_in_three_modes(result):

@@ -7,7 +7,6 @@ import islands
 from islands.data.dataset import Dataset, join
 from islands.errors import RecordError
 from islands.expressions.printing import plain
-from islands.io.result_text.summary_text import summary
 
 TANK = {"y(k-1)": 0.6, "u(k-1)": 0.5, "u(k-1)^2": -0.2}
 
@@ -44,7 +43,7 @@ def test_a_law_is_found_in_a_record_with_missing_outputs():
     y[[3, 50, 51, 52, 120, 200, 350, 361]] = np.nan
     made = islands.fit(Dataset(tank().u, y, 1.0), library="polynomial", max_terms=4)
     check_law(made)
-    assert "Missing outputs: 8 of 400 samples are skipped" in " ".join(summary(made.search_result).split())
+    assert "Missing outputs: 8 of 400 samples are skipped" in " ".join(str(made).split())
 
 
 def test_a_record_without_any_output_raises_record_error():

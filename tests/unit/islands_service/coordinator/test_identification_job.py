@@ -5,11 +5,15 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import pytest
 import structlog
 
+from islands.io.records.preview import preview
+from islands.io.result_folder import result_document
+from islands.io.result_text.statements import describe
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_job import run_identification_job
@@ -56,6 +60,40 @@ def test_job_finds_the_models_of_a_single_process(
     drawn = read_search_result(ended, store, blobs, None)
     errors = [asdict(entry.metrics["validation"]["multiple_shooting"]) for entry in drawn.models]
     assert errors == [model["metrics"]["validation"]["multiple_shooting"] for model in undisturbed[0]]
+    # The report states what the summary of the job states.
+    words = ended.summary["words"].splitlines()
+    assert len(words) > 5
+    assert describe(result_document(drawn)) == words
+
+
+@pytest.mark.ci
+def test_an_extrapolating_validation_is_stated_before_the_search(
+    store: Store, blobs: Blobs, job: Job, record: Path, tmp_path: Path
+) -> None:
+    head, *lines = record.read_text().splitlines()
+    name = head.split(",").index("u_V")
+    wide = [line.split(",") for line in lines]
+    for cells in wide[-100:]:
+        cells[name] = str(3.0 * float(cells[name]))
+    path = tmp_path / "wide.csv"
+    path.write_text("\n".join([head, *(",".join(cells) for cells in wide)]))
+    data, described = path.read_bytes(), asdict(preview(path))
+    dataset, _ = store.datasets.add(ALICE, "wide.csv", ".csv", blobs.write(data), len(data), described)
+    store.jobs.cancel(ALICE, job.id)
+    changed, _ = store.jobs.submit(Submission(ALICE, {**job.spec, "dataset": dataset.id}))
+
+    def stop_once_warned() -> None:
+        progress = store.jobs.get(ALICE, changed.id).progress or {}
+        if "warnings" in progress:
+            raise CoordinatorStopping("enough")
+
+    with pytest.raises(CoordinatorStopping):
+        run_job(claim(store), store, blobs, stop_once_warned)
+    progress = store.jobs.get(ALICE, changed.id).progress
+    assert progress is not None
+    assert "generation" not in progress
+    (warning,) = progress["warnings"]
+    assert warning.startswith("validation extrapolates: u_V is ")
 
 
 @pytest.mark.ci

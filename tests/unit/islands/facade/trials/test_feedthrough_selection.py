@@ -15,7 +15,6 @@ from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.rate_selection import TrialLibrary
 from islands.io.models import model_from_json, model_json
 from islands.io.result_folder import result_json
-from islands.io.result_text.summary_text import summary
 from islands.systems.catalogue import make_record
 
 LIBRARY = {"library": "polynomial", "degree": 1, "max_terms": 5, "average": 1}
@@ -116,7 +115,7 @@ def found():
 
 def test_the_equation_the_summary_and_the_document_state_it(found):
     assert found.best.equation == "y(k) = 0.7*y(k-1) + 0.3*u(k)"
-    assert "the output responds to u_V within the sample" in " ".join(summary(found.search_result).split())
+    assert "the output responds to u_V within the sample" in " ".join(str(found).split())
     document = json.loads(result_json(found.search_result))
     assert document["preprocessing"]["feedthrough"] == ["u_V"]
     assert document["settings"]["feedthrough"] == "auto"

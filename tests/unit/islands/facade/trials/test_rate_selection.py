@@ -13,7 +13,6 @@ from islands.data.split import average_split, split
 from islands.facade.trials.rate_selection import TrialLibrary, select_rate
 from islands.io.models import model_from_json, model_json
 from islands.io.result_folder import result_json, write_result
-from islands.io.result_text.summary_text import summary
 
 LIBRARY = {"library": "polynomial", "degree": 1, "max_terms": 4}
 TRIAL = TrialLibrary("polynomial", 1, 3, "none")
@@ -101,7 +100,7 @@ def test_the_result_states_the_averages(averaged):
     document = json.loads(result_json(averaged.search_result))
     assert document["preprocessing"].items() >= {"average": count, "dt": dt}.items()
     assert document["settings"]["average"] == "auto"
-    assert f"the mean of {count} samples of the record" in " ".join(summary(averaged.search_result).split())
+    assert f"the mean of {count} samples of the record" in " ".join(str(averaged).split())
     assert f"sampling time {dt} s; each value is the mean of {count} samples" in averaged.best.export("c")
 
 

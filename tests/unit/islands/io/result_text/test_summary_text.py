@@ -190,9 +190,7 @@ def test_the_verdict_has_the_error_against_the_noise_level(findings):
     changed = errors(findings, noisy) | {"validation": {"free_run": noisy, "one_step_ahead": one}}
     changed["validation"] |= {"multiple_shooting": noisy}
     document = with_noise(findings, None, metrics=changed, residual_structure=white)
-    assert "RMSE 2.5 times that one step ahead, whose residual is not predictable" in " ".join(
-        statements.describe(document)
-    )
+    assert "RMSE 2.5 times the unpredictable error one step ahead" in " ".join(statements.describe(document))
 
 
 def with_noise(findings, noise, **changes):
