@@ -4,7 +4,6 @@ from dataclasses import replace
 from functools import cache
 from math import inf, nan
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -24,8 +23,8 @@ from islands.validation.metrics import Metrics
 from islands.validation.predictable_residual import VERDICTS, ResidualStructure
 from support.assessments import with_changes
 from support.coupled_systems import TWO_MASSES, make_coupled_record
-from support.portfolio_records import KINDS
 from support.searches import record
+from support.stated_results import list_texts, make_cases
 from support.statements import EXCLUSIVE, find_contradictions
 
 OK = EvaluationOutcome(Status.OK, "")
@@ -197,31 +196,28 @@ def test_no_two_sentences_about_several_outputs_contradict_each_other(choices, l
     assert not find_contradictions(page.decode())
 
 
+CASES = make_cases()
+
+#: Cases of every kind; `tests/benchmarks/contradictions.py` has all of them.
+SAMPLE = (
+    *(name for name in CASES if name.startswith("portfolio")),
+    *[name for name in CASES if name.startswith("law")][::12],
+    *(name for name in CASES if name.startswith("first order") and name.endswith("seed 1")),
+    *(
+        f"first order, {fault}, seed 0"
+        for fault in ("sentinels", "spikes", "short", "extrapolation", "integrator")
+    ),
+    *[name for name in CASES if name.startswith("several outputs")][::5],
+    *("diagnosis, first order", "diagnosis, tank"),
+)
+
+
 @pytest.mark.ci
-@pytest.mark.parametrize("name", sorted(KINDS))
+@pytest.mark.parametrize("name", SAMPLE)
 def test_no_two_sentences_about_a_record_contradict_each_other(name):
-    data, _ = KINDS[name].record(seed=0)
-    result = islands.fit(data).search_result
-    assert not find_contradictions(str(islands.Result.from_search(result)))
-    assert not find_contradictions(identification_report(name, result, {}).decode())
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("fault", ["sentinels", "spikes", "short", "extrapolation", "integrator"])
-def test_no_two_sentences_about_an_awkward_record_contradict_each_other(fault):
-    rng = np.random.default_rng(0)
-    samples = 60 if fault == "short" else 1200
-    u, y = rng.uniform(-1.0, 1.0, samples), np.zeros(samples)
-    if fault == "extrapolation":
-        u[-samples // 4 :] *= 3.0
-    pole = 1.0 if fault == "integrator" else 0.9
-    for k in range(1, samples):
-        y[k] = pole * y[k - 1] + 0.2 * u[k - 1]
-    y += 0.02 * rng.standard_normal(samples)
-    if fault in ("sentinels", "spikes"):
-        y[[100, 500, 1000]] = -9999.0 if fault == "sentinels" else 12.0
-    result = islands.fit(Dataset(u, y, 0.1, ("valve",), "level")).search_result
-    assert not find_contradictions(str(islands.Result.from_search(result)))
+    """In the summary, in a notebook, over REST and in the report, from the run and from its folder."""
+    for where, text in list_texts(name, CASES[name]()).items():
+        assert not find_contradictions(text), where
 
 
 def test_the_checker_finds_the_contradictions_that_were_printed():

@@ -32,6 +32,12 @@ EXCLUSIVE = (
     (r"As a simulation: (good|usable)", r"Fails at: .*simulation from the inputs alone: the free run"),
     (r"Fails at: none of the checks", r"try other terms or more lags"),
     (r"Fails at: none of the checks", r"% of the residual of \w+ is predictable \(RMS"),
+    (r"No significant discrepancy", r"simulation (lacks|is wrong)"),
+    (r"No significant discrepancy", r"the RMSE falls from"),
+    (r"No significant discrepancy", r"improves the fit, but is not claimed.*which explain the discrepancy"),
+    (r"which explain the discrepancy", r"no known effect explains"),
+    (r"stopped before a verdict", r"(No significant discrepancy|which explain)"),
+    (r"the RMSE falls from", r"%?, by -[\d.]+ %"),
     (r"Good for: no use that", r"no structure is left in the"),
     (r"drifts by [\d.e+]+ % of its range at constant input", r"Good for: .*Property 1 holds.* Fails at:"),
 )

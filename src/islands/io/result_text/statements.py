@@ -25,6 +25,9 @@ _NOISE_RATIO = 1.2
 #: Ratio of the errors on validation data and estimation data above which a model does not generalise.
 _LARGE_RATIO = 2.0
 
+#: Ratio of the free-run error and that one step ahead below which the free run is better.
+_BETTER = 0.95
+
 #: RMSE as a fraction of the output range that is a rounding error: its ratio to another one says nothing.
 _ROUNDING = 1e-6
 
@@ -131,12 +134,17 @@ class RunFacts:
         """Whether the prediction one step ahead follows the output."""
         return (self.error("one_step_ahead")["r2"] or 0.0) >= _GOOD_R2
 
+    def is_rounding(self, rmse: float) -> bool:
+        """Return whether an error is that of rounding: its ratio to another one says nothing."""
+        return bool(rmse <= _ROUNDING * self.data.get("output_range", 0.0))
+
     @property
     def error_ratio(self) -> float:
         """Free-run error on the validation data divided by that on the estimation data; 0 for rounding."""
         estimated, validated = (self.error(part=part)["rmse"] for part in ("estimation", "validation"))
-        rounding = _ROUNDING * self.data.get("output_range", 0.0)
-        return float(validated / estimated) if estimated and (validated or 0.0) > rounding else 0.0
+        if not estimated or validated is None or self.is_rounding(validated):
+            return 0.0
+        return float(validated / estimated)
 
     @property
     def generalises_poorly(self) -> bool:
@@ -187,6 +195,18 @@ class ResultFacts(RunFacts):
         tests = (*self.physics["holds"], *self.physics["excursions"])
         bounded = all(test["bounded"] for test in tests)
         return bounded and bool(self.physics["property_1"] or not self.requires_property_1)
+
+    @property
+    def has_output_noise(self) -> bool:
+        """Whether least squares is biased by noise of the measured output.
+
+        The measured past then makes the prediction one step ahead worse than an adequate free run.
+        """
+        free, one = self.error()["rmse"], self.error("one_step_ahead")["rmse"]
+        if free is None or one is None or self.has_structure or exceeds_limit(self.share("free_run")):
+            return False
+        is_biased = self.document["settings"].get("estimator") == "least-squares"
+        return is_biased and not self.is_rounding(one) and free < _BETTER * one
 
     @cached_property
     def extrapolation(self) -> list[str]:
@@ -462,8 +482,7 @@ def describe_error_level(facts: RunFacts, name: str) -> str:
         Empty if neither is known, the free run diverges, or its error is a rounding error.
     """
     rmse, noise = facts.error()["rmse"], facts.data.get("noise")
-    # The ratio of two rounding errors says nothing.
-    if rmse is None or rmse <= _ROUNDING * facts.data.get("output_range", 0.0):
+    if rmse is None or facts.is_rounding(rmse):
         return ""
     if noise:
         ratio = rmse / noise
@@ -766,6 +785,14 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
         "other-terms",
         lambda facts: facts.has_structure and exceeds_limit(facts.share("one_step_ahead")),
         _suggest_terms,
+    ),
+    Statement(
+        "output-noise",
+        lambda facts: facts.has_output_noise,
+        lambda _: (
+            "estimate with --estimator free-run: the free run is better than the prediction one step ahead, "
+            "so that the noise is that of the measured output, which biases least squares"
+        ),
     ),
     Statement(
         "wider-record",

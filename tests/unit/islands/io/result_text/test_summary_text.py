@@ -3,6 +3,7 @@
 from dataclasses import replace
 from math import nan
 
+import numpy as np
 import pytest
 
 import islands
@@ -191,6 +192,29 @@ def test_the_verdict_has_the_error_against_the_noise_level(findings):
     changed["validation"] |= {"multiple_shooting": noisy}
     document = with_noise(findings, None, metrics=changed, residual_structure=white)
     assert "RMSE 2.5 times the unpredictable error one step ahead" in " ".join(statements.describe(document))
+
+
+def test_noise_of_the_output_is_a_reason_for_the_free_run_estimate(findings):
+    """The bias of 0.893 y(k-1) + ... makes 0.80 y(k-2) + ... the better simulation of 0.9 y(k-1) + ..."""
+    rng = np.random.default_rng(0)
+    u, y = rng.uniform(-1.0, 1.0, 1200), np.zeros(1200)
+    for k in range(1, 1200):
+        y[k] = 0.9 * y[k - 1] + 0.2 * u[k - 1]
+    data = Dataset(u, y + 0.02 * rng.standard_normal(1200), 0.1)
+    settings = {"library": "polynomial", "degree": 1, "lags": 2, "certificate": 0, "average": 1}
+    biased = islands.fit(data, **settings)
+    assert "y(k-2)" in biased.best.equation
+    assert "Next: estimate with --estimator free-run:" in " ".join(str(biased).split())
+    unbiased = islands.fit(data, estimator="free-run", **settings)
+    assert unbiased.best.model.size == 2
+    assert "*y(k-1)" in unbiased.best.equation
+    assert "--estimator" not in str(unbiased)
+    # With noise in the equation, the free run is not better than the prediction one step ahead.
+    white = ResidualStructure(0.02, 0.02, 0.7, "adequate")
+    free = Metrics(1.0, 0.99, 2.0, 90.0)
+    assert (
+        "--estimator" not in said(findings, metrics=errors(findings, free), residual_structure=white)["Next"]
+    )
 
 
 def with_noise(findings, noise, **changes):

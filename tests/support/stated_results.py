@@ -1,0 +1,125 @@
+"""Results of many kinds of records, and every text that states something about them."""
+
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+import islands
+from islands.data.dataset import Dataset
+from islands.facade.results.complete_diagnosis import DiagnosisResult
+from islands.reports.coupled import coupled_report
+from islands.reports.identification import identification_report
+from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
+from support.laws import LAWS
+from support.measured_portfolio import MEASURED
+from support.portfolio_records import KINDS
+
+AnyResult = islands.Result | islands.CoupledResult | DiagnosisResult
+
+#: Settings of a fit that takes less than a second.
+QUICK = {"library": "polynomial", "degree": 2, "lags": 3, "max_terms": 6, "certificate": 0, "average": 1}
+
+#: Settings of a fit of several outputs.
+COUPLED = {"library": "polynomial", "degree": 2, "lags": 2, "certificate": 0}
+
+#: Noise of the laws, as a fraction of the standard deviation of the output.
+LEVELS = (0.0, 0.003, 0.05)
+
+
+def make_first_order(fault: str, seed: int) -> Dataset:
+    """Return a record of y(k) = 0.9 y(k-1) + 0.2 u(k-1) with a fault of the record or of the system."""
+    rng = np.random.default_rng(seed)
+    samples = {"short": 60, "very short": 40}.get(fault, 1200)
+    u, y = rng.uniform(-1.0, 1.0, samples), np.zeros(samples)
+    if fault == "slow input":
+        u = np.repeat(u, 40)[:samples]
+    if fault == "extrapolation":
+        u[-samples // 4 :] *= 3.0
+    pole = {"integrator": 1.0, "unstable": 1.001, "oscillation": -0.95}.get(fault, 0.9)
+    for k in range(1, samples):
+        feedback = pole * y[k - 1] * (1.0 - 0.3 * u[k - 1] if fault == "bilinear" else 1.0)
+        y[k] = feedback + 0.2 * u[k - 1]
+    if fault == "drift":
+        y += np.linspace(0.0, 3.0, samples)
+    if fault == "jump":
+        y[-samples // 5 :] += 1.0
+    noise = {"noise alone": 5.0, "much noise": 0.3, "no noise": 0.0}.get(fault, 0.02)
+    y += noise * rng.standard_normal(samples)
+    if fault in ("sentinels", "spikes"):
+        y[[100, 500, 1000]] = -9999.0 if fault == "sentinels" else 12.0
+    if fault == "stuck":
+        y[300:600] = y[300]
+    if fault == "clipped":
+        y = np.clip(y, -0.2, 0.4)
+    if fault == "coarse":
+        y = np.round(y, 1)
+    return Dataset(u, y, 0.1, ("valve",), "level_cm", output_unit="cm")
+
+
+#: Faults of `make_first_order`.
+FAULTS = (
+    *("none", "sentinels", "spikes", "stuck", "clipped", "coarse", "short", "very short", "extrapolation"),
+    *("integrator", "unstable", "oscillation", "bilinear", "drift", "jump", "slow input", "noise alone"),
+    *("much noise", "no noise"),
+)
+
+
+def make_cases() -> dict[str, Callable[[], AnyResult]]:
+    """Return the functions that make the results, by name."""
+    cases: dict[str, Callable[[], AnyResult]] = {}
+    for name, kind in KINDS.items():
+        cases[f"portfolio, {name}"] = lambda kind=kind: islands.fit(kind.record(0)[0])
+        cases[f"diagnosis, {name}"] = lambda kind=kind: _diagnose(kind.record(0)[0])
+    for name, law in LAWS.items():
+        for level in LEVELS:
+            make = partial(law.record, 800, level, 0)
+            cases[f"law, {name}, noise {level:g}"] = lambda make=make: islands.fit(make(), **QUICK)
+    for fault in FAULTS:
+        for seed in range(3):
+            record = partial(make_first_order, fault, seed)
+            settings = {} if seed == 0 else QUICK
+            cases[f"first order, {fault}, seed {seed}"] = lambda record=record, settings=settings: (
+                islands.fit(record(), **settings)
+            )
+    for name, system in {"two masses": TWO_MASSES, "prey": PREY}.items():
+        for noise in (0.0, 0.02, 0.2):
+            for samples in (120, 400):
+                make = partial(make_coupled_record, system, samples, noise)
+                cases[f"several outputs, {name}, noise {noise:g}, {samples}"] = lambda make=make: (
+                    islands.fit_coupled(make(), library="polynomial", degree=2, lags=2, certificate=0)
+                )
+    for name, read in MEASURED.items():
+        cases[f"measured, {name}"] = lambda read=read: islands.fit(_shorten(read()[0]))
+    return cases
+
+
+def _shorten(record: Dataset) -> Dataset:
+    return record[: min(record.samples, 4000)]
+
+
+def _diagnose(record: Dataset) -> DiagnosisResult:
+    return islands.diagnose(record[: min(record.samples, 800)].first_inputs(1), "linear:1")
+
+
+def list_texts(name: str, result: AnyResult) -> Mapping[str, str]:
+    """Return every text about a result, by where a reader meets it."""
+    if isinstance(result, DiagnosisResult):
+        return {"summary": result.summary, "report": result.write_report(name).decode()}
+    if isinstance(result, islands.CoupledResult):
+        document, sentences = result.document(), result.sentences()
+        figures = [b"<svg/>"] * len(result.results)
+        terms = document["models"][0]["terms"]
+        report = coupled_report(name, result.model, document, terms, sentences, figures).decode()
+        return {"summary": str(result), "service": "\n".join(sentences), "report": report}
+    with tempfile.TemporaryDirectory() as folder:
+        result.save(folder, figures=())
+        (Path(folder) / "summary.txt").unlink()
+        stored = islands.read_result(folder)
+        read, notebook = str(stored), stored._repr_html_()
+    if read != str(result):
+        raise AssertionError(f"{name}: the folder states something else than the run")
+    report = identification_report(name, result.search_result, {}).decode()
+    return {"summary": read, "notebook": notebook, "report": report}
