@@ -236,5 +236,11 @@ def test_the_checker_finds_the_contradictions_that_were_printed():
     assert find_contradictions(
         "RMSE at the noise level of y. Fails at: simulation from the inputs alone: R2 0.3"
     )
+    assert find_contradictions(
+        "RMSE at the noise level of y2, 0.1; simulation from the inputs alone: R2 0.3 of y2"
+    )
+    assert not find_contradictions(
+        "RMSE at the noise level of y2, 0.1; simulation from the inputs alone: R2 0.300 of y1"
+    )
     assert len(set(EXCLUSIVE)) == len(EXCLUSIVE)
     assert not find_contradictions("As a simulation: good. Fails at: none of the checks. ")

@@ -26,7 +26,7 @@ EXCLUSIVE = (
     (r"the output (diverges|leaves its recorded range) .*1\.2 of the rec", r"Good for: .*up to 1\.2 times"),
     (r"the output (diverges|leaves its recorded range) .*\(1 of the rec", r"Good for: .*up to 1(\.2)? times"),
     (r"the free run on the validation data diverges", r"RMSE \S+( times)? the noise level of"),
-    (r"RMSE at the noise level of", r"simulation from the inputs alone: R2"),
+    (r"RMSE at the noise level of", r"simulation from the inputs alone: R2 [-.\d]+\d(?! ?of|\d)"),
     (r"the common free run on the validation data diverges", r"As a simulation: (good|usable)"),
     (r"the common free run on the validation data diverges", r"Good for: [^.]*simulation from the inputs"),
     (r"As a simulation: (good|usable)", r"Fails at: .*simulation from the inputs alone: the free run"),
@@ -60,6 +60,11 @@ def find_contradictions(text: str) -> list[str]:
         for listed in re.findall(r"no structure is left in the residual of ([^.;]*)", joined)
         for name in listed.split(" and ")
         if re.search(rf"% of the residual of {re.escape(name)} is predictable", joined)
+    ]
+    found += [
+        f"{name} is followed to its noise, and not followed"
+        for name in re.findall(r"RMSE at the noise level of (\w+)", joined)
+        if re.search(rf"simulation from the inputs alone: R2 \S+ of {re.escape(name)}\b", joined)
     ]
     return found + [
         f"{pattern}: {values}" for pattern in REPEATED if len(values := set(re.findall(pattern, joined))) > 1
