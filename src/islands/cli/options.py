@@ -1,5 +1,6 @@
 """Options of records and models that several commands share, and parsing of their values."""
 
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -58,5 +59,13 @@ Figures = Annotated[
 
 
 def columns(texts: list[str]) -> list[str]:
-    """Return the column names of a repeated option whose values may be lists, such as ``--input a,b``."""
-    return [name for text in texts for name in text.split(",") if name]
+    """Return the column names of a repeated option whose values may be lists, such as ``--input a,b``.
+
+    A comma before a blank is part of a name (``Voltage, V``), and so is any in a text in double quotes.
+    """
+    return [name for text in texts for name in _split_names(text) if name]
+
+
+def _split_names(text: str) -> list[str]:
+    is_quoted = len(text) > 1 and text.startswith('"') and text.endswith('"')
+    return [text[1:-1]] if is_quoted else re.split(r",(?!\s)", text)

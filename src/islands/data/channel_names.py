@@ -11,7 +11,7 @@ AT_ONCE = "+1"
 # A run of blanks must match in one way only: otherwise the time grows with the square of its length.
 _QUOTIENT = re.compile(r"([^/]*[^/\s])\s*/\s*([^/\s]+)")
 
-_BRACKETED = re.compile(r"(|.*\S)\s*[\[(]([^\[\]()]*)[\])]")
+_BRACKETED = re.compile(r"(|.*\S)\s*[\[(（]([^\[\]()（）]*)[\])）]")
 
 #: Exponents of ten of the SI prefixes.
 _PREFIXES = {"": 0, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "k": 3, "M": 6, "G": 9, "T": 12}
@@ -62,6 +62,20 @@ _WORDS = {
     "stunden": "h",
     "tage": "d",
     "tagen": "d",
+    "secondes": "s",
+    "segundos": "s",
+    "secondi": "s",
+    "seg": "s",
+    "sek": "s",
+    "с": "s",
+    "сек": "s",
+    "мс": "ms",
+    "мкс": "us",
+    "мин": "min",
+    "ч": "h",
+    "秒": "s",
+    "毫秒": "ms",
+    "分": "min",
     "volt": "V",
     "volts": "V",
     "ampere": "A",

@@ -1,5 +1,6 @@
 """`inspect_record`: columns, sampling and facts of a file or of a record, before a model is sought."""
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -384,8 +385,8 @@ class _FileInspection:
             return ""
         words = ["islands", "identify", str(self.path)]
         for name in choice.inputs:
-            words += ["--input", name]
-        words += ["--output", choice.output]
+            words += ["--input", _quote_commas(name)]
+        words += ["--output", _quote_commas(choice.output)]
         if self.found.dt is None and self.found.time is None:
             words += ["--dt", "SECONDS" if self.dt is None else f"{self.dt:g}"]
         if self.rows is not None:
@@ -396,6 +397,11 @@ class _FileInspection:
             if name != "header":
                 words.append(",".join(value) if isinstance(value, list) else str(value))
         return shlex.join([*words, "--out", "result"])
+
+
+def _quote_commas(name: str) -> str:
+    """Return a name as a value of the command line, where a comma without a blank separates names."""
+    return f'"{name}"' if re.search(r",(?!\s)", name) else name
 
 
 def _describe_aligned(record: Dataset, sampling: InspectedSampling) -> InspectedSampling:

@@ -15,15 +15,25 @@ TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0
 TEMPERATURE_UNITS = ("K", "C", "degC", "°C", "F", "degF", "°F")
 
 _TIME = re.compile(
-    r"t(_.*|\s*[\[(/].*)?|(?:time|zeit|elapsed|date|datum|uhrzeit|x-axis).*|x_value|sec(?:ond)?s?",
+    r"t(_.*|\s*[\[(（/].*)?|(?:time|zeit|elapsed|date|datum|uhrzeit|x-axis).*|x_value|sec(?:ond)?s?",
     re.IGNORECASE,
 )
+
+#: Words for time in other languages, which no letter follows in an alphabet.
+_FOREIGN_TIME = re.compile(
+    r"(?:(?:время|часы?|tiempo|hora|heure|tijd|czas|čas|idő|aika|zaman)(?![^\W\d_])|"
+    r"时间|時間|时刻|時刻|시간).*",
+    re.IGNORECASE,
+)
+
+#: Words for time that have another meaning in English: they need a unit of time.
+_AMBIGUOUS_TIME = re.compile(r"(?:temps|tempo|tid)\s*[\[(（/,].*", re.IGNORECASE)
 
 #: Unit at the end of a name in camel case.
 _CAPITAL_UNIT = re.compile(r"(?<=[a-z])(?:[MUN]s|[A-Z][a-z]{2,12})$")
 
 #: Marks before the last word of a name, and marks before which no last word begins.
-_OPENING, _CLOSING = "_[(/", "])"
+_OPENING, _CLOSING = "_[(（/", "])）"
 
 #: Last words of names of time columns that are not a unit.
 _WORDS = ("time", "value", "stamp", "utc", "gmt", "local", "unix", "posix", "epoch", "excel", "serial")
@@ -33,7 +43,7 @@ _WORDS = ("time", "value", "stamp", "utc", "gmt", "local", "unix", "posix", "epo
 _LISTED = 10
 
 #: Unit in brackets behind a name.
-_BRACKETED_UNIT = re.compile(r"\s*[\[(][^\[\]()]*[\])]")
+_BRACKETED_UNIT = re.compile(r"\s*[\[(（][^\[\]()（）]*[\])）]")
 
 
 def split_structures(names: Iterable[str]) -> dict[str, str]:
@@ -101,9 +111,14 @@ def looks_like_time(name: str) -> bool:
     """Return whether a column's name is ``t``, ``t_*``, ``t/*`` or begins with a word such as ``time``.
 
     ``x-axis*``, ``X_Value`` and ``second`` are the names that oscilloscopes and LabVIEW write. ``T_K`` is a
-    temperature.
+    temperature. Words of other languages count as well: ``Время``, ``时间``; those with another meaning in
+    English count with a unit of time: ``Temps (s)``.
     """
-    return bool(_TIME.fullmatch(name)) and not (name[0] == "T" and parse_unit(name) in TEMPERATURE_UNITS)
+    if _TIME.fullmatch(name):
+        return not (name[0] == "T" and parse_unit(name) in TEMPERATURE_UNITS)
+    if _AMBIGUOUS_TIME.fullmatch(name):
+        return _unit_word(name) in TIME_UNITS and _unit_word(name) != ""
+    return bool(_FOREIGN_TIME.fullmatch(name))
 
 
 def seconds_per_unit(name: str) -> float | None:

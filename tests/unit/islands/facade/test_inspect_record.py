@@ -1,9 +1,11 @@
 import json
+import shlex
 
 import numpy as np
 import pytest
 
 import islands
+from islands.cli.options import columns
 from islands.errors import RecordError
 from islands.inspection.findings import SCHEMA
 from islands.io.inspection_text import WIDTH, format_inspection
@@ -31,6 +33,13 @@ def test_a_file_is_described_without_a_choice_of_columns(tmp_path):
     assert found.warnings == ()
     assert "--input u_V --output y_um" in found.command
     assert found.choice.confidence > 0.9
+
+
+@pytest.mark.parametrize("name", ["Voltage, V", "drive,left"])
+def test_the_suggested_command_names_a_column_with_a_comma(tmp_path, name):
+    file = write(tmp_path / "r.csv", header=f't_s,"{name}",y_um')
+    words = shlex.split(islands.inspect_record(file, [name], "y_um").command)
+    assert columns([words[words.index("--input") + 1]]) == [name]
 
 
 def test_a_file_is_parsed_once(tmp_path, monkeypatch):

@@ -152,6 +152,11 @@ def test_an_unused_text_column_does_no_harm(tmp_path):
         ("time_h", 3600.0),
         ("Time (ms)", 1e-3),
         ("t [us]", 1e-6),
+        ("Temps (ms)", 1e-3),
+        ("Время (мин)", 60.0),
+        ("时间（秒）", 1.0),
+        ("時間[ms]", 1e-3),
+        ("Tiempo", 1.0),
     ],
 )
 def test_a_time_column_is_read_in_its_unit(tmp_path, name, seconds):
@@ -162,7 +167,10 @@ def test_a_time_column_is_read_in_its_unit(tmp_path, name, seconds):
     assert record.start == pytest.approx(0.05 * seconds, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["T_K", "T_degC", "T_in_C", "temperature", "tank", "test", "T (K)"])
+@pytest.mark.parametrize(
+    "name",
+    ["T_K", "T_degC", "T_in_C", "temperature", "tank", "test", "T (K)", "temps", "tempo_Hz", "Horatio"],
+)
 def test_a_column_with_another_name_is_not_the_time(name):
     assert not looks_like_time(name)
 
@@ -186,6 +194,7 @@ def test_a_timestamp_column_next_to_the_time_does_no_harm():
         ("u_", ""),
         ("u [V]", "V"),
         ("flow (m^3/s)", "m^3/s"),
+        ("电压（V）", "V"),
     ],
 )
 def test_a_unit_follows_the_last_underscore_or_is_in_brackets(name, unit):
