@@ -30,6 +30,7 @@ from islands.io.records.formats.text.time_stamps import (
     find_kind,
     parse_stamps,
 )
+from islands.io.records.formats.text.traces import TraceTable, is_trace, read_trace
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.size_limits import (
     MOST_CHARACTERS,
@@ -218,6 +219,8 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
         check_line(length, f"{file}, {counted} {number}")
     if not any(line.strip() for line in lines):
         raise RecordError(f"{file} is empty: a record has a header with names and one line per sample")
+    if is_trace(lines):
+        return _make_trace_table(read_trace(lines, file), file, counted, options)
     start = find_table(lines, file, options)
     check_column_count(start.names, file)
     for name in start.names:
@@ -250,6 +253,14 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
         kept.starts,
         left_out,
     )
+
+
+def _make_trace_table(trace: TraceTable, file: str, counted: str, options: ReadingOptions) -> DelimitedText:
+    for name in trace.names:
+        check_name(name, file)
+    note = f"{file} is a trace of a controller; its times are read in ms (option time_unit overrules it)"
+    rows = RowRange(file, counted, trace.numbers)
+    return DelimitedText(trace.names, ";", trace.cells, rows, {}, options, left_out=(note,))
 
 
 def _read_rows(
