@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from islands.diagnosis.detectability import NOTHING, SelfTest, SurrogateOutcome, self_test
 from islands.diagnosis.result import Diagnosis
@@ -84,6 +85,24 @@ def offset_record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     base = tmp_path_factory.mktemp("self-test")
     write_offset(base / "record.csv")
     return base
+
+
+@pytest.mark.ci
+def test_an_exact_simulation_of_a_slow_output_has_no_discrepancy(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 150), 40)
+    decay = np.exp(-0.01 / 0.15)
+    exact = lfilter([0.0, 1.0 - decay], [1.0, -decay], u)
+    y = exact + 0.01 * rng.standard_normal(6000)
+    cells = [f"{y[k]:.5f}" if k % 10 == 0 else "" for k in range(6000)]
+    rows = [f"{0.01 * k:.2f},{u[k]:.5f},{exact[k]:.5f},{cells[k]}" for k in range(6000)]
+    (tmp_path / "r.csv").write_text("\n".join(["t_s,u_V,theirs_um,y_um", *rows]) + "\n")
+    with undrawn_figures():
+        text = succeed(
+            *("diagnose", tmp_path / "r.csv", "--input", "u_V", "--output", "y_um"),
+            *("--simulation", "column:theirs_um", "--out", tmp_path / "out"),
+        )
+    assert text.startswith("No significant discrepancy")
 
 
 @pytest.mark.ci

@@ -55,7 +55,8 @@ def _read_part(
     stored = datasets[part.dataset]
     reading = stored.preview.get("reading", {})
     is_diagnosis = isinstance(spec, Discrepancy)
-    request = RecordRequest(*spec.columns, spec.dt, part.rows, reading, is_diagnosis)
+    signals = spec.recorded_columns if isinstance(spec, Discrepancy) else ()
+    request = RecordRequest(*spec.columns, spec.dt, part.rows, reading, is_diagnosis, signals)
     settings = service_settings()
     memory, seconds = settings.inspection_memory, settings.inspection_seconds
     with blobs.hold(stored.blob) as held, link_blob(held, stored.name) as path:

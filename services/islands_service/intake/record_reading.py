@@ -47,6 +47,7 @@ class RecordRequest:
     rows: str | None
     reading: dict[str, object]
     resting_inputs: bool = False
+    signals: Sequence[str] = ()
 
 
 def read_confined(path: Path, request: RecordRequest, memory: int, seconds: float) -> Dataset:
@@ -137,6 +138,7 @@ def main() -> None:
             rows,
             options=options,
             resting_inputs=request.resting_inputs,
+            signals=request.signals,
         )
     except (RecordError, SettingsError) as error:
         refuse(error, answer)

@@ -57,6 +57,8 @@ class Recordings:
         Steps of all recordings. The offsets are those of the estimation data.
     resting_inputs : bool
         Accept constant inputs.
+    signals : sequence of str
+        Inputs that are outputs of a simulation, as in `read_table`.
     """
 
     paths: Sequence[Path]
@@ -66,6 +68,7 @@ class Recordings:
     reading: ReadingOptions = DEFAULT_READING
     steps: PreprocessingSteps = NO_STEPS
     resting_inputs: bool = False
+    signals: Sequence[str] = ()
 
     def read(self, rows: str | None = None) -> Dataset:
         """Read ``START:STOP`` of every recording, or all of it, join the recordings and preprocess them."""
@@ -123,4 +126,5 @@ class Recordings:
             parse_rows(rows),
             options=self.reading,
             resting_inputs=self.resting_inputs,
+            signals=self.signals,
         )

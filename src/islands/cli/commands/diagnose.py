@@ -239,7 +239,7 @@ def _read_record(
     """Read the recordings, and separately the column of a simulation that was recorded in them."""
     extra = [] if column is None else [column]
     names = [simulation_options.single_input(inputs), *channels, *extra]
-    recordings = Recordings(records, names, output_column, dt, reading, resting_inputs=True)
+    recordings = Recordings(records, names, output_column, dt, reading, resting_inputs=True, signals=extra)
     whole = recordings.read(rows)
     if validation is not None:
         whole = hold_out(whole, replace(recordings, paths=[validation]).read())

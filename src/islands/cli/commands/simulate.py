@@ -54,7 +54,13 @@ class _Request:
     warm_up: int | None
     bands: float | None
 
-    def read(self, inputs: Sequence[str], output_name: str, missing_output: bool = False) -> Dataset:
+    def read(
+        self,
+        inputs: Sequence[str],
+        output_name: str,
+        missing_output: bool = False,
+        signals: Sequence[str] = (),
+    ) -> Dataset:
         """Read a record of one output; a given output column replaces that of the model."""
         if len(self.outputs) > 1:
             raise SettingsError(f"the model has one output, got {', '.join(self.outputs)}: give one --output")
@@ -63,6 +69,7 @@ class _Request:
             *(self.record, inputs, name, self.dt, self.rows),
             missing_output=missing_output,
             options=self.reading,
+            signals=signals,
         )
 
     def refuse_detrend(self, model: str) -> None:
@@ -213,7 +220,7 @@ def _simulate_system(found: SavedSimulation, request: _Request) -> None:
     if request.mode != "free-run":
         raise SettingsError(f"a simulation supports free runs only: --mode {request.mode} is for models")
     driving, recorded = request.inputs or found.column_names, found.recorded_columns
-    whole = request.read([*driving, *recorded], found.output_name)
+    whole = request.read([*driving, *recorded], found.output_name, signals=recorded)
     data = whole.first_inputs(len(driving))
     compile_kernels()
     y = found.simulate(data, dict.fromkeys(recorded, whole.u[:, -1])).y

@@ -180,10 +180,13 @@ def read_dataset(
     missing_output: bool = False,
     options: ReadingOptions = DEFAULT_READING,
     resting_inputs: bool = False,
+    signals: Sequence[str] = (),
 ) -> Dataset:
-    """Read a record like `read_record`, with the options as one value."""
+    """Read a record like `read_record`, with the options as one value; ``signals`` is as in `read_table`."""
     table, file = open_record(path, options), Path(path).name
-    record = read_table(table, file, inputs, output, dt, rows, missing_output, options, resting_inputs)
+    record = read_table(
+        *(table, file, inputs, output, dt, rows, missing_output, options, resting_inputs, signals)
+    )
     return replace(record, sha256=fingerprint(path))
 
 

@@ -51,6 +51,7 @@ def read_table(
     missing_output: bool = False,
     options: ReadingOptions = DEFAULT_READING,
     resting_inputs: bool = False,
+    signals: Sequence[str] = (),
 ) -> Dataset:
     """Read inputs and an output from an open table and check them.
 
@@ -65,6 +66,9 @@ def read_table(
         The time column, and the repair of irregular sampling.
     resting_inputs : bool
         Accept constant inputs.
+    signals : sequence of str
+        Inputs that are read at the samples of the record whatever their rate, such as the output of a
+        simulation; others may be averaged from each sample to the next.
 
     Raises
     ------
@@ -89,7 +93,10 @@ def read_table(
     steps = [*columns.notes, *(f"{errors} are left out" for errors in excluded)]
     parts = [part for part in columns.split(clock) if len(part.rows) > 1]
     values = np.column_stack([columns.numbers[name] for name in chosen])
-    use = ColumnUse(chosen, tuple(range(len(sources), len(chosen))), options.rates or MEAN, missing_output)
+    use = ColumnUse(
+        *(chosen, tuple(range(len(sources), len(chosen))), options.rates or MEAN, missing_output),
+        signals=tuple(place for place, name in enumerate(inputs) if name in signals),
+    )
     clocks = None
     if len(parts) == 1:
         clocks = _find_clocks(table, columns, values, clock, dt, structure, options, use)

@@ -41,6 +41,20 @@ def test_recordings_of_a_diagnosis_are_joined_with_their_recorded_simulations(tm
     assert np.array_equal(divided.u, record.u[:120])
 
 
+def test_a_recorded_simulation_is_read_at_the_samples_of_a_slow_output(tmp_path: Path) -> None:
+    blobs = Blobs(tmp_path)
+    rng = np.random.default_rng(3)
+    u, y, simulated = rng.normal(size=(3, 600))
+    rows = [f"{0.01 * k:.2f},{u[k]},{simulated[k]},{y[k] if k % 10 == 0 else ''}" for k in range(600)]
+    stored = blobs.write("\n".join(["t_s,u,s,y", *rows]).encode())
+    datasets = {"a": StoredDataset("me", "a", "a.csv", ".csv", stored, 7, {}, 0.0)}
+    order = Discrepancy.model_validate(
+        {"dataset": "a", "input": "u", "output": "y", "simulation": {"kind": "column", "column": "s"}}
+    )
+    _, columns = read_record_and_columns(order, datasets, blobs)
+    assert np.array_equal(columns["s"], simulated[::10])
+
+
 @pytest.mark.ci
 def test_recordings_of_a_job_are_joined(tmp_path: Path) -> None:
     blobs = Blobs(tmp_path)

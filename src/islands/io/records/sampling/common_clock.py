@@ -48,12 +48,16 @@ class ColumnUse:
         `MEAN` or `SAMPLE`.
     extend : bool
         Whether samples are needed as far as the inputs reach, although the output has ended.
+    signals : tuple of int
+        Places of inputs that are read at the samples of the record whatever their rate, such as the output of
+        a simulation.
     """
 
     names: tuple[str, ...]
     outputs: tuple[int, ...]
     rates: str = MEAN
     extend: bool = False
+    signals: tuple[int, ...] = ()
 
 
 def align_columns(
@@ -80,7 +84,7 @@ def align_columns(
             stamps = _extend(stamps, step, min(each[0] for each in others), max(each[-1] for each in others))
     values = np.column_stack(
         [
-            _read_column(column[own.rows], own, stamps, step, use, place in use.outputs)
+            _read_column(column[own.rows], own, stamps, step, use, place)
             for place, (column, own) in enumerate(zip(recording.values.T, clocks, strict=True))
         ]
     )
@@ -218,15 +222,15 @@ def _read_column(
     stamps: NDArray[np.float64],
     step: float,
     use: ColumnUse,
-    is_output: bool,
+    place: int,
 ) -> NDArray[np.float64]:
     near, same = _match(own.stamps, stamps, min(step, own.step))
     exact = np.where(same, samples[near], np.nan)
-    if is_output:
+    if place in use.outputs:
         return exact
     # Rows of several clocks may have the usual step of the record, and samples between those of the record.
     has_same = same.mean() > 1 - _WHOLE and len(own.stamps) < (1 + _WHOLE) * len(stamps)
-    if use.rates == SAMPLE or has_same:
+    if use.rates == SAMPLE or place in use.signals or has_same:
         return np.where(same, exact, _interpolate(own, samples, stamps))
     return _average(own, samples, stamps, step)
 
@@ -309,15 +313,17 @@ def _describe(
     text = describe_clocks(use.names, clocks, recording.seconds)
     text += f"; read at those of {use.names[slowest]}, every {step * recording.seconds:.6g} s"
     faster = [
-        name
-        for place, (name, own) in enumerate(zip(use.names, clocks, strict=True))
+        place
+        for place, own in enumerate(clocks)
         if place not in use.outputs and own.step < (1 - SAME_STEP) * step
     ]
-    if faster:
+    signals = ", ".join(use.names[place] for place in faster if place in use.signals)
+    inputs = ", ".join(use.names[place] for place in faster if place not in use.signals)
+    if signals:
+        text += f", with {_HOW[SAMPLE]} for {signals}"
+    if inputs:
         other = SAMPLE if use.rates == MEAN else MEAN
-        text += (
-            f", with {_HOW[use.rates]} for {', '.join(faster)} (option rates: {other} takes {_HOW[other]}, "
-        )
+        text += f", with {_HOW[use.rates]} for {inputs} (option rates: {other} takes {_HOW[other]}, "
         text += "rows every row as a sample)"
     else:
         text += " (option rates: rows takes every row as a sample)"

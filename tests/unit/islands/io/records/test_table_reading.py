@@ -6,7 +6,7 @@ import pytest
 from scipy.signal import lfilter
 
 import islands
-from islands.io.records import read_record
+from islands.io.records import read_dataset, read_record
 from islands.io.records.reading_options import ReadingOptions
 from support.bad_records import refusal
 
@@ -87,3 +87,18 @@ def test_the_law_is_found_in_a_record_with_gross_errors(tmp_path, values):
     assert result.best.model.parameters == pytest.approx((0.9, 0.2), abs=0.002)
     assert result.best.metrics["validation"]["free_run"].rmse < 0.0215
     assert "3 isolated spikes" in str(result) or "3 times -9999" in str(result)
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_an_input_that_is_a_signal_is_read_at_the_samples_of_a_slow_output(tmp_path, held):
+    """The output of a simulation is compared with a sample; its mean to the next sample is late."""
+    rng = np.random.default_rng(3)
+    u, y, simulated = rng.normal(size=900), rng.normal(size=90), rng.normal(size=900)
+    cells = [f"{y[k // 10]:.6f}" if held or k % 10 == 0 else "" for k in range(900)]
+    rows = [f"{0.01 * k:.2f},{u[k]:.6f},{simulated[k]:.6f},{cells[k]}" for k in range(900)]
+    file = tmp_path / "r.csv"
+    file.write_text("\n".join(["t_s,u,s,y", *rows]) + "\n")
+    record = read_dataset(file, ["u", "s"], "y", signals=["s"])
+    assert np.allclose(record.u[:, 1], simulated[::10], atol=1e-6)
+    assert np.allclose(record.u[:, 0], u.reshape(-1, 10).mean(axis=1), atol=1e-6)
+    assert "with the value at each for s, with the mean from each to the next for u" in record.reading[0]
