@@ -2,7 +2,8 @@
 
 An input that is sampled at other times is averaged from each sample of the record to the next: a system with
 memory responds to the mean of its input over a sample, as if it were held, and u(k-1) is the mean that ends
-where y(k) is sampled. An output has only values that were measured: one that is interpolated between two
+where y(k) is sampled. Between its samples, an input that is smooth is interpolated, and another one is held.
+The output of a simulation is read at the samples of the record. An output has only values that were measured: one that is interpolated between two
 samples contains the response to inputs of a later time.
 """
 
@@ -29,6 +30,10 @@ _WHOLE = 0.25
 #: Deviation of a mean from a sample, relative to the range, up to which the signal is at rest.
 _REST = 1e-9
 
+
+#: Mean square of the deviations from the neighbours, relative to that of the steps, of a smooth signal, at
+#: most; samples that determine it, at least.
+_SMOOTH, _LEAST_SMOOTH = 0.1, 12
 
 #: Part of the squared error of a prediction below which values predict better than means, and samples for
 #: each term of the prediction, at least.
@@ -249,25 +254,53 @@ def _interpolate(
 def _average(
     own: ColumnClock, samples: NDArray[np.float64], stamps: NDArray[np.float64], step: float
 ) -> NDArray[np.float64]:
-    """Return the means of a held signal from each time to the next; none over a gap or before the start."""
+    """Return the means of a signal from each time to the next; none over a gap or before the start.
+
+    Between its samples a smooth signal is interpolated, and another one is held: holding delays a signal by
+    half of its step.
+    """
     ends = np.minimum(np.concatenate((stamps[1:], [np.inf])), stamps + (1 + _WHOLE) * step)
     ends[-1] = stamps[-1] + step
     edges = np.concatenate((own.stamps, [own.stamps[-1] + own.step]))
     lengths = np.diff(edges)
-    # A sample is held for its step: what follows in a gap is unknown. Deviations from the first sample keep
-    # the digits of a signal with a large offset.
+    # What follows a sample in a gap is unknown. Deviations from the first sample keep the digits of a signal
+    # with a large offset.
     unknown = lengths > GAP * own.step
-    areas = np.concatenate(([0.0], np.cumsum((samples - samples[0]) * lengths)))
+    deviations = samples - samples[0]
+    following = np.concatenate((deviations[1:], deviations[-1:])) if _is_smooth(samples) else deviations
+    areas = np.concatenate(([0.0], np.cumsum(0.5 * (deviations + following) * lengths)))
     missing = np.concatenate(([0.0], np.cumsum(np.where(unknown, lengths, 0.0))))
     begins, ends = (np.clip(times, edges[0], edges[-1]) for times in (stamps, ends))
     known = (stamps >= edges[0] - AGREEMENT * step) & (ends > begins)
     width = np.where(known, ends - begins, 1.0)
-    means = (np.interp(ends, edges, areas) - np.interp(begins, edges, areas)) / width + samples[0]
+
+    def integrate(times: NDArray[np.float64]) -> NDArray[np.float64]:
+        place = np.clip(np.searchsorted(edges, times, "right") - 1, 0, len(samples) - 1)
+        passed = times - edges[place]
+        slopes = (following - deviations) / lengths
+        found: NDArray[np.float64] = areas[place] + passed * (
+            deviations[place] + 0.5 * slopes[place] * passed
+        )
+        return found
+
+    means = (integrate(ends) - integrate(begins)) / width + samples[0]
     # A command at rest has its value exactly, and so the same levels as before.
     held = samples[np.clip(np.searchsorted(own.stamps, begins, "right") - 1, 0, len(samples) - 1)]
     means = np.where(np.abs(means - held) <= _REST * np.ptp(samples), held, means)
     known &= np.interp(ends, edges, missing) - np.interp(begins, edges, missing) <= AGREEMENT * own.step
     return np.where(known, means, np.nan)
+
+
+def _is_smooth(samples: NDArray[np.float64]) -> bool:
+    """Return whether samples are close to the mean of their neighbours, compared with the steps between them.
+
+    The ratio of the mean squares is 0.5 for a command that rests between its steps, and 0.75 for white noise.
+    """
+    if len(samples) < _LEAST_SMOOTH:
+        return False
+    scale = float(np.ptp(samples)) or 1.0
+    steps = np.diff(samples / scale)
+    return float(np.mean((0.5 * np.diff(steps)) ** 2)) < _SMOOTH * float(np.mean(steps**2))
 
 
 def _find_rows(stamps: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.int64]:

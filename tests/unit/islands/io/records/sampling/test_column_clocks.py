@@ -192,6 +192,19 @@ def test_a_mean_of_a_command_at_rest_is_its_level(tmp_path):
     assert np.isin(record.u, levels).all()
 
 
+def test_a_mean_of_a_smooth_input_is_its_integral(tmp_path):
+    """A smooth input that were held between its samples would be late by half of their step."""
+    fast, slow = 0.03 * np.arange(2000), 0.1 * np.arange(600)
+    rng = np.random.default_rng(0)
+    rows = [(t, f"{t:.3f},{np.sin(2.0 * t):.9f},") for t in fast + 0.001]
+    rows += [(t, f"{t:.3f},,{rng.normal():.6f}") for t in slow]
+    (tmp_path / "r.csv").write_text("\n".join(["t_s,u,y", *(text for _, text in sorted(rows))]) + "\n")
+    record = read_record(tmp_path / "r.csv", ["u"], "y")
+    times = record.start + 0.1 * np.arange(record.samples)
+    means = (np.cos(2.0 * times) - np.cos(2.0 * (times + 0.1))) / 0.2
+    assert np.abs(record.u[:-1, 0] - means[:-1]).max() < 1e-3
+
+
 @pytest.mark.parametrize("step", [0.05, 0.1, 0.2])
 def test_resampling_interpolates_each_column_between_its_samples(tmp_path, step):
     for frame in (join(sample(0.01), sample(0.1)), hold(0.1), join(sample(0.01), sample(0.1, 0.003))):
