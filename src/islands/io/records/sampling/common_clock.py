@@ -3,8 +3,8 @@
 An input that is sampled at other times is averaged from each sample of the record to the next: a system with
 memory responds to the mean of its input over a sample, as if it were held, and u(k-1) is the mean that ends
 where y(k) is sampled. Between its samples, an input that is smooth is interpolated, and another one is held.
-The output of a simulation is read at the samples of the record. An output has only values that were measured: one that is interpolated between two
-samples contains the response to inputs of a later time.
+The output of a simulation is read at the samples of the record. An output has only values that were measured:
+one that is interpolated between two samples contains the response to inputs of a later time.
 """
 
 from collections.abc import Sequence
