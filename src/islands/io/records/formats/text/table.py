@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.column_names import append_unit
+from islands.io.records.column_names import append_unit, find_column, time_column
 from islands.io.records.formats.text.encoding import decode
 from islands.io.records.formats.text.missing_words import MissingWords, is_missing, parse_words
 from islands.io.records.formats.text.number_parsing import describe_numbers, parse_numbers
@@ -42,8 +42,14 @@ from islands.io.records.size_limits import (
 )
 from islands.io.records.table import Columns, RowRange, select
 
-#: Samples that decide whether a column contains time stamps.
+#: Samples that decide whether a column contains time stamps, and whether its times decrease.
 _DECIDING = 20
+
+#: Samples that determine that times decrease, at least.
+_LEAST_DECREASING = 12
+
+#: Seconds.
+_HALF_DAY = 43_200.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -241,7 +247,7 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
     clocks = _find_clocks(names, cells, missing)
     units = _find_units(names, cells, clocks, missing)
     titles = {name: append_unit(name, unit) for name, unit in units.items()}
-    return DelimitedText(
+    table = DelimitedText(
         tuple(titles.get(name, name) for name in names),
         start.separator,
         cells,
@@ -253,6 +259,44 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
         kept.starts,
         left_out,
     )
+    return _order_rows(table) if _has_newest_first(table) else table
+
+
+def _has_newest_first(table: DelimitedText) -> bool:
+    """Return whether the time decreases in the first and in the last rows.
+
+    Times of day without a date that decrease are read as those of the days before midnight.
+    """
+    count, file = len(table.cells), table.rows.file
+    if table.starts or count < _LEAST_DECREASING:
+        return False
+    try:
+        given = table.options.time
+        time = (
+            time_column(table.names, file, clocks=table.clocks)
+            if given is None
+            else find_column(given, table.names)
+        )
+        if time is None or time not in table.names:
+            return False
+        parts = [slice(0, min(count, _DECIDING)), slice(max(0, count - _DECIDING), count)]
+        steps = np.concatenate([np.diff(table.read((time,), part).numbers[time]) for part in parts])
+    except RecordError:
+        return False  # it is raised when the columns are read
+    if table.clocks.get(time) == "" and (steps > _HALF_DAY).all():
+        return _is_time_of_day(table, time)
+    return bool((steps < 0).all())
+
+
+def _is_time_of_day(table: DelimitedText, time: str) -> bool:
+    place = table.names.index(time)
+    return find_kind([row[place] for row in table.cells[:_DECIDING]], frozenset()) == TIME_ONLY
+
+
+def _order_rows(table: DelimitedText) -> DelimitedText:
+    rows = RowRange(table.rows.file, table.rows.counted, table.rows.numbers[::-1])
+    note = "the rows are read from the last to the first, because their time decreases"
+    return replace(table, cells=table.cells[::-1], rows=rows, left_out=(*table.left_out, note))
 
 
 def _make_trace_table(trace: TraceTable, file: str, counted: str, options: ReadingOptions) -> DelimitedText:
