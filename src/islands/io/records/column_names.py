@@ -29,6 +29,14 @@ _FOREIGN_TIME = re.compile(
 #: Words for time that have another meaning in English: they need a unit of time.
 _AMBIGUOUS_TIME = re.compile(r"(?:temps|tempo|tid)\s*[\[(（/,].*", re.IGNORECASE)
 
+#: Time since the start of a test or a program, which battery cyclers and test benches write beside the time
+#: of a step; it needs a unit of time, and comes after other columns of time.
+_RUN_TIME = re.compile(
+    r"(?:test|total|run(?:ning)?|measure(?:ment)?|meas|rec(?:ord(?:ing)?)?|exp(?:eriment)?|abs(?:olute)?|"
+    r"prüf|mess|lauf|versuchs|gesamt)[ _-]?(?:time|zeit).*",
+    re.IGNORECASE,
+)
+
 #: Unit at the end of a name in camel case.
 _CAPITAL_UNIT = re.compile(r"(?<=[a-z])(?:[MUN]s|[A-Z][a-z]{2,12})$")
 
@@ -112,11 +120,11 @@ def looks_like_time(name: str) -> bool:
 
     ``x-axis*``, ``X_Value`` and ``second`` are the names that oscilloscopes and LabVIEW write. ``T_K`` is a
     temperature. Words of other languages count as well: ``Время``, ``时间``; those with another meaning in
-    English count with a unit of time: ``Temps (s)``.
+    English count with a unit of time, ``Temps (s)``, as does the time of a test, ``Test_Time(s)``.
     """
     if _TIME.fullmatch(name):
         return not (name[0] == "T" and parse_unit(name) in TEMPERATURE_UNITS)
-    if _AMBIGUOUS_TIME.fullmatch(name):
+    if _AMBIGUOUS_TIME.fullmatch(name) or _RUN_TIME.fullmatch(name):
         return _unit_word(name) in TIME_UNITS and _unit_word(name) != ""
     return bool(_FOREIGN_TIME.fullmatch(name))
 
@@ -172,8 +180,8 @@ def time_column(
     """Return the name of the time column, None if the file has no time column.
 
     ``t``, ``time`` and names with a unit of time take precedence over other words that begin with ``time``,
-    so that a file may contain both ``timestamp`` and ``t_s``. Columns of time stamps come last, because other
-    columns are more precise.
+    so that a file may contain both ``timestamp`` and ``t_s``. The time of a test follows, and columns of time
+    stamps come last, because other columns are more precise.
 
     Parameters
     ----------
@@ -208,6 +216,7 @@ def time_column(
             and looks_like_time(field)
             and seconds_per_unit(field) is not None
         ]
+        candidates = [name for name in candidates if not _RUN_TIME.fullmatch(fields[name])] or candidates
         preferred = [
             name for name in candidates if fields[name].lower() in {"t", "time"} or parse_unit(fields[name])
         ] or candidates

@@ -157,6 +157,8 @@ def test_an_unused_text_column_does_no_harm(tmp_path):
         ("时间（秒）", 1.0),
         ("時間[ms]", 1e-3),
         ("Tiempo", 1.0),
+        ("Test_Time(s)", 1.0),
+        ("Laufzeit / ms", 1e-3),
     ],
 )
 def test_a_time_column_is_read_in_its_unit(tmp_path, name, seconds):
@@ -169,7 +171,20 @@ def test_a_time_column_is_read_in_its_unit(tmp_path, name, seconds):
 
 @pytest.mark.parametrize(
     "name",
-    ["T_K", "T_degC", "T_in_C", "temperature", "tank", "test", "T (K)", "temps", "tempo_Hz", "Horatio"],
+    [
+        "T_K",
+        "T_degC",
+        "T_in_C",
+        "temperature",
+        "tank",
+        "test",
+        "T (K)",
+        "temps",
+        "tempo_Hz",
+        "Horatio",
+        "test_time",
+        "rise time (s)",
+    ],
 )
 def test_a_column_with_another_name_is_not_the_time(name):
     assert not looks_like_time(name)
@@ -178,6 +193,8 @@ def test_a_column_with_another_name_is_not_the_time(name):
 def test_a_timestamp_column_next_to_the_time_does_no_harm():
     assert time_column(["timestamp", "t_s", "T_K"], "r.csv") == "t_s"
     assert time_column(["timestamp"], "r.csv") == "timestamp"
+    assert time_column(["Run Time (s)", "timestamp"], "r.csv") == "timestamp"
+    assert time_column(["Test_Time(s)", "Step_Time(s)"], "r.csv") == "Test_Time(s)"
     assert time_column(["T_K", "t_weeks", "k"], "r.csv") is None
 
 
