@@ -15,6 +15,8 @@ EXCLUSIVE = (
         r"Next: [^.]*(allow more than|try (an estimate|terms|linear|products|even)|estimate from)",
     ),
     (r"no structure is left in the free-run residual", r"[%] of the free-run residual is predictable"),
+    (r"no structure is left in the free-run residual", r"neither inputs nor past outputs predict it"),
+    (r"As a simulation: good", r"RMSE ([3-9]\.\d|\d{2,}[.\d]*) times the (noise level|unpredictable)"),
     (r"the residual is a rounding error", r"[%] of the free-run residual is predictable"),
     (r"the free run on the validation data diverges", r"Good for: [^.]*simulation from the inputs alone"),
     (r"the free run on the validation data diverges", r"times that on the estimation data"),

@@ -9,7 +9,7 @@ from islands.io.result_text.statements import (
     Statement,
     describe_error_level,
     describe_excess,
-    exceeds_limit,
+    describe_unexplained_error,
     list_insignificant,
     typical_half_width,
     write_percent,
@@ -134,11 +134,7 @@ def _list_names(outputs: list[OutputFacts]) -> str:
 
 
 def _find_unstructured(facts: CoupledFacts) -> list[OutputFacts]:
-    return [
-        output
-        for output in facts.outputs
-        if output.verdict and not output.has_structure and not exceeds_limit(output.share("free_run"))
-    ]
+    return [output for output in facts.outputs if output.is_unpredictable and not output.exceeds_noise]
 
 
 #: Measured quantities of an output in the verdict.
@@ -182,6 +178,11 @@ OUTPUT_FAILURES: Final[tuple[Statement[OutputFacts], ...]] = (
             f"{write_percent(output.share('free_run') or 0.0)} of the residual of {output.name} is "
             f"predictable (RMS {output.residual['predictable_percent']:.2g} % of the output range)"
         ),
+    ),
+    Statement(
+        "unexplained-error",
+        lambda output: output.exceeds_noise,
+        lambda output: f"{output.name}: {describe_unexplained_error(output)}",
     ),
     Statement(
         "low-coverage",

@@ -22,6 +22,9 @@ _GOOD_R2 = 0.9
 #: Largest ratio of the free-run error and the noise level at which the error is that of the noise.
 _NOISE_RATIO = 1.2
 
+#: Ratio of the free-run error and the noise level above which noise does not explain the error.
+_FAR_RATIO = 3.0
+
 #: Ratio of the errors on validation data and estimation data above which a model does not generalise.
 _LARGE_RATIO = 2.0
 
@@ -137,6 +140,28 @@ class RunFacts:
     def is_rounding(self, rmse: float) -> bool:
         """Return whether an error is that of rounding: its ratio to another one says nothing."""
         return bool(rmse <= _ROUNDING * self.data.get("output_range", 0.0))
+
+    @property
+    def least_error(self) -> float | None:
+        """Error one step ahead that cannot be predicted: the smallest that the data show."""
+        found: float | None = self.error("one_step_ahead")["rmse"]
+        return None if exceeds_limit(self.share("one_step_ahead")) else found
+
+    @property
+    def noise_ratio(self) -> float | None:
+        """Free-run error divided by the noise level, or by the least error if the level is unknown."""
+        rmse, level = self.error()["rmse"], self.data.get("noise") or self.least_error
+        return None if rmse is None or not level or self.is_rounding(rmse) else float(rmse / level)
+
+    @property
+    def is_unpredictable(self) -> bool:
+        """Whether neither inputs nor past outputs predict the residual of the free run."""
+        return self.verdict == ADEQUATE and not exceeds_limit(self.share("free_run"))
+
+    @property
+    def exceeds_noise(self) -> bool:
+        """Whether an unpredictable residual of the free run is far above the noise."""
+        return self.is_unpredictable and (self.noise_ratio or 0.0) > _FAR_RATIO
 
     @property
     def error_ratio(self) -> float:
@@ -481,19 +506,23 @@ def describe_error_level(facts: RunFacts, name: str) -> str:
     str
         Empty if neither is known, the free run diverges, or its error is a rounding error.
     """
-    rmse, noise = facts.error()["rmse"], facts.data.get("noise")
-    if rmse is None or facts.is_rounding(rmse):
+    ratio, noise = facts.noise_ratio, facts.data.get("noise")
+    if ratio is None:
         return ""
-    if noise:
-        ratio = rmse / noise
-        # The level has an uncertainty: an error below it is no contradiction.
-        times = "at" if ratio <= _NOISE_RATIO else f"{ratio:.3g} times"
-        return f"RMSE {times} the noise level of {name}, {facts.write_amount(noise)}"
-    one_step = facts.error("one_step_ahead")["rmse"]
-    # An unpredictable error one step ahead is the smallest that the data show.
-    if one_step and not exceeds_limit(facts.share("one_step_ahead")):
-        return f"RMSE {rmse / one_step:.3g} times the unpredictable error one step ahead"
-    return ""
+    if not noise:
+        return f"RMSE {ratio:.3g} times the unpredictable error one step ahead"
+    # The level has an uncertainty: an error below it is no contradiction.
+    times = "at" if ratio <= _NOISE_RATIO else f"{ratio:.3g} times"
+    return f"RMSE {times} the noise level of {name}, {facts.write_amount(noise)}"
+
+
+def describe_unexplained_error(facts: RunFacts) -> str:
+    """State that the free-run error is far above the noise, although its residual is unpredictable."""
+    level = "noise level" if facts.data.get("noise") else "error one step ahead"
+    return (
+        f"the free-run error is {facts.noise_ratio:.3g} times the {level}, and neither inputs nor past "
+        "outputs predict it: a disturbance, or a state that the model lacks"
+    )
 
 
 def describe_excess(facts: RunFacts) -> str:
@@ -685,7 +714,7 @@ USES: Final[tuple[Statement[ResultFacts], ...]] = (
     ),
     Statement(
         "adequate-residual",
-        lambda facts: facts.verdict == ADEQUATE and not exceeds_limit(facts.share("free_run")),
+        lambda facts: facts.is_unpredictable and not facts.exceeds_noise,
         lambda _: (
             "no structure is left in the free-run residual (at most "
             f"{write_percent(LARGEST_SHARE)} is predictable)"
@@ -743,6 +772,7 @@ FAILURES: Final[tuple[Statement[ResultFacts], ...]] = (
     ),
     Statement("open-loops", lambda facts: facts.open_loops, _describe_open_loops),
     Statement("predictable-residual", lambda facts: facts.has_visible_structure, _describe_structure),
+    Statement("unexplained-error", lambda facts: facts.exceeds_noise, describe_unexplained_error),
     Statement(
         "low-coverage",
         lambda facts: not facts.is_covered,
@@ -775,7 +805,11 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement("more-terms", _may_grow, lambda facts: f"allow more than {_largest_size(facts)} terms"),
     Statement(
         "free-run-estimate",
-        lambda facts: facts.has_structure and not exceeds_limit(facts.share("one_step_ahead")),
+        lambda facts: (
+            (facts.has_structure or facts.exceeds_noise)
+            and not exceeds_limit(facts.share("one_step_ahead"))
+            and facts.document["settings"].get("estimator") != "free-run"
+        ),
         lambda _: (
             "try an estimate that minimises the error of the free run (--estimator free-run), or measure the "
             "disturbance: one step ahead, no structure is left"

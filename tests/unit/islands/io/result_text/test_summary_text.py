@@ -212,9 +212,8 @@ def test_noise_of_the_output_is_a_reason_for_the_free_run_estimate(findings):
     # With noise in the equation, the free run is not better than the prediction one step ahead.
     white = ResidualStructure(0.02, 0.02, 0.7, "adequate")
     free = Metrics(1.0, 0.99, 2.0, 90.0)
-    assert (
-        "--estimator" not in said(findings, metrics=errors(findings, free), residual_structure=white)["Next"]
-    )
+    disturbed = said(findings, metrics=errors(findings, free), residual_structure=white)
+    assert "estimate with --estimator" not in disturbed["Next"]
 
 
 def with_noise(findings, noise, **changes):
@@ -223,6 +222,19 @@ def with_noise(findings, noise, **changes):
     document = result_document(replace(findings, models=(changed,)))
     document["data"]["noise"] = noise
     return document
+
+
+def test_an_unpredictable_error_far_above_the_noise_is_a_limit(findings):
+    """A valve that sticks: the residual of 10 times the noise is a state that no regressor has."""
+    white = ResidualStructure(0.02, 0.02, 0.7, "adequate")
+    metrics = errors(findings, Metrics(1.0, 0.99, 1.0, 90.0))
+    far = " ".join(describe(with_noise(findings, 0.1, metrics=metrics, residual_structure=white)))
+    assert "As a simulation: usable, with limits" in far
+    assert "the free-run error is 10 times the noise level, and neither inputs nor past outputs" in far
+    assert "no structure is left" not in far
+    near = " ".join(describe(with_noise(findings, 0.5, metrics=metrics, residual_structure=white)))
+    assert "times the noise level, and neither" not in near
+    assert "no structure is left" in near
 
 
 def test_an_output_that_escapes_at_an_extreme_is_a_failure_with_the_input(findings):
