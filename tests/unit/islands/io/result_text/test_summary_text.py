@@ -228,13 +228,13 @@ def test_an_unpredictable_error_far_above_the_noise_is_a_limit(findings):
     """A valve that sticks: the residual of 10 times the noise is a state that no regressor has."""
     white = ResidualStructure(0.02, 0.02, 0.7, "adequate")
     metrics = errors(findings, Metrics(1.0, 0.99, 1.0, 90.0))
-    far = " ".join(describe(with_noise(findings, 0.1, metrics=metrics, residual_structure=white)))
+    far = " ".join(statements.describe(with_noise(findings, 0.1, metrics=metrics, residual_structure=white)))
     assert "As a simulation: usable, with limits" in far
     assert "the free-run error is 10 times the noise level, and neither inputs nor past outputs" in far
-    assert "no structure is left" not in far
-    near = " ".join(describe(with_noise(findings, 0.5, metrics=metrics, residual_structure=white)))
+    assert "no structure is left in the free-run residual" not in far
+    near = " ".join(statements.describe(with_noise(findings, 0.5, metrics=metrics, residual_structure=white)))
     assert "times the noise level, and neither" not in near
-    assert "no structure is left" in near
+    assert "no structure is left in the free-run residual" in near
 
 
 def test_an_output_that_escapes_at_an_extreme_is_a_failure_with_the_input(findings):
