@@ -13,8 +13,14 @@ def python() -> str:
     """Return the page of the package ``islands``."""
     return page(
         "Python API",
-        "The public names of the package `islands`.",
+        "The public names of the package `islands`, and its estimator of scikit-learn.",
         *_groups(islands),
+        section(
+            "Scikit-learn",
+            "`islands.sklearn` needs the extra `sklearn`. [Use the library](../how-to/use-the-library.md#use-scikit-learn) "
+            "has an example.",
+            "::: islands.sklearn.IslandsRegressor",
+        ),
     )
 
 

@@ -12,12 +12,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
 from islands.distribution import describe_missing_extra
 from islands.errors import IslandsError, SettingsError, suggest
 from islands.facade.fit import fit
 from islands.facade.identify import identify
-from islands.models.candidate_library import get_library
+from islands.models.candidate_library import LIBRARIES, get_library
 from islands.models.narx import Model
 from islands.simulation.predictors import free_run
 
@@ -49,11 +50,12 @@ class IslandsRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     method : str
         ``fit`` (subset selection over a library, fast) or ``identify`` (evolution).
     library : str
-        Candidate library of ``fit``: ``polynomial`` for smooth systems, ``phi-polynomial`` for hysteresis.
+        Candidate library of ``fit``: ``auto`` fits several and takes the best one; ``polynomial`` is for smooth
+        systems, ``phi-polynomial`` for hysteresis.
     degree, lags : int, optional
         Degree and lags of the library of ``fit``; None takes the defaults of the library.
     preset : str
-        Preset of ``identify``.
+        Preset of ``identify``; ``auto`` chooses it.
     max_terms : int
         Size of the largest model.
     constraints : str, optional
@@ -89,10 +91,10 @@ class IslandsRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         dt: float = 1.0,
         *,
         method: str = "fit",
-        library: str = "polynomial",
+        library: str = AUTO,
         degree: int | None = None,
         lags: int | None = None,
-        preset: str = "narx",
+        preset: str = AUTO,
         max_terms: int = 10,
         constraints: str | None = None,
         feedthrough: str = "auto",
@@ -211,7 +213,8 @@ class IslandsRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         common |= {"average": 1, "seed": seed}
         if self.method == "fit":
             library: dict[str, Any] = {"library": self.library, "degree": self.degree, "lags": self.lags}
-            lags = get_library(self.library).lags if self.lags is None else self.lags
+            libraries = LIBRARIES if self.library == AUTO else [self.library]
+            lags = max(get_library(each).lags for each in libraries) if self.lags is None else self.lags
             enough = min(0.5, (lags + _RESIDUALS) / record.samples)
             common["validation"] = max(self.validation, enough)
             return fit(record, **common, **library, **further)

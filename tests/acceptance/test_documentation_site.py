@@ -123,6 +123,10 @@ def test_generated_pages_have_no_empty_rows(generated: dict[str, str]) -> None:
         assert not [row for row in empty if "---" not in row], path
 
 
+def test_the_reference_has_the_estimator_of_scikit_learn(generated: dict[str, str]) -> None:
+    assert "::: islands.sklearn.IslandsRegressor" in generated["reference/api.md"]
+
+
 def test_the_navigation_has_every_generated_reference_page(generated: dict[str, str]) -> None:
     from support.pages import site_pages
 

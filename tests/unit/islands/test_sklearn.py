@@ -39,19 +39,19 @@ def data():
 def regressor():
     from islands.sklearn import IslandsRegressor
 
-    return IslandsRegressor(DT, degree=2, lags=1, max_terms=4, settings={"certificate": 0})
+    return IslandsRegressor(
+        DT, library="polynomial", degree=2, lags=1, max_terms=4, settings={"certificate": 0}
+    )
 
 
-def small():
-    from islands.sklearn import IslandsRegressor
-
-    return IslandsRegressor(lags=1, degree=1, max_terms=2, settings={"certificate": 0})
-
-
-def test_the_checks_of_scikit_learn_pass():
+@pytest.mark.parametrize("library", ["polynomial", pytest.param("auto", marks=pytest.mark.nightly)])
+def test_the_checks_of_scikit_learn_pass(library):
     from sklearn.utils.estimator_checks import check_estimator
 
-    checks = check_estimator(small(), expected_failed_checks=CONTRADICTIONS, on_fail=None, on_skip=None)
+    from islands.sklearn import IslandsRegressor
+
+    small = IslandsRegressor(library=library, lags=1, degree=1, max_terms=2, settings={"certificate": 0})
+    checks = check_estimator(small, expected_failed_checks=CONTRADICTIONS, on_fail=None, on_skip=None)
     by_status = {check["check_name"]: check["status"] for check in checks if check["status"] != "passed"}
     assert {name for name, status in by_status.items() if status == "xfail"} == set(CONTRADICTIONS)
     assert "failed" not in by_status.values(), by_status
@@ -64,6 +64,19 @@ def test_a_prediction_continues_the_training_data(data, regressor):
     assert regressor.score(u[400:], y[400:]) > 0.999999
     assert regressor.equation_ == regressor.result_.best.equation
     assert {item.text for item in regressor.model_.regressors} == {"y(k-1)", "u1(k-1)", "u1(k-1)^2"}
+
+
+def test_the_defaults_choose_the_library_of_friction():
+    from islands.sklearn import IslandsRegressor
+
+    u = np.repeat(np.random.default_rng(1).uniform(-4.0, 4.0, 80), 8)
+    y = np.zeros(len(u))
+    for k in range(1, len(u)):
+        y[k] = 0.9 * y[k - 1] + 0.6 * u[k - 1] - 0.5 * np.sign(y[k - 1])
+    regressor = IslandsRegressor(DT, settings={"certificate": 0}).fit(u[:, None], y)
+    assert regressor.get_params()["library"] == regressor.get_params()["preset"] == "auto"
+    assert regressor.result_.settings["library"] == "friction"
+    assert "sign(y(k-1))" in regressor.equation_
 
 
 def test_a_prediction_starts_from_the_begin_or_from_given_outputs(data, regressor):
