@@ -17,8 +17,8 @@ def python() -> str:
         *_groups(islands),
         section(
             "Scikit-learn",
-            "`islands.sklearn` needs the extra `sklearn`. [Use the library](../how-to/use-the-library.md#use-scikit-learn) "
-            "has an example.",
+            "`islands.sklearn` needs the extra `sklearn`. "
+            "[Use the library](../how-to/use-the-library.md#use-scikit-learn) has an example.",
             "::: islands.sklearn.IslandsRegressor",
         ),
     )

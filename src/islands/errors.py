@@ -6,7 +6,8 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 from math import isfinite, nan
 from numbers import Integral, Real
-from typing import TypeVar
+from reprlib import repr as abbreviate
+from typing import TypeVar, cast
 
 T = TypeVar("T")
 
@@ -108,7 +109,8 @@ def lookup(table: Mapping[str, T], name: str, kind: str) -> T:
         The name is unknown. The message lists the names of the table, and suggests similar ones.
     """
     if name not in table:
-        raise SettingsError(f"unknown {kind} {name!r}: take one of {', '.join(table)}{suggest(name, table)}")
+        known = f"take one of {', '.join(table)}" if table else "there is none"
+        raise SettingsError(f"unknown {kind} {name!r}: {known}{suggest(name, table)}")
     return table[name]
 
 
@@ -121,6 +123,7 @@ def check_at_least(least: int, **values: int) -> None:
         A value is below the bound.
     """
     for name, value in values.items():
+        check_integers(**{name: value})
         if value < least:
             raise SettingsError(f"{name} is at least {least}, got {value}")
 
@@ -133,9 +136,12 @@ def check_seconds(value: object, name: str, kind: type[IslandsError] = SettingsE
     IslandsError
         It is not. The message has the name of the argument; ``kind`` is the class of the error.
     """
-    seconds = float(value) if isinstance(value, Real) and not isinstance(value, bool) else nan
+    try:
+        seconds = float(value) if isinstance(value, Real) and not isinstance(value, bool) else nan
+    except TypeError:  # a timedelta64 of NumPy is an Integral
+        seconds = nan
     if not (isfinite(seconds) and seconds > 0):
-        raise kind(f"{name} must be a positive number of seconds, got {value!r}")
+        raise kind(f"{name} must be a positive number of seconds, got {abbreviate(value)}")
     return seconds
 
 
@@ -149,7 +155,93 @@ def check_integers(**values: object) -> None:
     """
     for name, value in values.items():
         if value is not None and (isinstance(value, bool) or not isinstance(value, Integral)):
-            raise SettingsError(f"{name} is an integer, got {value!r}")
+            raise SettingsError(f"{name} is an integer, got {abbreviate(value)}")
+
+
+def check_texts(**values: object) -> None:
+    """Check that settings, which are given by name, are texts or None.
+
+    Raises
+    ------
+    SettingsError
+        A value is not.
+    """
+    for name, value in values.items():
+        if value is not None and not isinstance(value, str):
+            raise SettingsError(f"{name} is a text, got {abbreviate(value)}")
+
+
+def check_sequences(**values: object) -> None:
+    """Check that settings, which are given by name, are sequences and not texts.
+
+    Raises
+    ------
+    SettingsError
+        A value is not.
+    """
+    for name, value in values.items():
+        if isinstance(value, str) or not isinstance(value, Iterable):
+            raise SettingsError(f"{name} is a sequence, such as [{value!r}], got {abbreviate(value)}")
+
+
+def check_callables(**values: object) -> None:
+    """Check that arguments, which are given by name, can be called.
+
+    Raises
+    ------
+    SettingsError
+        A value cannot.
+    """
+    for name, value in values.items():
+        if not callable(value):
+            raise SettingsError(f"{name} is a function, got {abbreviate(value)}")
+
+
+def check_seed(seed: object) -> None:
+    """Check that a seed is an integer and not negative.
+
+    Raises
+    ------
+    SettingsError
+        It is not.
+    """
+    if seed is None:
+        raise SettingsError("seed is an integer, got None: results are reproducible")
+    check_integers(seed=seed)
+    if cast("int", seed) < 0:
+        raise SettingsError(f"a seed is not negative, got {seed}")
+
+
+def check_type(value: object, kind: type, user: str, advice: str) -> None:
+    """Check the class of an argument.
+
+    Parameters
+    ----------
+    user : str
+        Function that takes the argument.
+    advice : str
+        What to do, for the message.
+
+    Raises
+    ------
+    SettingsError
+        It is of another class.
+    """
+    if not isinstance(value, kind):
+        raise SettingsError(f"{user} takes a {kind.__name__}, got a {type(value).__name__}: {advice}")
+
+
+def check_numbers(**values: object) -> None:
+    """Check that settings, which are given by name, are numbers.
+
+    Raises
+    ------
+    SettingsError
+        A value is not.
+    """
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, Real):
+            raise SettingsError(f"{name} is a number, got {abbreviate(value)}")
 
 
 def check_probabilities(**values: float) -> None:
@@ -160,6 +252,7 @@ def check_probabilities(**values: float) -> None:
     SettingsError
         A value is not a probability.
     """
+    check_numbers(**values)
     for name, value in values.items():
         if not 0.0 <= value <= 1.0:
             raise SettingsError(f"{name} lies between 0 and 1, got {value}")

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from islands.errors import IslandsError
+from islands.errors import IslandsError, check_callables
 from islands.parallel import ParallelMap
 
 A = TypeVar("A")
@@ -213,6 +213,7 @@ class Steps:
     """
 
     def __init__(self, progress: ProgressCallback = ignore_progress, stop: Stop = never_stop) -> None:
+        check_callables(progress=progress, stop=stop)
         self.report, self.stop = progress, stop
         self._left_out: dict[str, None] = {}
 

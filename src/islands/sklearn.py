@@ -50,8 +50,8 @@ class IslandsRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     method : str
         ``fit`` (subset selection over a library, fast) or ``identify`` (evolution).
     library : str
-        Candidate library of ``fit``: ``auto`` fits several and takes the best one; ``polynomial`` is for smooth
-        systems, ``phi-polynomial`` for hysteresis.
+        Candidate library of ``fit``: ``auto`` fits several and takes the best one; ``polynomial`` is for
+        smooth systems, ``phi-polynomial`` for hysteresis.
     degree, lags : int, optional
         Degree and lags of the library of ``fit``; None takes the defaults of the library.
     preset : str

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from islands.data.channel_names import describe_contradiction
 from islands.data.preprocessing_steps import Preprocessing
-from islands.errors import RecordError, SettingsError, check_seconds
+from islands.errors import RecordError, SettingsError, check_seconds, check_sequences, check_type
 
 #: Largest relative difference between equal sampling times. A printed time column is not more precise.
 SAME_DT = 1e-3
@@ -71,8 +71,7 @@ class Dataset:
     held_out: int = 0
 
     def __post_init__(self) -> None:
-        u = np.array(self.u, dtype=np.float64, order="C", ndmin=1)
-        y = np.array(self.y, dtype=np.float64)
+        u, y = _to_numbers(self.u, "inputs"), _to_numbers(self.y, "output")
         if u.ndim == 1:
             u = u[:, None]
         if u.ndim != 2 or y.ndim != 1 or len(u) != len(y):
@@ -90,6 +89,9 @@ class Dataset:
         for name, unit in zip((*names, self.output_name), (*units, self.output_unit), strict=True):
             if contradiction := describe_contradiction(name, unit):
                 raise RecordError(contradiction)
+        if not y.size:
+            raise RecordError("the record has 0 samples: give at least one")
+        check_sequences(segments=self.segments)
         segments = tuple(int(length) for length in self.segments) or (len(y),)
         check_seconds(self.dt, "the sampling time dt", RecordError)
         _check_segments(segments, len(y), self.held_out)
@@ -172,6 +174,7 @@ class Dataset:
 
     def __getitem__(self, rows: slice) -> "Dataset":
         """Return the samples of a slice (step 1) as a separate record; segments are cut but not joined."""
+        check_type(rows, slice, "a record", "write record[start:stop]; record.u and record.y are the arrays")
         first, last, step = rows.indices(self.samples)
         if step != 1 or last <= first:
             raise RecordError(f"take a non-empty slice of step 1 of the record's {self.samples} samples")
@@ -190,6 +193,13 @@ class Dataset:
             recordings=tuple(name for _, name in kept),
             start=self.start + first * self.dt,
         )
+
+
+def _to_numbers(values: object, name: str) -> NDArray[np.float64]:
+    try:
+        return np.array(values, dtype=np.float64, order="C", ndmin=1)
+    except (TypeError, ValueError) as error:
+        raise RecordError(f"the {name} are not an array of numbers: {error}") from error
 
 
 def _check_finite(
@@ -240,6 +250,8 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
     SettingsError
         A recording is not a Dataset.
     """
+    if isinstance(recordings, Dataset):
+        raise SettingsError("join takes a sequence of Datasets, got one: write join((one, other))")
     if not recordings:
         raise RecordError("there is no recording to join: give at least one")
     for each in recordings:

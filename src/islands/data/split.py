@@ -13,7 +13,7 @@ from islands.data.compatibility import Reference, match_record
 from islands.data.dataset import Dataset, join
 from islands.data.magnitudes import check_magnitudes
 from islands.data.missing_outputs import skip_missing_outputs
-from islands.errors import ExtrapolationWarning, SettingsError
+from islands.errors import ExtrapolationWarning, SettingsError, check_numbers, check_type
 
 #: Fraction of a record, at its end, that a diagnosis reserves for hold-out validation.
 HOLDOUT_FRACTION = 0.25
@@ -64,6 +64,8 @@ def split(record: Dataset, fraction: float = 0.25) -> Split:
     SettingsError
         The fraction is not inside (0, 1) or leaves a part empty.
     """
+    check_type(record, Dataset, "split", "make one by as_record(data, inputs=..., output=...)")
+    check_numbers(fraction=fraction)
     if not 0.0 < fraction < 1.0:
         raise SettingsError(f"the validation fraction lies between 0 and 1, got {fraction}")
     estimation, validation = [], []

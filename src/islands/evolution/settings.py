@@ -8,7 +8,16 @@ from typing import Any, TypeVar
 
 from islands.data.averaging import check_average
 from islands.data.input_lead import check_feedthrough
-from islands.errors import SettingsError, check_at_least, check_probabilities, lookup
+from islands.errors import (
+    SettingsError,
+    check_at_least,
+    check_integers,
+    check_numbers,
+    check_probabilities,
+    check_sequences,
+    check_texts,
+    lookup,
+)
 from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
@@ -247,6 +256,13 @@ class Settings:
     target_error: float = _option(0.0, "Stop after the epoch that reaches this RMSE, in the output's unit.")
 
     def __post_init__(self) -> None:
+        check_sequences(
+            shifts=self.shifts,
+            primitives=self.primitives,
+            initial_terms=self.initial_terms,
+            characters=self.characters,
+        )
+        check_numbers(tolerance=self.tolerance, target_error=self.target_error)
         check_at_least(1, population=self.population, max_terms=self.max_terms, shooting=self.shooting)
         check_at_least(0, generations=self.generations, max_height=self.max_height)
         check_at_least(1, tournament=self.tournament)
@@ -256,6 +272,7 @@ class Settings:
         check_probabilities(high_level=self.high_level, outer=self.outer, from_library=self.from_library)
         if not self.tolerance >= 0.0:
             raise SettingsError(f"the tolerance of pruning is not negative, got {self.tolerance}")
+        check_integers(initial_height=self.initial_height)
         fewest, most = self.initial_terms
         if not 1 <= fewest <= most <= self.max_terms:
             raise SettingsError(
@@ -273,6 +290,7 @@ class Settings:
         check_average(self.average)
         check_feedthrough(self.feedthrough)
         lookup(STRUCTURES, self.structure, "structure")
+        check_texts(constraints=self.constraints)
         constraint(self.constraints)
         lookup(FITNESSES, self.fitness, "fitness")
         lookup(OVERLONG, self.overlong, "overlong")
@@ -281,6 +299,8 @@ class Settings:
         if self.estimator:
             lookup(ESTIMATORS, self.estimator, "estimator")
         primitive_table(self.primitives)
+        for shift in self.shifts:
+            check_integers(shifts=shift)
         if any(shift < 1 for shift in self.shifts):
             raise SettingsError(f"back-shifts are at least 1, got {self.shifts}")
         self._check_islands()

@@ -110,6 +110,8 @@ def parse(text: str, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Expres
         The text is not an expression, or it is nested too deeply. The message shows the part that cannot be
         read.
     """
+    if not isinstance(text, str):
+        raise ModelError(f"an expression is a text such as 'u(k-1)^2', got {text!r}")
     try:
         tree = ast.parse(text.strip().replace("^", "**"), mode="eval")
         return _Parser(replace(MODEL_SYNTAX, functions=primitives)).read(tree.body, -1)

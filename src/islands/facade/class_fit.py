@@ -9,7 +9,7 @@ from islands.errors import SettingsError, lookup
 from islands.estimation.refinement import refine
 from islands.evolution.search_result import SearchResult, SearchStatistics, rank_models, with_bands
 from islands.facade.results.model_simulation import SHOOTING
-from islands.io.models import MODEL_CLASSES
+from islands.io.models import MODEL_CLASSES, NARX
 from islands.models.parametric import ParametricModel
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
@@ -44,7 +44,8 @@ def fit_class(record: Dataset, split: Split, kind: str, seed: int, steps: Steps)
     SettingsError
         There is no such class, or no starting model has a free run that remains bounded.
     """
-    entry = lookup(MODEL_CLASSES, kind, "class of models")
+    lookup(dict.fromkeys((NARX, *MODEL_CLASSES)), kind, "class of models")
+    entry = MODEL_CLASSES[kind]
     interval = min(SHOOTING, max(1, split.estimation.samples // 10))
     found = list(_estimate(entry, split.estimation, steps))
     if not found:

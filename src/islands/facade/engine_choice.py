@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 
 from islands.distribution import describe_missing_extra
-from islands.errors import SettingsError, lookup
+from islands.errors import SettingsError, check_integers, lookup
 from islands.evolution.engine import Engine, SerialEngine
 from islands.progress import ProgressCallback, ignore_progress
 
@@ -40,6 +40,7 @@ class Ray:
     cpus: int | None = None
 
     def __post_init__(self) -> None:
+        check_integers(cpus=self.cpus)
         if self.cpus is not None and self.cpus < 1:
             raise SettingsError(f"Ray needs at least 1 core, got cpus = {self.cpus}")
         if self.cpus is not None and self.address is not None:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
 from islands.data.split import split_data, warn_of_extrapolation
-from islands.errors import SettingsError
+from islands.errors import SettingsError, check_seed
 from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.class_fit import fit_class
@@ -131,6 +131,7 @@ def fit(
     ExtrapolationWarning
         An input of the validation data leaves the range of the estimation data.
     """
+    check_seed(seed)
     record, validation = read_data(record, y, dt, inputs, output, validation)
     settings = FitSettings(
         max_terms=max_terms,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from islands.data.averaging import count_means
 from islands.data.dataset import Dataset
 from islands.data.split import split_data, warn_of_extrapolation
-from islands.errors import RecordError, SettingsError
+from islands.errors import RecordError, SettingsError, check_seed
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.deviations import (
     LARGE_OFFSET,
@@ -144,8 +144,7 @@ def identify(
         An input of the validation data leaves the range of the estimation data.
     """
     record, validation = read_data(record, y, dt, inputs, output, validation)
-    if seed < 0:
-        raise SettingsError(f"a seed is not negative, got {seed}")
+    check_seed(seed)
     parts = split_data(record, validation)
     warn_of_extrapolation(parts)
     steps = Steps(progress, stop)

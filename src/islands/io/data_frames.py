@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from islands.data.dataset import Dataset, join
 from islands.errors import RecordError, SettingsError
@@ -187,6 +187,11 @@ def read_data(
 ) -> tuple[Dataset, Dataset | float]:
     """Return the record of a search, and its validation data with the same columns or their fraction."""
     record = as_record(data, y, dt, inputs=inputs, output=output)
+    if validation is None or isinstance(validation, str | slice):
+        raise SettingsError(
+            f"validation is a fraction such as 0.25, or a record, got {validation!r}: cut rows by "
+            "record[start:stop]"
+        )
     if isinstance(validation, Dataset | Real):
         return record, cast("Dataset | float", validation)
     columns = inputs or record.input_names
@@ -198,21 +203,37 @@ def _join_output(
 ) -> tuple[tuple[str, ...], str, MemoryColumns]:
     """Return the names of the inputs and of the output, and the columns of both."""
     if columns is None:
-        u = np.asarray(data)
+        u = _to_array(data, "inputs")
         if not u.ndim:
             raise SettingsError(f"the inputs are an array of numbers, got {type(data).__name__}")
+        if u.ndim > 2:
+            raise SettingsError(
+                f"the inputs are an array of the shape (samples,) or (samples, inputs), got {u.shape}"
+            )
+        if u.ndim == 2 and len(u) != np.size(y) == u.shape[1]:
+            raise RecordError(
+                f"the inputs have the shape {u.shape}, the output {np.size(y)} samples: rows are samples, "
+                "give the transpose (u.T)"
+            )
         names = ("u",) if u.ndim < 2 else tuple(f"u{place + 1}" for place in range(u.shape[1]))
-        channels = u.reshape(len(u), -1).T
+        channels = u[:, None].T if u.ndim < 2 else u.T
         columns = MemoryColumns(
             {name: partial(np.asarray, channel) for name, channel in zip(names, channels, strict=True)}
         )
     loads = {name or "u": load for name, load in columns.load.items()}
-    other = read_columns_in_memory(y) or MemoryColumns({"": partial(np.asarray, y)})
+    other = read_columns_in_memory(y) or MemoryColumns({"": partial(_to_array, y, "output")})
     if len(other.load) != 1:
         raise RecordError(f"the output is one column, got {', '.join(other.load)}")
     ((name, load),) = other.load.items()
     output = name if name and name not in loads else "y"
     return tuple(loads), output, MemoryColumns(loads | {output: load}, columns.time or other.time)
+
+
+def _to_array(data: Any, name: str) -> NDArray[Any]:
+    try:
+        return np.asarray(data)
+    except ValueError as error:
+        raise RecordError(f"the {name} are not an array: every row needs the same length") from error
 
 
 def _time_columns(columns: MemoryColumns, taken: Sequence[str | None]) -> list[str]:

@@ -5,6 +5,7 @@ Frames are read through narwhals, which imports none of their libraries.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.io.records.column_names import looks_like_time, seconds_per_unit
+from islands.io.records.formats.text.time_stamps import kind_of, parse_stamps
+from islands.io.records.table import RowRange
 
 if TYPE_CHECKING:
     import xarray
@@ -89,8 +92,28 @@ def _load_series(series: Any) -> NDArray[Any]:
     if kind.is_temporal():
         return _count_seconds(series) / (seconds_per_unit(str(series.name)) or 1.0)
     numeric = kind.is_numeric() or kind == nw.Boolean
-    array: NDArray[Any] = series.cast(nw.Float64).to_numpy() if numeric else series.to_numpy()
-    return array
+    if numeric:
+        numbers: NDArray[np.float64] = series.cast(nw.Float64).to_numpy()
+        return numbers
+    return _read_stamps(series.to_numpy(), str(series.name))
+
+
+def _read_stamps(array: NDArray[Any], name: str) -> NDArray[Any]:
+    """Return time stamps, as texts or objects of the class datetime, in the unit of their name.
+
+    Other values are returned as they are.
+    """
+    values = array.tolist()
+    known = [value for value in values if value is not None]
+    if known and all(isinstance(value, datetime) for value in known):
+        spans = [np.nan if value is None else (value - known[0]).total_seconds() for value in values]
+        seconds = np.array(spans, np.float64)
+    elif known and all(isinstance(value, str) for value in known) and kind_of(known[0]):
+        texts = ["" if value is None else value for value in values]
+        seconds = parse_stamps(texts, name, RowRange("the record", "sample", range(len(texts))), None, None)
+    else:
+        return array
+    return seconds / (seconds_per_unit(name) or 1.0)
 
 
 def _count_seconds(series: Any) -> NDArray[np.float64]:
@@ -113,6 +136,8 @@ def _find_time(frame: Any, index: Any) -> tuple[str, NDArray[np.float64]] | None
     """
     import narwhals.stable.v2 as nw  # noqa: PLC0415
 
+    if hasattr(index, "to_timestamp"):
+        index = index.to_timestamp()  # the beginnings of periods
     if index is not None and getattr(index, "nlevels", 1) == 1:
         series = nw.from_native(index.to_series(), series_only=True)
         name = str(index.name or "")

@@ -71,8 +71,13 @@ def write_model(model: AnyModel, path: str | Path) -> None:
     Raises
     ------
     ModelError
-        A number of the model is not finite, or the file cannot be written.
+        It is no model, a number of it is not finite, or the file cannot be written.
     """
+    if not isinstance(model, Model | CoupledModel | ParametricModel):
+        raise ModelError(
+            f"a {type(model).__name__} is no model: give result.best.model, or save the result by "
+            "result.save(folder)"
+        )
     text = model_json(model)
     try:
         Path(path).write_text(text, encoding="utf-8")

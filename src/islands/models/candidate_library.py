@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from types import MappingProxyType
 
-from islands.errors import SettingsError, lookup
+from islands.errors import SettingsError, check_integers, lookup
 from islands.expressions.primitives import MUL, PRIMITIVES, SIGN, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged
 from islands.models.narx import canonical_order
@@ -97,6 +97,7 @@ def check_library(name: str, degree: int, lags: int, inputs: int) -> None:
     SettingsError
         As in `candidates`.
     """
+    check_integers(degree=degree, lags=lags)
     if degree < 1 or lags < 1:
         raise SettingsError(f"degree and lags are at least 1, got {degree} and {lags}")
     count = get_library(name).count(degree, lags, inputs)

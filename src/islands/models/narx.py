@@ -1,8 +1,10 @@
 """NARX model, linear in its parameters: y(k) = theta_1 psi_1 + theta_2 psi_2 + ... (equation (10))."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import nan
+from numbers import Real
+from reprlib import repr as abbreviate
 from typing import Any, ClassVar
 
 from islands.data.channel_names import parse_channel_name
@@ -252,12 +254,28 @@ def make_model(
         No term remains, or a term reads the present or the future.
     """
     theta: dict[Regressor, float] = {}
-    for expression, parameter in terms:
+    for expression, parameter in _check_terms(terms):
         factor, item = regressor(expression)
         if item is not None:
             theta[item] = theta.get(item, 0.0) + factor * parameter
     ordered = canonical_order(theta)
     return Model(tuple(ordered), tuple(theta[item] for item in ordered), input_names, output_name, dt)
+
+
+def _check_terms(terms: Iterable[object]) -> Iterator[tuple[Expression, float]]:
+    """Yield pairs of an expression and a number."""
+    for term in terms:
+        if not (
+            isinstance(term, Sequence)
+            and len(term) == 2
+            and isinstance(term[0], Expression)
+            and isinstance(term[1], Real)
+        ):
+            raise ModelError(
+                f"a term is a pair of an expression and a number, got {abbreviate(term)}: write "
+                "(islands.parse('y(k-1)'), 0.5)"
+            )
+        yield term[0], float(term[1])
 
 
 def measured_model(model: Model) -> Model:

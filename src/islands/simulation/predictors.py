@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.data.dataset import Dataset
 from islands.data.signal_map import map_coupled_signals, map_signals
-from islands.errors import RecordError, SettingsError
+from islands.errors import RecordError, SettingsError, check_integers
 from islands.kernels.simulate import COMPLETE, Layout, simulate
 from islands.kernels.summation import dot, total
 from islands.models.coupled_narx import AnyModel, CoupledModel
@@ -102,6 +102,7 @@ def multiple_shooting(
     SettingsError
         The warm-up is shorter than the model's largest lag, or the interval is less than 1.
     """
+    check_integers(warm_up=warm_up)
     first = model.maximum_lag if warm_up is None else warm_up
     if first < model.maximum_lag:
         raise SettingsError(f"the model reads {model.maximum_lag} samples back, the warm-up has {first}")

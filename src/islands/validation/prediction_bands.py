@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from islands.data.coupled_record import AnyRecord, CoupledSplit
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.errors import SettingsError
+from islands.errors import SettingsError, check_numbers
 from islands.models.coupled_narx import CoupledModel
 from islands.models.protocol import DynamicModel
 from islands.simulation.predictors import free_run
@@ -138,6 +138,7 @@ class PredictionBands:
         return self._factor(LEVEL)
 
     def _factor(self, level: float) -> float:
+        check_numbers(level=level)
         if not LEVELS[0] <= level <= LEVELS[-1]:
             raise SettingsError(f"the level of a band lies between {LEVELS[0]} and {LEVELS[-1]}, got {level}")
         levels = sorted(self.factors)

@@ -12,7 +12,7 @@ from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect, SimulationContext, Site
 from islands.effects.scale import wrong_parameter
-from islands.errors import RecordError, SettingsError, suggest
+from islands.errors import RecordError, SettingsError, check_type, suggest
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 
@@ -66,6 +66,8 @@ def select_effects(
 
 
 def _check_names(catalogue: Sequence[Effect]) -> None:
+    for effect in catalogue:
+        check_type(effect, Effect, "effects", "take entries of islands.EFFECTS by their attribute name")
     names = [effect.name for effect in catalogue]
     if duplicates := sorted({name for name in names if names.count(name) > 1}):
         raise SettingsError(

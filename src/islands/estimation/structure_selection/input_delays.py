@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from islands.errors import SettingsError
+from islands.errors import SettingsError, check_integers, check_sequences
 from islands.expressions.tree import Apply, Expression, Lagged
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor, regressor
@@ -17,8 +17,11 @@ def check_delays(delays: Sequence[int]) -> None:
     Raises
     ------
     SettingsError
-        A dead time is out of range.
+        A dead time is out of range, or no integer.
     """
+    check_sequences(delays=delays)
+    for delay in delays:
+        check_integers(delays=delay)
     if any(not 0 <= delay <= LARGEST_DELAY for delay in delays):
         raise SettingsError(f"dead times lie between 0 and {LARGEST_DELAY} samples, got {list(delays)}")
 

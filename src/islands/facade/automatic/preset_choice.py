@@ -7,6 +7,7 @@ from typing import Any
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split, split_data
+from islands.errors import check_texts, lookup
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_delays import check_delays
 from islands.evolution.presets import AUTO, resolve_kinds, with_tuples
@@ -14,6 +15,7 @@ from islands.evolution.search_result import SearchResult
 from islands.facade.automatic.kind_choice import Choice, choose_kind
 from islands.facade.library_fit import FitSettings, fit_library
 from islands.facade.trials.library import make_trial_library, take_library
+from islands.models.candidate_library import LIBRARIES
 from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 
 
@@ -78,9 +80,12 @@ def fit_chosen_library(
         As in `islands.fit`.
     """
     check_delays(delays or ())
+    check_texts(constraints=constraints)
     constraint(constraints or "none").check_inputs(record.inputs)
     fit_one = partial(fit_library, record, split, settings=settings, seed=seed, progress=progress, stop=stop)
     if library != AUTO:
+        # The message about another name lists auto, too.
+        lookup(dict.fromkeys((AUTO, *LIBRARIES)), library, "library")
         return fit_one(take_library(library, degree, lags, constraints, delays or ())).complete()
     kinds = resolve_kinds({} if constraints is None else {"constraints": constraints})
     libraries = {kind: take_library(each.library, degree, lags, constraints) for kind, each in kinds.items()}

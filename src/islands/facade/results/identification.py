@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.errors import ModelError, SettingsError
+from islands.errors import ModelError, SettingsError, check_type
 from islands.evolution.search_result import SearchResult
 from islands.facade.results.comparison import ResultComparison, compare_models
 from islands.facade.results.fitted_model import FittedModel
@@ -147,6 +147,7 @@ class Result:
         RecordError
             The record does not match a model.
         """
+        check_type(other, Result, "compare", "open a folder by islands.load(path)")
         both = (self, other)
         return compare_models(
             [each.models for each in both],

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from islands.data.averaging import count_means
 from islands.data.dataset import Dataset
+from islands.errors import check_integers
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.settings import Settings
@@ -85,6 +86,7 @@ def take_library(
         The library is unknown.
     """
     entry = get_library(name)
+    check_integers(degree=degree, lags=lags)
     return TrialLibrary(
         name,
         entry.degree if degree is None else degree,

@@ -3,6 +3,9 @@
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from numbers import Integral
+from reprlib import repr as abbreviate
 from types import MappingProxyType
 
 from islands.data.channel_names import AT_ONCE, is_unit, normalise_unit, parse_unit, spell_unit
@@ -82,31 +85,51 @@ def find_column(name: str, columns: Iterable[str]) -> str:
 
 
 def list_inputs(inputs: object) -> tuple[str, ...]:
-    """Return the names of inputs that are given as one name or as a sequence; numbers become texts."""
-    if isinstance(inputs, str) or not isinstance(inputs, Iterable):
-        return (str(inputs),)
-    return tuple(map(str, inputs))
-
-
-def take_output(output: object) -> str | None:
-    """Return the name of the output; a number becomes a text.
+    """Return the names of inputs that are given as one name or as a sequence; integers become texts.
 
     Raises
     ------
     SettingsError
-        Several outputs are given.
+        A set has no order, or an element is no name.
+    """
+    if inputs is None:
+        return ()
+    if isinstance(inputs, AbstractSet):
+        raise SettingsError(f"inputs have an order, got a {type(inputs).__name__}: give a list")
+    if isinstance(inputs, str) or not isinstance(inputs, Iterable):
+        return (_check_name(inputs, "inputs"),)
+    return tuple(_check_name(name, "inputs") for name in inputs)
+
+
+def _check_name(name: object, argument: str) -> str:
+    """Return a name of a column, which is a text or an integer, as a text."""
+    if isinstance(name, str | Integral) and not isinstance(name, bool):
+        return str(name)
+    raise SettingsError(
+        f"{argument} names columns, got {abbreviate(name)}, a {type(name).__name__}: give names such as "
+        "'u_V', or all data as arrays, (u, y, dt)"
+    )
+
+
+def take_output(output: object) -> str | None:
+    """Return the name of the output; an integer becomes a text.
+
+    Raises
+    ------
+    SettingsError
+        Several outputs are given, or something that is no name.
     """
     if output is None or isinstance(output, str):
         return output
     if isinstance(output, Iterable):
-        names = tuple(map(str, output))
+        names = tuple(_check_name(name, "output") for name in output)
         if len(names) == 1:
             return names[0]
         raise SettingsError(
             f"output names one column, got {', '.join(names) or 'none'}: name one, or take fit_coupled or "
             "identify_coupled for all"
         )
-    return str(output)
+    return _check_name(output, "output")
 
 
 def append_unit(name: str, unit: str) -> str:

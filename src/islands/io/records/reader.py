@@ -4,10 +4,11 @@ import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from os import PathLike
 from pathlib import Path
 
 from islands.data.dataset import Dataset
-from islands.errors import RecordError
+from islands.errors import RecordError, SettingsError
 from islands.io.records.content import find_suffix
 from islands.io.records.formats.excel import read_workbook
 from islands.io.records.formats.hdf5 import read_hdf5
@@ -240,6 +241,11 @@ def _open_file(file: Path, options: ReadingOptions) -> Table:
 
 
 def _check_readable(path: str | Path) -> Path:
+    if not isinstance(path, str | PathLike):
+        raise SettingsError(
+            f"read_record takes the path of a file, got a {type(path).__name__}: data in memory are read by "
+            "as_record(data, inputs=..., output=...)"
+        )
     file = Path(path)
     try:
         file.open("rb").close()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
-from islands.errors import RecordError
+from islands.errors import RecordError, check_type
 
 #: Lower and upper limit of a prediction band.
 Band = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -25,6 +25,7 @@ def write_record(record: Dataset, path: str | Path) -> None:
         The record has several segments, which a table with one time column cannot represent, or the file
         cannot be written.
     """
+    check_type(record, Dataset, "write_record", "make one by as_record(data, inputs=..., output=...)")
     if len(record.segments) > 1:
         raise RecordError("a CSV file holds one recording: write each segment to a separate file")
     names = ("t_s", *record.input_names, record.output_name)

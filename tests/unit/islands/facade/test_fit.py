@@ -358,7 +358,7 @@ def test_progress_fractions_are_monotonic(samples):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"library": "wavelets"}, "unknown library 'wavelets': take one of phi-polynomial, polynomial"),
+        ({"library": "wavelets"}, "unknown library 'wavelets': take one of auto, phi-polynomial, polynomial"),
         ({"estimator": "kalman"}, "unknown estimator 'kalman': take one of least-squares, extended-"),
         ({"constraints": "passive"}, "unknown constraints 'passive': take one of none, hysteresis"),
         ({"max_terms": 0}, "a model has at least one term, got max_terms = 0"),

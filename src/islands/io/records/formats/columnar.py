@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
+from reprlib import repr as abbreviate
 from typing import Any
 
 import numpy as np
@@ -126,9 +128,15 @@ def _list_texts(array: NDArray[Any]) -> list[str] | None:
 
 
 def _to_channel(array: NDArray[Any], name: str, file: str) -> NDArray[np.float64]:
+    if array.dtype.kind == "O" and all(value is None or isinstance(value, Real) for value in array.flat):
+        array = np.array([np.nan if value is None else value for value in array.flat], np.float64)
     if array.dtype.kind not in "fiub":
-        kind = "string" if array.dtype.kind == "O" and _list_texts(array) is not None else array.dtype
-        raise RecordError(f"{file}: column {name} holds {kind} where real numbers are expected")
+        texts = _list_texts(array)
+        found = str(array.dtype)
+        if texts is not None:
+            sample = next((place for place, text in enumerate(texts) if text), 0)
+            found = f"text ({abbreviate(texts[sample])} in sample {sample})"
+        raise RecordError(f"{file}: column {name} holds {found} where real numbers are expected")
     if not (array.ndim == 1 or (array.ndim == 2 and 1 in array.shape)):
         raise RecordError(
             f"{file}: column {name} has the shape {array.shape}, a channel has (samples,): save one "
