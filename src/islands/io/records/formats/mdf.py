@@ -17,6 +17,7 @@ from islands.io.records.column_names import append_unit
 from islands.io.records.formats.columnar import ColumnarFile
 from islands.io.records.formats.groups import choose_group
 from islands.io.records.formats.mat.workspace import DAMAGED
+from islands.io.records.formats.mdf_blocks import check_lists
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.size_limits import check_column_count, check_samples, check_stored
 from islands.io.records.validation import MIN_SAMPLES
@@ -72,6 +73,7 @@ def _open(path: Path) -> Any:
     MDF3.__del__ = MDF4.__del__ = _close  # type: ignore[method-assign]
     # It also logs damages, before it raises or reads on.
     logger.setLevel("CRITICAL")
+    check_lists(path)
     return MDF(path)
 
 

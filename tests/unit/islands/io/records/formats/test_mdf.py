@@ -63,3 +63,31 @@ def test_a_channel_outside_of_its_records_is_refused(tmp_path):
         path.write_bytes(content[:place] + (60_000).to_bytes(4, "little") + content[place + 4 :])
         with pytest.raises(RecordError, match=r"outside of the records of its group"):
             read_record(path, ["u"], "y")
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("mark", [b"##DG", b"##CG", b"##CN", b"##FH"])
+def test_a_list_of_blocks_that_is_a_circle_is_refused(tmp_path, mark):
+    content = bytearray(save(tmp_path / "whole.mf4"))
+    at = content.index(mark)
+    content[at + 24 : at + 32] = at.to_bytes(8, "little")
+    (tmp_path / "r.mf4").write_bytes(content)
+    with pytest.raises(RecordError, match=r"r\.mf4 is damaged \(a list of its blocks is a circle\)"):
+        preview(tmp_path / "r.mf4")
+
+
+@pytest.mark.timeout(60)
+def test_a_circle_in_a_file_of_version_3_is_refused(tmp_path):
+    from asammdf import MDF, Signal
+
+    with MDF(version="3.30") as file:
+        file.append([Signal(K % 7 - 3.0, K / 100, name="u", unit="V"), Signal(K % 11, K / 100, name="y")])
+        file.save(tmp_path / "r.mdf")
+    assert read_record(tmp_path / "r.mdf", ["u"], "y").samples == 60
+    content = bytearray((tmp_path / "r.mdf").read_bytes())
+    first = content[68:72]
+    at = int.from_bytes(first, "little")
+    content[at + 4 : at + 8] = first
+    (tmp_path / "r.mdf").write_bytes(content)
+    with pytest.raises(RecordError, match=r"r\.mdf is damaged \(a list of its blocks is a circle\)"):
+        preview(tmp_path / "r.mdf")
