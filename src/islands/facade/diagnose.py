@@ -1,7 +1,7 @@
 """`diagnose` names what a simulation gets wrong on a record; `plan_experiment` says what one could show."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from threadpoolctl import threadpool_limits
 
@@ -15,6 +15,8 @@ from islands.effects.interface.effect import Effect, Signal
 from islands.errors import SettingsError
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.data_frames import as_record
+from islands.io.records.column_names import list_inputs
+from islands.io.records.reading_options import DEFAULT_READING, take_reading
 from islands.models.narx import Model
 from islands.models.parametric import ParametricModel
 from islands.parallel import ParallelMap
@@ -23,10 +25,16 @@ from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.specification.base import SpecModel
 from islands.simulators.specification.factory import make_model_simulator, make_simulator
-from islands.simulators.specification.table import LocalSpec, SimulationSpec
+from islands.simulators.specification.table import (
+    ColumnSpec,
+    LocalSpec,
+    SimulationSpec,
+    innermost,
+    parse_spec,
+)
 
 if TYPE_CHECKING:
-    from islands.io.data_frames import RecordLike
+    from islands.io.data_frames import ReadingLike, RecordLike
 
 
 def diagnose(
@@ -41,6 +49,7 @@ def diagnose(
     columns: Mapping[str, Signal] | None = None,
     effects: Sequence[Effect] = EFFECTS,
     seed: int = 0,
+    reading: "ReadingLike" = DEFAULT_READING,
     progress: ProgressCallback = ignore_progress,
     parallel_map: ParallelMap = map,
 ) -> DiagnosisResult:
@@ -66,13 +75,15 @@ def diagnose(
         calibrated without a prior.
     columns : mapping, optional
         Outputs of external simulations by name, each of shape (samples,), for ``column:NAME``; those of the
-        validation data follow those of the record.
+        validation data follow those of the record. By default, ``NAME`` is a column of the data frame.
     effects : sequence of Effect
         Effects to search for. Add your own with ``(*islands.EFFECTS, mine)``; user-defined maps act after
         those of the catalogue.
     seed : int
         Seed of the random generator. The same record, simulation and seed give the same diagnosis, bit for
         bit.
+    reading : mapping
+        Options of reading a frame, as of `as_record`: ``{"gaps": "split"}``.
     progress : callable
         Called with a message, and with the completed fraction if it is known.
     parallel_map : ParallelMap
@@ -92,10 +103,22 @@ def diagnose(
         There is no such simulation, a tolerance belongs to no parameter, two effects have the same name, or
         an effect is invalid.
     """
-    record = as_record(record, dt=dt, inputs=inputs, output=output, resting_inputs=True)
+    recorded = () if isinstance(record, Dataset) else _find_recorded(simulation, columns or {})
+    options = take_reading(reading).changes()
+    names = [*list_inputs(inputs), *recorded] if recorded else inputs
+
+    def read(data: "RecordLike") -> Dataset:
+        return as_record(
+            data, dt=dt, inputs=names, output=output, resting_inputs=True, signals=recorded, **options
+        )
+
+    record = read(record)
     if validation is not None:
-        held_out = as_record(validation, dt=dt, inputs=inputs, output=output, resting_inputs=True)
-        record = hold_out(record, held_out)
+        record = hold_out(record, read(validation))
+    if recorded:
+        kept = record.inputs - len(recorded)
+        columns = {**(columns or {}), **dict(zip(recorded, record.u[:, kept:].T, strict=True))}
+        record = record.first_inputs(kept)
     simulator = _as_simulator(simulation, record, columns)
     # The matrices are small: several threads take twice the CPU time.
     with threadpool_limits(1, user_api="blas"):
@@ -151,6 +174,15 @@ def plan_experiment(
     return plan_with_simulator(
         *(record, simulator, noise_std, tolerance, separate, limits, seed, parallel_map, progress, effects)
     )
+
+
+def _find_recorded(simulation: object, columns: Mapping[str, Signal]) -> tuple[str, ...]:
+    """Return the column of a frame that is the simulation; empty if it is given or is another simulation."""
+    if not isinstance(simulation, str | SpecModel):
+        return ()
+    spec = parse_spec(simulation) if isinstance(simulation, str) else simulation
+    inner = innermost(cast("LocalSpec", spec))
+    return (inner.column,) if isinstance(inner, ColumnSpec) and inner.column not in columns else ()
 
 
 def _as_simulator(

@@ -17,6 +17,7 @@ from islands.facade.library_fit import FitSettings
 from islands.facade.results.identification import Result
 from islands.io.data_frames import read_data
 from islands.io.models import NARX
+from islands.io.records.reading_options import DEFAULT_READING
 from islands.io.result_folder import record_document
 from islands.progress import (
     ProgressCallback,
@@ -29,7 +30,7 @@ from islands.progress import (
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
 
-    from islands.io.data_frames import RecordLike
+    from islands.io.data_frames import ReadingLike, RecordLike
 
 
 def fit(
@@ -53,6 +54,7 @@ def fit(
     shooting: int | None = None,
     certificate: int = 10_000,
     seed: int = 0,
+    reading: "ReadingLike" = DEFAULT_READING,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
 ) -> Result:
@@ -106,6 +108,8 @@ def fit(
         of all others; 0 for forward selection only.
     seed : int
         Stored in the result; forward selection is deterministic.
+    reading : mapping
+        Options of reading a frame, as of `as_record`: ``{"gaps": "split"}``.
     progress : callable, optional
         Called with a message and the completed fraction.
     stop : callable, optional
@@ -132,7 +136,7 @@ def fit(
         An input of the validation data leaves the range of the estimation data.
     """
     check_seed(seed)
-    record, validation = read_data(record, y, dt, inputs, output, validation)
+    record, validation = read_data(record, y, dt, inputs, output, validation, reading)
     settings = FitSettings(
         max_terms=max_terms,
         estimator=estimator,

@@ -41,6 +41,7 @@ from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import make_trial_library
 from islands.facade.trials.rate_selection import select_rate
 from islands.io.data_frames import read_data
+from islands.io.records.reading_options import DEFAULT_READING
 from islands.io.result_folder import record_document
 from islands.models.candidate_library import full_set
 from islands.program.primitive_functions import row_address
@@ -56,7 +57,7 @@ from islands.progress import (
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
 
-    from islands.io.data_frames import RecordLike
+    from islands.io.data_frames import ReadingLike, RecordLike
 
 #: Outcomes of individuals with estimated parameters.
 FEASIBLE_OUTCOMES = ("ok", "abandoned")
@@ -83,6 +84,7 @@ def identify(
     stop: Stop = never_stop,
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
+    reading: "ReadingLike" = DEFAULT_READING,
     **changes: Unpack[SettingChanges],
 ) -> Result:
     """Identify a model of a record by evolution.
@@ -118,6 +120,8 @@ def identify(
     engine : str, Ray or Engine, optional
         What runs the islands: ``serial`` (the default), ``ray`` on all cores of this machine,
         ``islands.Ray(address=..., cpus=...)``, or an engine. The result is the same, bit for bit.
+    reading : mapping
+        Options of reading a frame, as of `as_record`: ``{"gaps": "split"}``.
     **changes
         Settings that differ from the preset: ``generations=100, islands=4``. ``primitives`` contains names of
         built-in primitives and primitives of your own, ``("mul", islands.primitive("soften", soften))``.
@@ -143,8 +147,8 @@ def identify(
     ExtrapolationWarning
         An input of the validation data leaves the range of the estimation data.
     """
-    record, validation = read_data(record, y, dt, inputs, output, validation)
     check_seed(seed)
+    record, validation = read_data(record, y, dt, inputs, output, validation, reading)
     parts = split_data(record, validation)
     warn_of_extrapolation(parts)
     steps = Steps(progress, stop)

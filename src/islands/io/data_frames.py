@@ -24,7 +24,7 @@ from islands.io.records.column_names import (
     take_output,
 )
 from islands.io.records.formats.columnar import ColumnarFile
-from islands.io.records.reading_options import EXCLUDE, ROWS, ReadingOptions
+from islands.io.records.reading_options import DEFAULT_READING, ROWS, ReadingOptions, take_reading
 from islands.io.records.table_reading import read_table
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     #: What a record can be made of.
     RecordLike: TypeAlias = Dataset | FrameLike | IntoSeries | ArrayLike | Sequence[Dataset | FrameLike]
 
+#: Options of reading, or a mapping of their names to values.
+ReadingLike: TypeAlias = ReadingOptions | Mapping[str, Any]
+
 #: Name of the data in messages.
 _TITLE = "the record"
 
@@ -48,9 +51,10 @@ def as_record(
     *,
     inputs: str | Sequence[str] = (),
     output: str | None = None,
-    outliers: str = EXCLUDE,
     missing_output: bool = False,
     resting_inputs: bool = False,
+    signals: Sequence[str] = (),
+    **options: Any,
 ) -> Dataset:
     """Make a record of a data frame or of arrays, and check it as `read_record` checks a file.
 
@@ -71,12 +75,16 @@ def as_record(
         sample early.
     output : str
         Name of the output column.
-    outliers : str
-        ``exclude`` treats gross errors of the output as missing values, ``keep`` uses them.
     missing_output : bool
         Accept missing values of the output and constant columns, for a simulation.
     resting_inputs : bool
         Accept constant inputs, for a diagnosis.
+    signals : sequence of str
+        Inputs that are read at the samples of an output with fewer samples, such as the output of a
+        simulation; others may be averaged from each sample to the next.
+    **options
+        Options of `read_record` that are not for text: ``time``, ``time_unit``, ``resample``, ``missing``,
+        ``gaps``, ``outliers`` and ``rates``.
 
     Returns
     -------
@@ -93,17 +101,20 @@ def as_record(
     _check_kinds(data, y)
     output = take_output(output)
     inputs = inputs if isinstance(inputs, str) else list_inputs(inputs)
+    reading = take_reading(options)
+    reading.check_array_file(_TITLE, zones=False)
     if isinstance(data, Dataset):
-        if y is not None or dt is not None or inputs or output is not None:
+        if y is not None or dt is not None or inputs or output is not None or options:
             raise SettingsError(
                 "a Dataset already has its inputs, output and sampling time: give nothing else"
             )
         return data
     if y is None and isinstance(data, list | tuple) and data and _is_recording(data[0]):
-        accepted: dict[str, Any] = {
-            "outliers": outliers,
+        accepted = {
+            **options,
             "missing_output": missing_output,
             "resting_inputs": resting_inputs,
+            "signals": signals,
         }
         made = (_read_one(each, dt, inputs, output, accepted) for each in data)
         return join(tuple(made))
@@ -118,17 +129,20 @@ def as_record(
         raise SettingsError(
             "an array holds the inputs only: give the output and the sampling time as well, (u, y, dt)"
         )
-    table = _make_table(columns, (*list_inputs(inputs), output))
+    table = _make_table(columns, (*list_inputs(inputs), output), reading)
     if output is None:
         raise SettingsError(
             f"no output is given: take one of the columns {', '.join(table.names)} as output=..."
         )
+    if y is not None and reading.rates is None:
+        # The elements of arrays are samples; a column of a frame may have its own clock.
+        reading = replace(reading, rates=ROWS)
     record = read_table(
         *(table, _TITLE, inputs, output, dt),
         missing_output=missing_output,
-        # The elements of arrays are samples; a column of a frame may have its own clock.
-        options=ReadingOptions(outliers=outliers, rates=None if y is None else ROWS),
+        options=reading,
         resting_inputs=resting_inputs,
+        signals=signals,
     )
     names = [*record.input_names, output]
     units = [
@@ -184,9 +198,11 @@ def read_data(
     inputs: str | Sequence[str],
     output: str | None,
     validation: "RecordLike | float",
+    reading: ReadingLike = DEFAULT_READING,
 ) -> tuple[Dataset, Dataset | float]:
     """Return the record of a search, and its validation data with the same columns or their fraction."""
-    record = as_record(data, y, dt, inputs=inputs, output=output)
+    options = take_reading(reading).changes()
+    record = as_record(data, y, dt, inputs=inputs, output=output, **options)
     if validation is None or isinstance(validation, str | slice):
         raise SettingsError(
             f"validation is a fraction such as 0.25, or a record, got {validation!r}: cut rows by "
@@ -195,7 +211,8 @@ def read_data(
     if isinstance(validation, Dataset | Real):
         return record, cast("Dataset | float", validation)
     columns = inputs or record.input_names
-    return record, as_record(validation, dt=dt, inputs=columns, output=output or record.output_name)
+    held_out = as_record(validation, dt=dt, inputs=columns, output=output or record.output_name, **options)
+    return record, held_out
 
 
 def _join_output(
@@ -244,9 +261,9 @@ def _time_columns(columns: MemoryColumns, taken: Sequence[str | None]) -> list[s
     ]
 
 
-def _make_table(columns: MemoryColumns, taken: Sequence[str | None]) -> ColumnarFile:
+def _make_table(columns: MemoryColumns, taken: Sequence[str | None], reading: ReadingOptions) -> ColumnarFile:
     loads = dict(columns.load)
     if columns.time is not None and not _time_columns(columns, taken):
         name, times = columns.time
         loads[name] = lambda: times
-    return ColumnarFile(_TITLE, tuple(loads), lambda name: loads[name]())
+    return ColumnarFile(_TITLE, tuple(loads), lambda name: loads[name](), missing=reading.missing)

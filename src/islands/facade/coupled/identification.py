@@ -33,6 +33,7 @@ from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.rate_selection import select_rate
 from islands.io.data_frames import as_record
+from islands.io.records.reading_options import DEFAULT_READING, take_reading
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import require_narx
 from islands.progress import (
@@ -46,7 +47,7 @@ from islands.progress import (
 from islands.simulation.outcome import EvaluationOutcome
 
 if TYPE_CHECKING:
-    from islands.io.data_frames import FrameLike
+    from islands.io.data_frames import FrameLike, ReadingLike
 
 #: Largest number of accepted steps of the common refinement over each interval.
 _STEPS = 20
@@ -97,6 +98,7 @@ def fit_coupled(
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
+    reading: "ReadingLike" = DEFAULT_READING,
     **options: Unpack[FitOptions],
 ) -> CoupledResult:
     """Fit one equation per output by subset selection, for a simulation of all outputs together.
@@ -125,6 +127,8 @@ def fit_coupled(
     stop : callable, optional
         Called between all steps. Once it returns true and every output has models, the fit ends with the best
         ones so far; ``left_out`` of the result names the steps that are missing.
+    reading : mapping
+        Options of reading a frame, as of `as_record`: ``{"gaps": "split"}``.
     **options
         Options of `fit`. The default library is ``polynomial``; ``constraints`` are an entry of
         ``CONSTRAINTS`` and hold for every equation; ``feedthrough`` is ``no``.
@@ -148,7 +152,7 @@ def fit_coupled(
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
     trial = take_library(chosen["library"], degree, lags, constraints)
     find = partial(fit, seed=seed, stop=stop)
-    data = _read_data(record, inputs, outputs, dt, validation)
+    data = _read_data(record, inputs, outputs, dt, validation, reading)
     return _couple(data, chosen, trial, trial.lags + 3, refine_together, seed, Steps(progress, stop), find)
 
 
@@ -167,6 +171,7 @@ def identify_coupled(
     stop: Stop = never_stop,
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
+    reading: "ReadingLike" = DEFAULT_READING,
     **changes: Unpack[SettingChanges],
 ) -> CoupledResult:
     """Identify one equation per output by evolution, for a simulation of all outputs together.
@@ -192,6 +197,8 @@ def identify_coupled(
         State to continue from; the result equals that of an uninterrupted run.
     engine : str, Ray or Engine, optional
         What runs the islands, as for `identify`.
+    reading : mapping
+        As for `fit_coupled`.
     **changes
         Settings that differ from the preset; ``constraints`` and ``feedthrough`` as for `fit_coupled`.
 
@@ -210,7 +217,7 @@ def identify_coupled(
     chosen.setdefault("average", settings.average)
     find = _Searches(partial(identify, preset=preset, seed=seed, stop=stop, engine=engine), start, on_epoch)
     trial = make_trial_library(settings)
-    data = _read_data(record, inputs, outputs, dt, validation)
+    data = _read_data(record, inputs, outputs, dt, validation, reading)
     return _couple(
         data, chosen, trial, settings.maximum_lag + 3, refine_together, seed, Steps(progress, stop), find
     )
@@ -259,8 +266,10 @@ def _read_data(
     outputs: Sequence[str],
     dt: float | None,
     validation: "CoupledRecord | FrameLike | float",
+    reading: "ReadingLike",
 ) -> CoupledSplit:
     """Return estimation data and validation data, at the sampling time of the record."""
+    named = take_reading(reading).changes()
 
     def as_coupled(data: Any) -> CoupledRecord:
         if isinstance(data, CoupledRecord):
@@ -269,7 +278,7 @@ def _read_data(
             raise SettingsError("a Dataset has one output: give a CoupledRecord, one Dataset per output")
         columns = [inputs] if isinstance(inputs, str) else list(inputs)
         check_outputs(columns, outputs)
-        read = as_record(data, None, dt, inputs=[*columns, *outputs[1:]], output=outputs[0])
+        read = as_record(data, None, dt, inputs=[*columns, *outputs[1:]], output=outputs[0], **named)
         return couple(read, len(outputs))
 
     held_out = validation if isinstance(validation, int | float) else as_coupled(validation)

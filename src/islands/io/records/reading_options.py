@@ -128,8 +128,14 @@ class ReadingOptions:
         """The decimal mark as a character, None if it is inferred."""
         return None if self.decimal is None else DECIMAL_MARKS[self.decimal]
 
-    def check_array_file(self, file: str, sheets: bool = False) -> None:
+    def check_array_file(self, file: str, sheets: bool = False, zones: bool = True) -> None:
         """Refuse options of tables for a file of arrays, whose names and numbers are certain.
+
+        Parameters
+        ----------
+        file : str
+        sheets, zones : bool
+            Whether the file may have sheets, and times without a time zone.
 
         Raises
         ------
@@ -142,6 +148,7 @@ class ReadingOptions:
             _name("decimal"): self.decimal,
             _name("dates"): self.dates,
             _name("sheet"): None if sheets else self.sheet,
+            _name("timezone"): None if zones else self.timezone,
         }
         for option, value in given.items():
             if value:
@@ -155,6 +162,30 @@ class ReadingOptions:
             for name, value in given.items()
             if value != getattr(DEFAULT_READING, name)
         }
+
+
+def take_reading(reading: object) -> ReadingOptions:
+    """Return options of reading that are given as such, or as a mapping of their names to values.
+
+    Raises
+    ------
+    SettingsError
+        An option is unknown or invalid.
+    """
+    if isinstance(reading, ReadingOptions):
+        return reading
+    if not isinstance(reading, Mapping):
+        raise SettingsError(
+            f'reading is a mapping of options, such as {{"gaps": "split"}}, got a {type(reading).__name__}'
+        )
+    known = [option.name for option in fields(ReadingOptions)]
+    for name in reading:
+        if name not in known:
+            raise SettingsError(
+                f"a record is read without an option {name}: take one of {', '.join(known)}"
+                f"{suggest(str(name), known)}"
+            )
+    return ReadingOptions(**reading)
 
 
 def split_words(words: Sequence[str]) -> tuple[str, ...]:

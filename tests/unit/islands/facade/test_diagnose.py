@@ -67,6 +67,16 @@ def test_catalogue_is_the_default_and_is_not_changed(record: tuple[islands.Datas
     assert len(islands.EFFECTS) == len({effect.name for effect in islands.EFFECTS})
 
 
+@pytest.mark.ci
+def test_a_recorded_simulation_is_a_column_of_a_frame(record: tuple[islands.Dataset, Signal]) -> None:
+    data, simulated = record
+    frame = {"u": data.u[:, 0], "y": data.y, "theirs": simulated}
+    choice = {"inputs": "u", "output": "y", "dt": data.dt}
+    found = islands.diagnose(frame, "column:theirs", **choice)
+    same = islands.diagnose(islands.as_record(frame, **choice), "column:theirs", columns=frame)
+    assert found.summary == same.summary
+
+
 def _proportional(u: Signal, dt: float, gain: float = 0.8) -> Signal:
     del dt
     return gain * u

@@ -223,3 +223,54 @@ def test_arrays_import_no_library_of_frames():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
+
+
+WITH_GAPS = FRAME.assign(t_s=TIME, u_V=np.where(np.isin(np.arange(400), [50, 51, 300]), np.nan, FRAME["u_V"]))
+WITH_WORDS = FRAME.assign(t_s=TIME, y=[f"{y:.17g}" if k % 90 else "Failed" for k, y in enumerate(FRAME["y"])])
+
+
+@pytest.mark.parametrize(
+    ("frame", "options"),
+    [
+        (WITH_GAPS, {"gaps": "split"}),
+        (WITH_GAPS, {"gaps": "interpolate"}),
+        (WITH_WORDS, {"missing": ["Failed"]}),
+        (FRAME.assign(t_s=TIME), {"resample": 0.08}),
+        (FRAME.assign(k=1000 * TIME), {"time": "k", "time_unit": "ms"}),
+        (FRAME.assign(t_s=TIME, y=FRAME["y"].where(np.arange(400) % 4 == 0)), {"rates": "sample"}),
+    ],
+)
+def test_options_of_reading_are_those_of_a_file(tmp_path, frame, options):
+    frame.to_csv(tmp_path / "r.csv", index=False)
+    same = islands.read_record(tmp_path / "r.csv", ["u_V"], "y", **options)
+    found = islands.as_record(frame, **CHOICE, **options)
+    assert (found.dt, found.segments, found.samples) == (same.dt, same.segments, same.samples)
+    assert np.array_equal(found.u, same.u)
+    assert np.array_equal(found.y, same.y, equal_nan=True)
+    assert len(found.reading) == len(same.reading) > 0 or "time" in options
+
+
+def test_searches_take_options_of_reading():
+    found = islands.fit(WITH_GAPS, **CHOICE, library="polynomial", reading={"gaps": "split"})
+    assert found.search_result.record.segments == (50, 248, 99)
+    with pytest.raises(islands.errors.SettingsError, match="already has"):
+        islands.fit(RECORD, reading={"gaps": "split"})
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"gap": "split"}, "without an option gap: .* Did you mean 'gaps'"),
+        ({"gaps": "cut"}, "gaps is split or interpolate, got 'cut'"),
+        ({"decimal": "comma"}, "the record is not a table of text: leave decimal out"),
+        ({"timezone": "Europe/Berlin"}, "the record is not a table of text: leave timezone out"),
+    ],
+)
+def test_an_option_that_does_not_apply_to_a_frame_is_refused(options, words):
+    with pytest.raises(islands.errors.SettingsError, match=words):
+        islands.as_record(SAME["a column t_s"], **CHOICE, **options)
+
+
+def test_options_of_reading_are_a_mapping():
+    with pytest.raises(islands.errors.SettingsError, match="reading is a mapping of options"):
+        islands.fit(FRAME, **CHOICE, reading="split")

@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from islands.errors import RecordError
 
-#: Place of the header, and what it begins with in versions 3 and 4.
+#: Place of the header, and its marks in versions 3 and 4.
 _HEADER, _OLD, _NEW = 64, b"HD", b"##HD"
 
 
