@@ -127,7 +127,6 @@ def monitor(
         "tolerance": simulation_options.tolerances(tolerance or []),
     }
     out.mkdir(parents=True, exist_ok=True)
-    compile_kernels()
     run = _Run(out, reader, spec, settings, known)
     try:
         while True:
@@ -180,6 +179,7 @@ class _Run:
         self.saved, self.alarms = saved, 0
         self._out, self._reader, self._spec, self._settings = out, reader, spec, settings
         self._rejected: list[RejectedRecord] = []
+        self._is_compiled = False
 
     def analyse(self, path: Path) -> None:
         """Analyse a file, and write the state; report a file that cannot be used, and continue."""
@@ -189,6 +189,7 @@ class _Run:
         try:
             record, columns = self._reader.read(path)
             record = replace(record, sha256=sha256)
+            self._compile()
             monitor = self.saved or self._create(record, columns)
             before = len(monitor.state.alarms)
             monitor = monitor_record(monitor, record, path.name, find_time(path.name), columns)
@@ -204,6 +205,12 @@ class _Run:
             self.alarms += 1
             output.print(describe_alarm_text(monitor.state, alarm), markup=False)
             self.write_result()
+
+    def _compile(self) -> None:
+        """Compile the kernels once, after the first record is read: an error in it is shown at once."""
+        if not self._is_compiled:
+            compile_kernels()
+            self._is_compiled = True
 
     def _create(self, record: Dataset, columns: Mapping[str, Any]) -> SavedMonitor:
         monitor = create_monitor(record, self._spec, columns=columns, **self._settings)

@@ -74,3 +74,14 @@ def test_a_folder_without_a_usable_record_is_refused(folder):
     done = run(folder, "out")
     assert done.exit_code == 2
     assert "a.csv: skipped" in done.output
+
+
+def test_records_are_read_before_kernels_are_compiled(folder, monkeypatch):
+    def compile_kernels():
+        raise AssertionError("kernels are compiled before a record is read")
+
+    monkeypatch.setattr("islands.cli.commands.monitor.compile_kernels", compile_kernels)
+    (folder / "records" / "2026-11-01T00-00.csv").write_text("t_s,F,x\n0,1,a\n")
+    done = run(folder, "out")
+    assert done.exit_code == 2, done.output
+    assert "2026-11-01T00-00.csv: skipped" in done.output
