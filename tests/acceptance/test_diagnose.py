@@ -103,6 +103,8 @@ def test_an_exact_simulation_of_a_slow_output_has_no_discrepancy(tmp_path: Path)
             *("--simulation", "column:theirs_um", "--out", tmp_path / "out"),
         )
     assert text.startswith("No significant discrepancy")
+    reading = "Reading: columns have samples at different times: u_V in every row, theirs_um in every row"
+    assert reading in " ".join(text.split())
 
 
 @pytest.mark.ci

@@ -30,6 +30,7 @@ def summarise_diagnosis(found: Diagnosis, proposal: ResidualFormula | None = Non
     lines = [describe_verdict(found)]
     lines += [f"  {describe_finding(finding)}" for finding in found.effects]
     lines += [f"Record: {each.text}" for each in found.record_findings]
+    lines += [f"Reading: {step}." for step in found.record.reading]
     if (discovery := found.discovery) is not None and found.verdict == Verdict.DISCOVERED:
         lines.append(f"Equations: {discovery.equations}")
         if others := " and ".join(discovery.nearest):
