@@ -58,6 +58,11 @@ def name_option(name: str, value: object = None) -> str:
     return _names[-1](name, value)
 
 
+def name_without_value(name: str) -> str:
+    """Return an option as the subject of a sentence: ``gaps``, or ``--gaps`` on the command line."""
+    return name_option(name).removesuffix("=")
+
+
 def _name_argument(name: str, value: object) -> str:
     is_literal = isinstance(value, str) and not value.isupper()
     return f"{name}=" + (f'"{value}"' if is_literal else _format(value))

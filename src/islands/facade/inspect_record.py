@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
-from islands.errors import RecordError, SettingsError, check_seconds, name_flag, name_option
+from islands.errors import (
+    RecordError,
+    SettingsError,
+    check_seconds,
+    name_flag,
+    name_option,
+    name_without_value,
+)
 from islands.inspection.channel import channels
 from islands.inspection.column_roles import ColumnChoice, choose_columns
 from islands.inspection.findings import (
@@ -95,7 +102,7 @@ def inspect_record(
             "as_record(data, inputs=..., output=...)"
         )
     if dt is not None:
-        check_seconds(dt, name_option("dt").removesuffix("="))
+        check_seconds(dt, name_without_value("dt"))
     # The file is parsed once: parsing takes most of the time.
     table = open_record(record, reading)
     found = preview_table(table, Path(record).name, reading)

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import cloudpickle
 
 from islands.available_cpus import count_cpus
-from islands.errors import IslandsError
+from islands.errors import IslandsError, name_without_value
 from islands.parallel import ParallelMap
 from islands.processes.blocked_signals import block_sigint
 
@@ -149,7 +149,8 @@ def _map_on(
             yield cloudpickle.loads(result.result())
     except BrokenProcessPool as error:
         raise ProcessPoolError(
-            "a process has ended, perhaps because memory was full: repeat the command with fewer --workers"
+            "a process has ended, perhaps because memory was full: repeat it with fewer "
+            f"{name_without_value('workers')}"
         ) from error
 
 

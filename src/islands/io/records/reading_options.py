@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 from zoneinfo import ZoneInfo
 
-from islands.errors import SettingsError, check_seconds, name_option, suggest
+from islands.errors import SettingsError, check_seconds, name_option, name_without_value, suggest
 from islands.io.records.column_names import TIME_UNITS
 
 #: Characters of the decimal marks by the values of ``decimal``.
@@ -105,7 +105,7 @@ class ReadingOptions:
         words = split_words(self.missing)
         if not all(words):
             raise SettingsError(
-                f"{_name('missing')}: a word is empty; empty cells are missing values without it"
+                f"{name_without_value('missing')}: a word is empty; empty cells are missing values without it"
             )
         object.__setattr__(self, "missing", words)
         _check_choice("time_unit", self.time_unit, TIME_UNIT_CHOICES)
@@ -115,7 +115,7 @@ class ReadingOptions:
         _check_choice("outliers", self.outliers, (EXCLUDE, KEEP))
         _check_choice("rates", self.rates, RATES)
         if self.resample is not None:
-            check_seconds(self.resample, _name("resample"))
+            check_seconds(self.resample, name_without_value("resample"))
         _check_timezone(self.timezone)
 
     @property
@@ -143,12 +143,12 @@ class ReadingOptions:
             An option does not apply.
         """
         given = {
-            _name("names"): self.names,
+            name_without_value("names"): self.names,
             name_option("header", False): not self.header,
-            _name("decimal"): self.decimal,
-            _name("dates"): self.dates,
-            _name("sheet"): None if sheets else self.sheet,
-            _name("timezone"): None if zones else self.timezone,
+            name_without_value("decimal"): self.decimal,
+            name_without_value("dates"): self.dates,
+            name_without_value("sheet"): None if sheets else self.sheet,
+            name_without_value("timezone"): None if zones else self.timezone,
         }
         for option, value in given.items():
             if value:
@@ -194,15 +194,10 @@ def split_words(words: Sequence[str]) -> tuple[str, ...]:
     return tuple(str(word).strip() for word in listed)
 
 
-def _name(option: str) -> str:
-    """Return the name of an option as the subject of a sentence."""
-    return name_option(option).removesuffix("=")
-
-
 def _check_choice(option: str, value: str | None, choices: Sequence[str] | Mapping[str, str]) -> None:
     if value is not None and value not in choices:
         raise SettingsError(
-            f"{_name(option)} is {' or '.join(choices)}, got {value!r}{suggest(value, choices)}"
+            f"{name_without_value(option)} is {' or '.join(choices)}, got {value!r}{suggest(value, choices)}"
         )
 
 

@@ -17,7 +17,15 @@ from islands.data.segments import fill_gaps
 from islands.data.split import estimation_part
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
-from islands.errors import ModelError, RecordError, SettingsError, lookup, suggest
+from islands.errors import (
+    ModelError,
+    RecordError,
+    SettingsError,
+    lookup,
+    name_option,
+    name_without_value,
+    suggest,
+)
 from islands.io.models import model_from_json
 from islands.models.narx import Model, measured_model
 from islands.models.parametric import ParametricModel
@@ -238,7 +246,7 @@ def _read_as_recorded(model: M, name: str, record: Dataset) -> M:
     if model.average > 1 and model.dt is not None and same_dt(model.dt, record.dt * model.average):
         raise RecordError(
             f"of {name}, {describe_values(model)}, and a diagnosis reads every sample: identify the model "
-            "with --average 1"
+            f"with {name_option('average', 1)}"
         )
     if expected is None:
         return model
@@ -246,7 +254,8 @@ def _read_as_recorded(model: M, name: str, record: Dataset) -> M:
         values = describe_values(replace(model, average=1)) or "each value is a sample as measured"
         raise RecordError(
             f"of {name}, {values}, and a diagnosis reads the record as it is: identify the model without "
-            "--lowpass and --decimate, or give islands.diagnose the record of islands.preprocess(record"
+            f"{name_without_value('lowpass')} and {name_without_value('decimate')}, or give "
+            "islands.diagnose the record of islands.preprocess(record"
             f"{_list_steps(expected.rate_steps)})"
         )
     left = expected if done is None else expected.relative_to(done)

@@ -87,7 +87,7 @@ def test_killed_process_is_an_error_that_says_what_to_do() -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 
     with (
-        pytest.raises(ProcessPoolError, match="fewer --workers"),
+        pytest.raises(ProcessPoolError, match="fewer workers"),
         process_pool(2, start_after=0.0) as parallel_map,
     ):
         list(parallel_map(end, range(2)))

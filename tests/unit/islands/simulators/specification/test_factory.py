@@ -92,8 +92,8 @@ def test_a_diagnosis_of_samples_that_a_model_does_not_read_says_what_to_do() -> 
         islands.diagnose(measured, filtered)
     assert str(caught.value) == (
         "of the model, each value is one of 2 samples of 0.01 s behind a zero-phase low-pass filter of "
-        "20 Hz, and a diagnosis reads the record as it is: identify the model without --lowpass and "
-        "--decimate, or give islands.diagnose the record of islands.preprocess(record, decimate=2)"
+        "20 Hz, and a diagnosis reads the record as it is: identify the model without lowpass and "
+        "decimate, or give islands.diagnose the record of islands.preprocess(record, decimate=2)"
     )
     make_simulator(as_spec(filtered), preprocess(measured, decimate=2))
     with pytest.raises(RecordError, match=r"the mean of 4 samples of the record, .* identify the model with"):
