@@ -37,7 +37,7 @@ from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, KEEP, R
 from islands.io.records.sampling.column_clocks import find_clocks, may_differ
 from islands.io.records.sampling.common_clock import ColumnUse, align_columns, merge_notes
 from islands.io.records.sampling.recording import Recording
-from islands.io.records.sampling.time_step import find_time_scale
+from islands.io.records.sampling.time_step import TimeSource, find_time_scale
 from islands.io.records.sampling.time_unit import TimeScale
 from islands.io.records.table import Columns, Table
 from islands.io.records.table_reading import exclude_gross_errors, read_table
@@ -305,7 +305,7 @@ class _FileInspection:
 
     def _scale(self, columns: Columns, time: str) -> TimeScale:
         structure = split_structures(self.table.names)[time]
-        return find_time_scale(self.table, columns, time, structure, self.reading)
+        return find_time_scale(TimeSource(self.table, time, None, structure, self.reading), columns)
 
     def _field(self, name: str) -> str:
         return name.removeprefix(split_structures(self.table.names)[name])

@@ -14,7 +14,7 @@ from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ROWS, ReadingOptions
 from islands.io.records.sampling.column_clocks import ColumnClock, find_clocks, may_differ
 from islands.io.records.sampling.common_clock import common_step, describe_clocks
-from islands.io.records.sampling.time_step import find_sampling, find_time_scale
+from islands.io.records.sampling.time_step import TimeSource, find_sampling, find_time_scale
 from islands.io.records.table import Columns, RowRange, Table
 from islands.io.records.validation import (
     MIN_SAMPLES,
@@ -202,7 +202,7 @@ def _preview_sampling(
             check_values(known, time)
             if len(known.rows) < 2:  # no step; the message of `check_length` is more helpful
                 return time, None, ""
-        return time, find_sampling(table, known, time, None, structure, options)[0], ""
+        return time, find_sampling(TimeSource(table, time, None, structure, options), known)[0], ""
     except RecordError as error:
         return time, None, str(error)
 
@@ -214,7 +214,8 @@ def _describe_time_unit(
     if time is None or time not in columns:
         return ""
     try:
-        return find_time_scale(table, columns[time], time, split_structures(table.names)[time], options).note
+        source = TimeSource(table, time, None, split_structures(table.names)[time], options)
+        return find_time_scale(source, columns[time]).note
     except RecordError:
         return ""  # `_preview_sampling` states it
 
@@ -242,7 +243,8 @@ def _find_clocks(
     stamps, seconds = np.arange(len(values), dtype=np.float64), dt
     if time is not None:
         try:
-            scale = find_time_scale(table, columns[time], time, split_structures(table.names)[time], options)
+            source = TimeSource(table, time, None, split_structures(table.names)[time], options)
+            scale = find_time_scale(source, columns[time])
         except RecordError:
             return none
         stamps, seconds = scale.stamps, scale.seconds

@@ -28,7 +28,12 @@ from islands.io.records.sampling.common_clock import (
 )
 from islands.io.records.sampling.recording import Recording, UniformRecording
 from islands.io.records.sampling.repair import join_recordings, make_uniform
-from islands.io.records.sampling.time_step import find_sampling, find_time_scale, make_recording
+from islands.io.records.sampling.time_step import (
+    TimeSource,
+    find_sampling,
+    find_time_scale,
+    make_recording,
+)
 from islands.io.records.sampling.uniform_grid import AGREEMENT
 from islands.io.records.table import Columns, Table
 from islands.io.records.validation import (
@@ -89,6 +94,7 @@ def read_table(
     # A simulation needs no more samples than the lags of its model, which it checks.
     check_length(columns, *([2] if missing_output else []))
     columns, excluded = exclude_gross_errors(columns, sources, output, options)
+    source = TimeSource(table, clock, dt, structure, options)
     required = [name for name in columns.numbers if not (missing_output and name == output)]
     steps = [*columns.notes, *(f"{errors} are left out" for errors in excluded)]
     parts = [part for part in columns.split(clock) if len(part.rows) > 1]
@@ -99,46 +105,40 @@ def read_table(
     )
     clocks = None
     if len(parts) == 1:
-        clocks = _find_clocks(table, columns, values, clock, dt, structure, options, use)
+        clocks = _find_clocks(source, columns, values, use)
     if clocks is not None:
         found = _read_clocks(*clocks, use, required, options)
     else:
         if options.gaps is None:
             _check_columns(columns, output)
         steps += _describe_parts(parts)
-        found = _read_rows(table, columns, parts, chosen, clock, dt, structure, required, options)
+        found = _read_rows(source, columns, parts, chosen, required)
     found = replace(found, steps=(*steps, *found.steps))
     for name in () if missing_output else (*(() if resting_inputs else sources), *outputs):
         check_varies(columns, name)
     if clock is not None:
-        note = find_time_scale(table, columns, clock, structure, options).note
+        note = find_time_scale(source, columns).note
         found = replace(found, steps=(*([note] if note else []), *found.steps))
     record = _make_record(found, sources, output, structures, columns.units, file)
     return advance_inputs(record, _find_advanced(inputs, sources))
 
 
 def _read_rows(
-    table: Table,
+    source: TimeSource,
     columns: Columns,
     parts: Sequence[Columns],
     chosen: Sequence[str],
-    clock: str | None,
-    dt: float | None,
-    structure: str,
     required: Sequence[str],
-    options: ReadingOptions,
 ) -> UniformRecording:
     """Read columns whose samples are the rows of the file; each part is a segment."""
+    options = source.options
     blocks = [np.column_stack([part.numbers[name] for name in chosen]) for part in parts]
     if options.gaps is None and options.resample is None:
-        step, start = find_sampling(table, columns, clock, dt, structure, options)
+        step, start = find_sampling(source, columns)
         start = step * columns.first if start is None else start
         segments = tuple(map(len, blocks)) if len(blocks) > 1 else ()
         return UniformRecording(np.concatenate(blocks), step, start, segments, ())
-    recordings = [
-        make_recording(table, part, values, clock, dt, structure, options)
-        for part, values in zip(parts, blocks, strict=True)
-    ]
+    recordings = [make_recording(source, part, values) for part, values in zip(parts, blocks, strict=True)]
     return _repair(recordings, chosen, required, options, columns.rows.file)
 
 
@@ -148,25 +148,19 @@ def _check_columns(columns: Columns, output: str | None) -> None:
 
 
 def _find_clocks(
-    table: Table,
-    columns: Columns,
-    values: NDArray[np.float64],
-    clock: str | None,
-    dt: float | None,
-    structure: str,
-    options: ReadingOptions,
-    use: ColumnUse,
+    source: TimeSource, columns: Columns, values: NDArray[np.float64], use: ColumnUse
 ) -> tuple[Recording, tuple[ColumnClock, ...]] | None:
     """Return the rows with their times and the clocks of the columns; None if these are that of the rows."""
+    options, dt = source.options, source.dt
     if options.rates == ROWS or not may_differ(values, use.outputs):
         return None
     try:
-        recording = make_recording(table, columns, values, clock, dt, structure, options)
+        recording = make_recording(source, columns, values)
     except RecordError:
         return None  # The checks of the columns come first.
     problem = None
     try:
-        step = find_sampling(table, columns, clock, dt, structure, options)[0] / recording.seconds
+        step = find_sampling(source, columns)[0] / recording.seconds
         recording = replace(recording, stamps=recording.stamps[0] + step * np.arange(len(values)))
     except RecordError as error:
         problem = error

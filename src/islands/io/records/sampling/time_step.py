@@ -1,7 +1,7 @@
 """Sampling time of a record, from a time column that is checked against a uniform grid or as stated."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,22 +15,14 @@ from islands.io.records.sampling.uniform_grid import AGREEMENT, agrees_with_step
 from islands.io.records.table import Columns, RowRange, Table
 
 
-def find_sampling(
-    table: Table,
-    columns: Columns,
-    time: str | None,
-    dt: float | None,
-    structure: str = "",
-    options: ReadingOptions = DEFAULT_READING,
-) -> tuple[float, float | None]:
-    """Return the sampling time and the time of the first sample in seconds.
+@dataclass(frozen=True, slots=True)
+class TimeSource:
+    """Where the sampling of a record is stated.
 
-    The latter is None if there is no time column, or if it contains time stamps.
-
-    Parameters
+    Attributes
     ----------
-    table, columns
-        The file and the columns read from it.
+    table : Table
+        The file, which may state a sampling time.
     time : str or None
         The time column.
     dt : float or None
@@ -40,18 +32,31 @@ def find_sampling(
         The structure of the output. A sampling time stated in it takes precedence over one at the top level.
     options : ReadingOptions
         The name and the unit of the time column, if the user has given them.
+    """
+
+    table: Table
+    time: str | None
+    dt: float | None = None
+    structure: str = ""
+    options: ReadingOptions = DEFAULT_READING
+
+
+def find_sampling(source: TimeSource, columns: Columns) -> tuple[float, float | None]:
+    """Return the sampling time and the time of the first sample of columns in seconds.
+
+    The latter is None if there is no time column, or if it contains time stamps.
 
     Raises
     ------
     RecordError
         The time column is not uniform, the sampling time is unknown, or two sources disagree.
     """
+    time, dt, file = source.time, source.dt, columns.rows.file
     if len(parts := columns.split(time)) > 1:
-        return _find_common_sampling(table, parts, time, dt, structure, options)
-    file = columns.rows.file
+        return _find_common_sampling(source, parts)
     known: dict[str, float] = {}
     start = None
-    if time is None and options.time_unit is not None:
+    if time is None and source.options.time_unit is not None:
         raise RecordError(
             f"{file} has no time column that {name_option('time_unit')} could describe: name the column by "
             f"{name_option('time')}, or leave the unit out"
@@ -59,7 +64,7 @@ def find_sampling(
     if dt is not None:
         dt = check_seconds(dt, "the sampling time dt", RecordError)
     if time is not None:
-        scale = find_time_scale(table, columns, time, structure, options)
+        scale = find_time_scale(source, columns)
         stamps, seconds = scale.stamps, scale.seconds
         if dt is not None and agrees_with_step(stamps, dt / seconds):
             step = _uniform_step_or(dt / seconds, scale, time, columns.rows)
@@ -69,58 +74,44 @@ def find_sampling(
         start = None if scale.elapsed else float(stamps[0]) * seconds
     if dt is not None:
         known[name_option("dt")] = float(dt)
-    known |= {f"array {name}": seconds for name, seconds in table.stated(structure).items()}
+    known |= {f"array {name}": seconds for name, seconds in source.table.stated(source.structure).items()}
     if not known:
-        raise RecordError(_unknown_sampling_message(table, file, structure))
+        raise RecordError(_unknown_sampling_message(source, file))
     return _reconcile(known, file), start
 
 
-def _find_common_sampling(
-    table: Table,
-    parts: Sequence[Columns],
-    time: str | None,
-    dt: float | None,
-    structure: str,
-    options: ReadingOptions,
-) -> tuple[float, float | None]:
+def _find_common_sampling(source: TimeSource, parts: Sequence[Columns]) -> tuple[float, float | None]:
     """Return the sampling time of all recordings of a file, and the time of the first sample."""
     file = parts[0].rows.file
     parts = [part for part in parts if len(part.rows) > 1]
     if not parts:
         raise RecordError(f"{file}: each sample has its header: delete the repeated headers")
-    found = [find_sampling(table, part, time, dt, structure, options) for part in parts]
+    found = [find_sampling(source, part) for part in parts]
     known = {f"the rows from {part.rows.row(0)}": step for part, (step, _) in zip(parts, found, strict=True)}
     return _reconcile(known, file), found[0][1]
 
 
-def make_recording(
-    table: Table,
-    columns: Columns,
-    values: NDArray[np.float64],
-    time: str | None,
-    dt: float | None,
-    structure: str = "",
-    options: ReadingOptions = DEFAULT_READING,
-) -> Recording:
+def make_recording(source: TimeSource, columns: Columns, values: NDArray[np.float64]) -> Recording:
     """Return samples with their times, which may be irregular. Without a time column they are uniform.
 
     Parameters
     ----------
+    source : TimeSource
+    columns : Columns
+        Rows of the file.
     values : ndarray, shape (samples, columns)
-    table, columns, time, dt, structure, options
-        As in `find_sampling`.
 
     Raises
     ------
     RecordError
         The sampling time is unknown.
     """
-    if time is None:
-        step, _ = find_sampling(table, columns, None, dt, structure, options)
+    if source.time is None:
+        step, _ = find_sampling(source, columns)
         stamps = step * (columns.first + np.arange(len(values), dtype=np.float64))
         return Recording(columns.rows, stamps, values, "time", 1.0)
-    scale = find_time_scale(table, columns, time, structure, options)
-    return Recording(columns.rows, scale.stamps, values, time, scale.seconds)
+    scale = find_time_scale(source, columns)
+    return Recording(columns.rows, scale.stamps, values, source.time, scale.seconds)
 
 
 def _uniform_step_or(step: float, scale: TimeScale, time: str, rows: RowRange) -> float:
@@ -131,20 +122,15 @@ def _uniform_step_or(step: float, scale: TimeScale, time: str, rows: RowRange) -
         return step
 
 
-def find_time_scale(
-    table: Table,
-    columns: Columns,
-    time: str,
-    structure: str = "",
-    options: ReadingOptions = DEFAULT_READING,
-) -> TimeScale:
-    """Return the numbers of a time column with their unit.
+def find_time_scale(source: TimeSource, columns: Columns) -> TimeScale:
+    """Return the numbers of the time column with their unit.
 
     Raises
     ------
     RecordError
         The unit is unknown, or a unit is given for time stamps.
     """
+    time, options = str(source.time), source.options
     if time in columns.clocks:
         if options.time_unit is not None:
             raise RecordError(
@@ -152,19 +138,19 @@ def find_time_scale(
                 f"{name_option('time_unit')} out"
             )
         return TimeScale(columns.numbers[time], 1.0, elapsed=True)
-    field = time.removeprefix(structure)
+    field = time.removeprefix(source.structure)
     found = find_time_unit(columns.numbers[time], field, options.time is not None, options.time_unit)
     if found is None:
-        raise RecordError(_unknown_sampling_message(table, columns.rows.file, structure))
+        raise RecordError(_unknown_sampling_message(source, columns.rows.file))
     return replace(found, note=found.note.replace(field, time, 1))
 
 
-def _unknown_sampling_message(table: Table, file: str, structure: str) -> str:
+def _unknown_sampling_message(source: TimeSource, file: str) -> str:
     message = (
         f"{file} has no time column (t, t_s, time_ms ...): give the sampling time by "
         f"{name_option('dt')}, or name the column by {name_option('time')}"
     )
-    fields = {name: name.removeprefix(structure) for name in table.names}
+    fields = {name: name.removeprefix(source.structure) for name in source.table.names}
     unknown_unit = [
         name for name, field in fields.items() if looks_like_time(field) and seconds_per_unit(field) is None
     ]
