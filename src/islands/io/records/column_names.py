@@ -32,7 +32,7 @@ _FOREIGN_TIME = re.compile(
 #: Words for time that have another meaning in English: they need a unit of time.
 _AMBIGUOUS_TIME = re.compile(r"(?:temps|tempo|tid)\s*[\[(（/,].*", re.IGNORECASE)
 
-#: Time since the start of a test or a program, which battery cyclers and test benches write beside the time
+#: Time since the start of a test or a program, which battery cyclers and test benches write next to the time
 #: of a step; it needs a unit of time, and comes after other columns of time.
 _RUN_TIME = re.compile(
     r"(?:test|total|run(?:ning)?|measure(?:ment)?|meas|rec(?:ord(?:ing)?)?|exp(?:eriment)?|abs(?:olute)?|"

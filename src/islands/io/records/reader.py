@@ -4,7 +4,6 @@ import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from os import PathLike
 from pathlib import Path
 
 from islands.data.dataset import Dataset
@@ -241,7 +240,7 @@ def _open_file(file: Path, options: ReadingOptions) -> Table:
 
 
 def _check_readable(path: str | Path) -> Path:
-    if not isinstance(path, str | PathLike):
+    if not (isinstance(path, str) or hasattr(path, "__fspath__")):
         raise SettingsError(
             f"read_record takes the path of a file, got a {type(path).__name__}: data in memory are read by "
             "as_record(data, inputs=..., output=...)"
