@@ -19,6 +19,9 @@ _COARSE = (4, 16)
 #: Part of the increments of an input that its past does not predict, for full confidence.
 _FULL_INNOVATION = 0.3
 
+#: Confidence, at most: the resamples of one record agree more often than records do.
+_MOST_CONFIDENCE = 0.99
+
 
 def estimate_dead_time(record: Dataset, place: int) -> Fact:
     """Estimate how many samples after an input the output begins to respond.
@@ -46,21 +49,22 @@ def estimate_dead_time(record: Dataset, place: int) -> Fact:
     if isinstance(onset, str):
         return Fact("dead-time", name, None, "samples", None, None, onset)
     value = round(onset.lag)
-    low, high = np.percentile(onset.resampled, [2.5, 97.5])
-    interval = (float(min(value, max(0, floor(low)))), float(max(value, ceil(high))))
+    first, last = np.percentile(onset.resampled, [2.5, 97.5])
+    interval = (float(min(value, max(0, floor(first)))), float(max(value, ceil(last))))
     right = float(np.mean(np.abs(onset.resampled - value) <= 1.0))
-    right *= min(1.0, onset.innovation / _FULL_INNOVATION)
-    plural = "sample" if value == 1 else "samples"
+    right = min(right * min(1.0, onset.innovation / _FULL_INNOVATION), _MOST_CONFIDENCE)
+    after = f"after {_count(value)} ({value * record.dt:.4g} s)" if value else "within the sample"
+    low, high = map(int, interval)
+    between = f", between {low} and {_count(high)} with a probability of 95 %" if low < high else ""
     sentence = (
-        f"{record.output_name} responds to {name} after {value} {plural} ({value * record.dt:.4g} s); "
-        f"right within one sample with a probability of {100 * right:.0f} %."
+        f"{record.output_name} responds to {name} {after}{between}; right within one sample with a probability of "
+        f"{100 * right:.0f} %."
     )
-    if value == 0:
-        sentence = (
-            f"{record.output_name} responds to {name} within the sample; right within one sample with a "
-            f"probability of {100 * right:.0f} %."
-        )
     return Fact("dead-time", name, float(value), "samples", interval, right, sentence)
+
+
+def _count(samples: int) -> str:
+    return f"{samples} sample" if samples == 1 else f"{samples} samples"
 
 
 def _find_onset(record: Dataset, place: int) -> Onset | str:

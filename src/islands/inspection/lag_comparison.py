@@ -40,6 +40,9 @@ _LEAST_GAIN = 0.02
 #: Samples of a hidden response: multiple of those that the slope of the response gives, and the most.
 _HIDDEN, _MOST_HIDDEN = 1.5, 10.0
 
+#: Samples before a response that the next values of an input may cause, and their size relative to the next.
+_PRECURSORS, _PRECURSOR = 2, 0.35
+
 #: Correlation of an input with itself from which on it repeats itself.
 _REPEATED = 0.95
 
@@ -120,7 +123,9 @@ def compare_lags(record: Dataset, place: int, delay: int) -> Onset | str:
     matrix = np.array([*past, *response])
     scale = np.sqrt(np.mean(matrix**2, axis=1))
     scale[scale == 0.0] = 1.0
-    comparison = _Comparison(matrix / scale[:, None], target, scale, len(past), largest, delay, innovation)
+    comparison = _Comparison(
+        matrix / scale[:, None], target, scale, len(past), largest, delay, innovation, _is_averaged(u)
+    )
     return comparison.find_onset() or _deny_response(record, place)
 
 
@@ -135,6 +140,7 @@ class _Comparison:
     largest: int
     delay: int
     innovation: float
+    is_averaged: bool
 
     def find_onset(self) -> Onset | None:
         """Return the first lag of the response, None if there is none."""
@@ -151,9 +157,15 @@ class _Comparison:
         equal = np.maximum(_STANDARD_ERRORS * error, _EQUAL * totals[best])[:, None]
         first = int(_last_equal(totals[:-1, None], equal)[0])
         resampled = _last_equal(resample(losses[:-1]), equal).astype(np.float64)
-        hidden = min(
-            self._count_hidden(totals[:-1] - totals[best], equal[:, 0], first, weights[first]), first
-        )
+        response = _compute_impulse_response(weights[first], self.past, _PRECURSORS + 2)
+        precursors = _count_precursors(response) if self.is_averaged else 0
+        if precursors > 0:
+            return Onset(
+                float(self.delay + first + precursors),
+                self.delay + resampled + np.round(precursors * FRACTIONS),
+                self.innovation,
+            )
+        hidden = min(self._count_hidden(totals[:-1] - totals[best], equal[:, 0], first, response), first)
         return Onset(
             self.delay + first - floor(0.5 * hidden),
             self.delay + resampled - hidden * FRACTIONS,
@@ -193,7 +205,7 @@ class _Comparison:
         losses: NDArray[np.float64],
         equal: NDArray[np.float64],
         first: int,
-        weights: NDArray[np.float64],
+        response: NDArray[np.float64],
     ) -> float:
         """Return how many samples before its first visible lag a response may have begun.
 
@@ -206,12 +218,27 @@ class _Comparison:
         jump, further = float(losses[first + 1]), float(losses[first + 2])
         visible = min(1.0, (float(equal[first]) / jump) ** 0.5)
         at_most = 1.0 / max(1.0 - visible**0.5, 1.0 / _MOST_HIDDEN)
-        response = _compute_impulse_response(weights, self.past, 4)
         size = response * np.sign(response[0])
         slope = max((size[lag] - size[0]) / lag for lag in (1, 2, 3))
         by_slope = _HIDDEN * size[0] / slope if slope > 0.0 else 0.0
         by_loss = 2.0 * jump / (further - jump) - 1.0 if further > jump else _MOST_HIDDEN
         return float(min(max(by_slope, by_loss), at_most))
+
+
+def _count_precursors(response: NDArray[np.float64]) -> int:
+    """Return how many samples of alternating sign, each much larger than the one before, precede a response.
+
+    A mean of a held input over a change contains a part of the next level, which the prediction subtracts at a
+    lag before the dead time.
+    """
+    count = 0
+    while (
+        count < _PRECURSORS
+        and response[count] * response[count + 1] < 0.0
+        and abs(response[count]) < _PRECURSOR * abs(response[count + 1])
+    ):
+        count += 1
+    return count
 
 
 def _compute_impulse_response(weights: NDArray[np.float64], past: int, samples: int) -> NDArray[np.float64]:
@@ -263,6 +290,19 @@ def _find_repetition(u: NDArray[np.float64]) -> int | None:
     low = np.flatnonzero(relative < 0.5)
     again = np.flatnonzero(relative[low[0] :] > _REPEATED) if low.size else low
     return int(low[0] + again[0]) if again.size else None
+
+
+def _is_averaged(u: NDArray[np.float64]) -> bool:
+    """Return whether most changes of a held input have a value between the levels before and after.
+
+    So have the means of an input whose changes are between two samples of the record.
+    """
+    before, now, after = u[1:-3], u[2:-2], u[3:-1]
+    is_edge = (u[:-4] == before) & (after == u[4:]) & (before != after)
+    between = is_edge & (np.minimum(before, after) < now) & (now < np.maximum(before, after))
+    changes = int(np.count_nonzero(np.diff(u)))
+    # A change with a value between is two steps.
+    return 4 * int(np.count_nonzero(between)) > changes
 
 
 def _measure_innovation(lagged: list[NDArray[np.float64]]) -> float:

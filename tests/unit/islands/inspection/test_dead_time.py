@@ -85,5 +85,29 @@ def test_recordings_are_not_joined():
     assert estimate_dead_time(join(parts), 0).value == 5
 
 
-def test_sentence_states_samples_and_seconds():
-    assert "after 5 samples (0.5 s)" in estimate_dead_time(make_record(white, 4), 0).sentence
+@pytest.mark.parametrize("part", [0.03, 0.07, 0.13, 0.19])
+def test_means_of_a_held_input_do_not_shorten_the_dead_time(part):
+    """Samples of a late column are between those of the input: a mean has a part of the next level."""
+    for seed in range(3):
+        u = steps(1500, seed, 10)
+        y = delay(lag(u, 5.0), 3)
+        means = (1.0 - part) * u + part * np.append(u[1:], u[-1])
+        fact = estimate_dead_time(measure(means, y, 0.02, seed, dt=0.1), 0)
+        assert fact.value == 4
+        assert fact.interval[0] <= 4 <= fact.interval[1]
+        assert fact.interval[0] < fact.interval[1]
+        assert fact.confidence <= 0.99
+
+
+def test_a_small_inverse_response_is_a_response():
+    u = steps(1500, 0, 10)
+    y = delay(lag(u, 5.0) - 1.2 * np.diff(lag(u, 1.0), prepend=0.0), 3)
+    assert estimate_dead_time(measure(u, y, 0.005), 0).value == 4
+
+
+def test_sentence_states_samples_seconds_and_range():
+    fact = estimate_dead_time(make_record(white, 4), 0)
+    assert "after 5 samples (0.5 s)" in fact.sentence
+    low, high = fact.interval
+    assert low < high
+    assert f"between {low:.0f} and {high:.0f} samples with a probability of 95 %" in fact.sentence
