@@ -73,7 +73,7 @@ def inspect_record(
         reported; the facts are then those of the parts between them.
     inputs, output : sequence of str, str or None
         Columns of the file. Without them, they are chosen by the names of the columns and by which column
-        predicts which; ``choice`` states how sure that is.
+        responds to which; ``choice`` states how sure that is. None is chosen without a visible response.
     dt : float, optional
         Sampling time in seconds, for files without a time column.
     rows : slice, optional

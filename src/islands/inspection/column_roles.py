@@ -1,4 +1,4 @@
-"""Choice of inputs and output among the columns of a file, by their names and by which predicts which."""
+"""Choice of inputs and output among the columns of a file, by their names and by which responds to which."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -8,6 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_channel_name
+from islands.inspection.column_direction import estimate_direction
+from islands.inspection.column_influence import (
+    LEAST_SAMPLES,
+    MOST_SAMPLES,
+    ColumnInfluence,
+    average_middle,
+)
+from islands.inspection.gross_errors import find_gross_errors
 
 #: Names that say that a column is an input or an output, by the first word of the name.
 _SURE = {
@@ -25,20 +33,35 @@ _LIKELY = {
     ),
 }
 
-#: Probability that a role is right by a sure name, by a likely name, and by prediction only.
-_BY_SURE_NAME, _BY_LIKELY_NAME, _BY_PREDICTION = 0.95, 0.7, 0.5
+#: Logarithm of the odds that a role is right by a sure name and by a likely one.
+_SURE_NAME, _LIKELY_NAME = 3.0, 0.85
 
-#: Probability that is added if the prediction agrees with the names.
-_AGREES = 0.04
+#: Logarithm of the odds by the signals, at most.
+_MOST_BY_SIGNALS = 4.0
 
-#: Part of the prediction error of an output that an input removes, at least.
-_LEAST_INFLUENCE = 0.02
+#: Logarithm of the odds of an input that is visible only if others are known.
+_BY_INDEPENDENCE = 2.0
 
-#: Columns whose mutual prediction is measured, lags, and samples, at most.
-_MOST_COLUMNS, _LAGS, _SAMPLES = 12, 8, 4000
+#: Weight of the unlimited odds by the signals between pairs with equal odds.
+_TIE = 1e-2
+
+#: Probability of a choice, at least and at most.
+_LEAST_PROBABILITY, _MOST_PROBABILITY = 0.05, 0.98
+
+#: Probability of a choice by names, at most, if no response is visible.
+_BY_NAME_ALONE = 0.5
+
+#: Columns that are compared, at most.
+_MOST_COLUMNS = 12
 
 #: Levels of a column that numbers the parts of a file, at most, and samples of a part, at least.
 _MOST_PARTS, _LEAST_PART = 100, 20
+
+#: Part of the samples in which a measured signal moves, at least.
+_MOVING = 0.5
+
+#: Part of a column that has values, at least, to be compared without being named.
+_LEAST_KNOWN = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +72,7 @@ class ColumnChoice:
     ----------
     inputs : tuple of str
     output : str
-        Empty, like the inputs, if no two columns can be chosen.
+        Empty, like the inputs, if no column visibly responds to another one.
     confidence : float or None
         Probability that the choice is right; None if the user made it.
     reason : str
@@ -67,6 +90,8 @@ def choose_columns(
 ) -> ColumnChoice:
     """Choose inputs and output.
 
+    Columns are proposed only if a response of the output to them is visible, or if their names are sure.
+
     Parameters
     ----------
     columns : mapping of str to ndarray, shape (samples,)
@@ -76,20 +101,20 @@ def choose_columns(
     """
     if inputs and output is not None:
         return ColumnChoice(tuple(inputs), output, None, "Inputs and output are as given.")
-    signals = {name: values for name, values in columns.items() if not _is_counter(name, values)}
-    signals |= {name: columns[name] for name in (*inputs, *([output] if output else [])) if name in columns}
-    if len(signals) < 2:
-        return ColumnChoice((), "", None, "Fewer than two columns are signals: name inputs and output.")
-    names = list(signals)[:_MOST_COLUMNS]
-    influence = _measure_influences([signals[name] for name in names])
-    if output is None:
-        output = max(
-            (name for name in names if name not in inputs),
-            key=lambda name: _rate_output(name, names, influence),
-        )
-    target = names.index(output) if output in names else 0
-    chosen = tuple(inputs) or _choose_inputs(names, target, influence)
-    return _explain(names, chosen, output, influence)
+    given = {*inputs, *([] if output is None else [output])}
+    # Differences of very large numbers overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        signals = {
+            name: values
+            for name, values in columns.items()
+            if np.isfinite(values).mean() >= _LEAST_KNOWN * (name not in given)
+            and (name in given or not is_counter(name, values))
+        }
+        if len(signals) < 2:
+            return ColumnChoice((), "", None, "Fewer than two columns are signals: name inputs and output.")
+        names = [*given & signals.keys(), *(name for name in signals if name not in given)][:_MOST_COLUMNS]
+        names = [name for name in signals if name in names]
+        return _compare(names, [signals[name] for name in names]).choose(tuple(inputs), output)
 
 
 def _first_word(name: str) -> str:
@@ -98,64 +123,227 @@ def _first_word(name: str) -> str:
 
 
 def find_role(name: str) -> tuple[str, float]:
-    """Return the role that a column's name suggests, empty if none, and the probability that it is right."""
+    """Return the role that a column's name suggests, empty if none, and the logarithm of its odds."""
     word = _first_word(name)
-    for table, probability in ((_SURE, _BY_SURE_NAME), (_LIKELY, _BY_LIKELY_NAME)):
+    for table, odds in ((_SURE, _SURE_NAME), (_LIKELY, _LIKELY_NAME)):
         for role, pattern in table.items():
             if pattern.fullmatch(word):
-                return role, probability
+                return role, odds
     return "", 0.0
 
 
-def _rate_output(name: str, names: Sequence[str], influence: NDArray[np.float64]) -> float:
-    """Return a score: names count more than prediction, and the first of equals wins."""
-    role, probability = find_role(name)
-    place = names.index(name)
-    by_name = {"output": probability, "input": -probability, "": 0.0}[role]
-    causal = float(np.max(influence[:, place]) - np.max(influence[place]))
-    return 2.0 * by_name + 0.5 * causal - 1e-3 * place
+def _rate_name(name: str, role: str) -> float:
+    """Return the logarithm of the odds that a column has a role by its name."""
+    found, odds = find_role(name)
+    return odds if found == role else -odds
 
 
-def _choose_inputs(names: Sequence[str], target: int, influence: NDArray[np.float64]) -> tuple[str, ...]:
-    """Return columns with the name of an input that predict the output, or the one that predicts best."""
-    others = [place for place in range(len(names)) if place != target]
-    sure = [
-        place
-        for place in others
-        if find_role(names[place])[0] == "input" and influence[place, target] >= _LEAST_INFLUENCE
-    ]
-    named = [place for place in others if find_role(names[place])[0] == "input"]
-    best = max(others, key=lambda place: (influence[place, target], -place))
-    return tuple(names[place] for place in sure or named[:1] or [best])
+def _is_sure(name: str, role: str) -> bool:
+    return find_role(name) == (role, _SURE_NAME)
 
 
-def _explain(
-    names: Sequence[str], inputs: tuple[str, ...], output: str, influence: NDArray[np.float64]
-) -> ColumnChoice:
-    by_name = [
-        find_role(name) if find_role(name)[0] == role else ("", 0.0)
-        for name, role in ((output, "output"), *((name, "input") for name in inputs))
-    ]
-    named = all(role for role, _ in by_name)
-    confidence = min(probability for _, probability in by_name) if named else _BY_PREDICTION
-    known = [name for name in (*inputs, output) if name in names]
-    part = 0.0
-    if len(known) == len(inputs) + 1:
-        target = names.index(output)
-        part = max(influence[names.index(name), target] for name in inputs)
-        back = max(influence[target, names.index(name)] for name in inputs)
-        confidence += _AGREES if part > back else -2.0 * _AGREES
-    listed = ", ".join(inputs)
-    ground = "by their names" if named else "because they predict each other best"
-    predicts = "predict" if len(inputs) > 1 else "predicts"
-    reason = f"{listed} and {output} are chosen {ground}"
-    if part >= _LEAST_INFLUENCE:
-        reason += f"; {listed} {predicts} {100 * part:.0f} % of the changes of {output} that its past leaves"
-    reason += "."
-    return ColumnChoice(inputs, output, min(confidence, 0.99), reason)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Comparison:
+    """Columns, and which are inputs of which: row the input, column the output.
+
+    Attributes
+    ----------
+    names : list of str
+    odds : ndarray, shape (columns, columns)
+        Logarithm of the odds that one column is an input of the other.
+    unlimited : ndarray, shape (columns, columns)
+        Logarithm of the odds by the signals, without a limit.
+    gains : ndarray, shape (columns, columns)
+        Visible gain of each pair, zero if no response is visible.
+    derived : ndarray of bool, shape (columns, columns)
+        Whether one column is a derivative of the other.
+    allowed : ndarray of bool, shape (columns, columns)
+        Whether the pair may be chosen.
+    set_point : ndarray of bool, shape (columns, columns)
+        Whether one column is the set point of a loop in which the other is.
+    influence : ColumnInfluence or None
+        None for a record that is too short to measure it.
+    places : mapping of int to int
+        Place of a column in the influence.
+    """
+
+    names: list[str]
+    odds: NDArray[np.float64]
+    unlimited: NDArray[np.float64]
+    gains: NDArray[np.float64]
+    derived: NDArray[np.bool_]
+    allowed: NDArray[np.bool_]
+    set_point: NDArray[np.bool_]
+    influence: ColumnInfluence | None
+    places: Mapping[int, int]
+
+    def choose(self, inputs: tuple[str, ...], output: str | None) -> ColumnChoice:
+        known = [self.names.index(name) for name in inputs if name in self.names]
+        allowed = self.allowed.copy()
+        if output is not None:
+            allowed &= np.array(self.names) == output
+        if inputs:
+            allowed &= np.isin(np.arange(len(self.names)), known)[:, None]
+            allowed[:, known] = False
+        if not allowed.any():
+            return ColumnChoice((), "", None, self._deny(inputs, output))
+        best = np.argmax(np.where(allowed, self.odds + _TIE * self.unlimited, -np.inf))
+        source, target = (int(place) for place in np.unravel_index(best, self.odds.shape))
+        chosen = known or self._add_inputs(source, target)
+        return self._explain(inputs or tuple(self.names[place] for place in chosen), chosen, target)
+
+    def _deny(self, inputs: tuple[str, ...], output: str | None) -> str:
+        if self.influence is None:
+            return (
+                f"Fewer than {LEAST_SAMPLES} samples have values in all columns, too few to show which "
+                "column responds to which: name inputs and output."
+            )
+        if output is not None:
+            return f"No response of {output} to another column is visible: name the inputs."
+        if inputs:
+            return f"No response of a column to {', '.join(inputs)} is visible: name the output."
+        return "No response of a column to another one is visible: name inputs and output."
+
+    def _add_inputs(self, source: int, target: int) -> list[int]:
+        """Return the best input and all others that improve the prediction of the output."""
+        chosen = [source]
+        if self.influence is None or target not in self.places:
+            return chosen
+        others = [int(place) for place in np.argsort(-self.odds[:, target], kind="stable")]
+        # Some inputs show only when others are known, so that all are tried again after each.
+        while (
+            added := next((each for each in others if self._is_input(each, chosen, target)), None)
+        ) is not None:
+            chosen.append(added)
+        # An input that was better than nothing may be no better than all others.
+        for place in chosen[:0:-1]:
+            known = [each for each in chosen if each != place]
+            if self._measure_gain(target, known, place) == 0.0:
+                chosen = known
+        return sorted(chosen)
+
+    def _is_input(self, place: int, chosen: Sequence[int], target: int) -> bool:
+        """Return whether a column may be a further input: neither a response nor what controls an input."""
+        name = self.names[place]
+        if place in (*chosen, target) or place not in self.places or _is_sure(name, "output"):
+            return False
+        if _is_sure(name, "input"):
+            return self._measure_gain(target, chosen, place) > 0.0
+        if self._rate_input(place, target) <= 0.0 or self.derived[place, target]:
+            return False
+        if any(self.set_point[place, each] for each in chosen):
+            return False
+        if any(self.gains[each, place] > 0.0 and self.odds[each, place] > 0.0 for each in chosen):
+            return False
+        return self._measure_gain(target, chosen, place) > 0.0
+
+    def _rate_input(self, place: int, target: int) -> float:
+        """Return the logarithm of the odds that a column is an input of the output.
+
+        The response to a weak input, or to one that modulates others, shows only if these are known. Such a
+        column is independent of the others, so that it is not a response itself.
+        """
+        if self.influence is None or self.gains[place, target] > 0.0:
+            return float(self.odds[place, target])
+        if self.gains[target, place] > 0.0:
+            return float(self.odds[place, target] - self.odds[target, place])
+        return _BY_INDEPENDENCE
+
+    def _measure_gain(self, target: int, known: Sequence[int], added: int) -> float:
+        """Return what an input adds to the known ones, alone or by its products with them."""
+        if self.influence is None:
+            return 0.0
+        at, source = [self.places[each] for each in known if each in self.places], self.places[added]
+        gain = self.influence.measure_gain(self.places[target], at, [source])
+        return gain or self.influence.measure_modulation(self.places[target], at, source)
+
+    def _explain(self, inputs: tuple[str, ...], chosen: Sequence[int], target: int) -> ColumnChoice:
+        output, listed = self.names[target], ", ".join(inputs)
+        rated = [self._rate_input(place, target) for place in chosen]
+        confidence = float(np.prod(1.0 / (1.0 + np.exp(-np.array(rated)))))
+        confidence = min(max(confidence, _LEAST_PROBABILITY), _MOST_PROBABILITY)
+        named = _is_named(output, "output") and all(_is_named(name, "input") for name in inputs)
+        reason = f"{listed} and {output} are chosen by their {'names' if named else 'signals'}"
+        seen = [place for place in chosen if self.gains[place, target] > 0.0]
+        if seen and self.influence is not None:
+            gain = self.influence.measure_gain(self.places[target], [], [self.places[each] for each in seen])
+            part = 1.0 - np.exp(-2.0 * max(gain, *self.gains[seen, target]))
+            predicts = "predict" if len(inputs) > 1 else "predicts"
+            reason += (
+                f"; {listed} {predicts} {100 * part:.0f} % of the changes of {output} that its past leaves"
+            )
+        elif self.influence is not None:
+            confidence = min(confidence, _BY_NAME_ALONE)
+            reason += f"; no response of {output} to {listed} is visible"
+        # A column that responds to the same inputs is another output.
+        also = [
+            name
+            for place, name in enumerate(self.names)
+            if place not in (*chosen, target)
+            and any(self.gains[each, place] > 0.0 and self.odds[each, place] > 0.0 for each in chosen)
+        ]
+        if also:
+            reason += f"; {', '.join(also)} {'respond' if len(also) > 1 else 'responds'} to {listed} too"
+        return ColumnChoice(inputs, output, confidence, reason + ".")
 
 
-def _is_counter(name: str, values: NDArray[np.float64]) -> bool:
+def _is_named(name: str, role: str) -> bool:
+    return find_role(name)[0] == role
+
+
+def _compare(names: list[str], columns: Sequence[NDArray[np.float64]]) -> _Comparison:
+    signals = _prepare(columns)
+    count = len(names)
+    by_name = np.array(
+        [[_rate_name(one, "input") + _rate_name(other, "output") for other in names] for one in names]
+    )
+    unlimited, gains = np.zeros((2, count, count))
+    derived, set_point = np.zeros((2, count, count), dtype=bool)
+    if signals.shape[1] < LEAST_SAMPLES:
+        allowed = (by_name > 0.0) & ~np.eye(count, dtype=bool)
+        return _Comparison(names, 0.5 * by_name, unlimited, gains, derived, allowed, set_point, None, {})
+    moving = np.flatnonzero(average_middle(signals, 1).std(axis=1) > 0.0)
+    found, at = estimate_direction(signals[moving]), np.ix_(moving, moving)
+    unlimited[at], gains[at], derived[at] = found.logits, found.influence.visible, found.derived
+    set_point[at] = found.manipulated < 0.0
+    # Names show the roles of columns without a visible response only if they are sure.
+    odds = by_name - _MOST_BY_SIGNALS
+    odds[at] += np.clip(found.logits, -_MOST_BY_SIGNALS, _MOST_BY_SIGNALS) + _MOST_BY_SIGNALS
+    # If nothing else is visible, one of two columns is the integral of the other as its response.
+    visible = gains > 0.0
+    allowed = visible & ~derived if (visible & ~derived).any() else visible
+    allowed |= by_name > _MOST_BY_SIGNALS
+    places = {int(place): at for at, place in enumerate(moving)}
+    return _Comparison(names, odds, unlimited, gains, derived, allowed, set_point, found.influence, places)
+
+
+def _prepare(columns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return the middle of columns without missing values and gross errors, between -1 and 1."""
+    samples = min(len(values) for values in columns)
+    first = max(0, samples - MOST_SAMPLES) // 2
+    signals = np.array([values[first : min(samples, first + MOST_SAMPLES)] for values in columns])
+    known = np.array([_mark_known(x, np.delete(signals, place, 0).T) for place, x in enumerate(signals)])
+    signals = signals[:, known.all(axis=0)]
+    if signals.shape[1] == 0:
+        return signals
+    low, high = signals.min(axis=1, keepdims=True), signals.max(axis=1, keepdims=True)
+    half = 0.5 * high - 0.5 * low
+    scaled: NDArray[np.float64] = (signals - (0.5 * high + 0.5 * low)) / np.where(half > 0.0, half, 1.0)
+    return scaled
+
+
+def _mark_known(values: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which samples are neither missing nor gross errors, which hide responses."""
+    known: NDArray[np.bool_] = np.isfinite(values)
+    errors = find_gross_errors(values, others)
+    # A column that is held between its spikes is a command with pulses.
+    is_measured = np.mean(np.diff(values) != 0.0) > _MOVING
+    for places in (*errors.codes.values(), *([errors.spikes] if is_measured else [])):
+        known[places] = False
+    return known
+
+
+def is_counter(name: str, values: NDArray[np.float64]) -> bool:
     """Return whether a column counts samples, or numbers the parts of a file."""
     known = values[np.isfinite(values)]
     if known.size < 2 or np.ptp(known) == 0.0:
@@ -166,40 +354,12 @@ def _is_counter(name: str, values: NDArray[np.float64]) -> bool:
     if np.mean(steps == np.median(steps)) > 0.98 and np.median(steps) != 0.0:
         return True
     levels, changes = np.unique(known).size, np.count_nonzero(steps)
-    whole = np.all(known == np.round(known)) and np.all(steps >= 0.0)
-    return bool(whole and levels <= _MOST_PARTS and changes * _LEAST_PART <= known.size)
-
-
-def _measure_influences(signals: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the part of the prediction error of every column that the past of another one removes.
-
-    Row: the column that predicts. Column: the one that is predicted.
-    """
-    samples = min(len(values) for values in signals)
-    first = max(0, samples - _SAMPLES) // 2
-    parts = np.array([values[first : first + _SAMPLES] for values in signals])
-    parts = parts[:, np.isfinite(parts).all(axis=0)]
-    count = len(signals)
-    found = np.zeros((count, count))
-    if parts.shape[1] < 8 * _LAGS:
-        return found
-    sizes = parts.std(axis=1, keepdims=True)
-    parts = (parts - parts.mean(axis=1, keepdims=True)) / np.where(sizes > 0.0, sizes, 1.0)
-    rows = np.arange(_LAGS, parts.shape[1])
-    past = [np.array([part[rows - lag] for lag in range(1, _LAGS + 1)]) for part in parts]
-    for target in range(count):
-        own = _measure_error(past[target], parts[target, rows])
-        for source in range(count):
-            if source != target and own > 0.0:
-                both = _measure_error(np.concatenate([past[target], past[source]]), parts[target, rows])
-                found[source, target] = max(0.0, 1.0 - both / own)
-    return found
-
-
-def _measure_error(columns: NDArray[np.float64], target: NDArray[np.float64]) -> float:
-    """Return the mean squared error of the second half of a signal, predicted by that of the first half."""
-    half = target.size // 2
-    x = columns[:, :half]
-    ridge = 1e-8 * half * np.eye(len(columns))
-    weights = np.linalg.solve(np.einsum("ir,jr->ij", x, x) + ridge, np.einsum("ir,r->i", x, target[:half]))
-    return float(np.mean((target[half:] - np.einsum("ir,i->r", columns[:, half:], weights)) ** 2))
+    if np.any(known != np.round(known)) or np.any(steps[steps > 0.0] != 1.0):
+        return False
+    # Whole numbers that increase by one, and begin again, count samples or parts.
+    again = bool(np.all(known[1:][steps < 0.0] == known.min()))
+    if changes == steps.size:
+        return again
+    # Two levels that alternate are a command.
+    is_numbering = again and (levels > 2 or bool(np.all(steps >= 0.0)))
+    return is_numbering and levels <= _MOST_PARTS and bool(changes * _LEAST_PART <= known.size)

@@ -57,8 +57,8 @@ def estimate_dead_time(record: Dataset, place: int) -> Fact:
     low, high = map(int, interval)
     between = f", between {low} and {_count(high)} with a probability of 95 %" if low < high else ""
     sentence = (
-        f"{record.output_name} responds to {name} {after}{between}; right within one sample with a probability of "
-        f"{100 * right:.0f} %."
+        f"{record.output_name} responds to {name} {after}{between}; right within one sample with a "
+        f"probability of {100 * right:.0f} %."
     )
     return Fact("dead-time", name, float(value), "samples", interval, right, sentence)
 

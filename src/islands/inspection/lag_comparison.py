@@ -228,8 +228,8 @@ class _Comparison:
 def _count_precursors(response: NDArray[np.float64]) -> int:
     """Return how many samples of alternating sign, each much larger than the one before, precede a response.
 
-    A mean of a held input over a change contains a part of the next level, which the prediction subtracts at a
-    lag before the dead time.
+    A mean of a held input over a change contains a part of the next level, which the prediction subtracts at
+    a lag before the dead time.
     """
     count = 0
     while (

@@ -1,14 +1,23 @@
 import numpy as np
 import pytest
+from column_roles import calibration_error
 
-from islands.inspection.column_roles import choose_columns, find_role
+from islands.inspection.column_roles import choose_columns, find_role, is_counter
 from support.known_records import delay, lag, steps, white
+from support.role_records import KINDS, make_record, make_records
 
 
 def make(name="a", other="b", noise=0.05, seed=0):
     u = steps(3000, seed, 10)
     y = delay(lag(u, 5.0), 2)
     return {name: u, other: y + noise * y.std() * white(3000, [seed, 5])}
+
+
+def assert_right(kind, test=False, seeds=range(2)):
+    for seed in seeds:
+        record = make_record(kind, seed, test)
+        choice = choose_columns(record.columns)
+        assert record.is_right(choice), (choice, record.answers)
 
 
 @pytest.mark.parametrize(
@@ -30,15 +39,14 @@ def test_sure_names_decide():
 
 
 def test_cause_predicts_effect():
-    for seed in range(5):
-        for swapped in (False, True):
-            columns = make(seed=seed)
-            if swapped:
-                columns = dict(reversed(columns.items()))
-            choice = choose_columns(columns)
-            assert (choice.inputs, choice.output) == (("a",), "b")
-            assert choice.confidence < 0.7
-            assert "predicts" in choice.reason
+    for swapped in (False, True):
+        columns = make()
+        if swapped:
+            columns = dict(reversed(columns.items()))
+        choice = choose_columns(columns)
+        assert (choice.inputs, choice.output) == (("a",), "b")
+        assert 0.9 < choice.confidence < 0.99
+        assert "a predicts" in choice.reason
 
 
 def test_names_with_prediction_are_surer_than_names_against_it():
@@ -51,10 +59,79 @@ def test_every_named_input_that_predicts_is_chosen():
     assert choose_columns(columns).inputs == ("u1", "u2")
 
 
-def test_counters_and_parts_of_a_file_are_no_signals():
-    columns = {"k": np.arange(3000.0), "test": np.repeat(np.arange(3.0), 1000), **make()}
+@pytest.mark.ci
+@pytest.mark.parametrize("kind", ["two inputs", "static map"])
+def test_every_input_that_improves_the_prediction_is_chosen(kind):
+    """The second input of the static map 2 u^2 + 0.5 u x is visible in products with the first one only."""
+    assert_right(kind, test=True, seeds=[0])
+
+
+@pytest.mark.parametrize("kind", ["thermostat", "control loop"])
+def test_the_output_of_a_controller_is_the_input_and_not_its_set_point(kind):
+    assert_right(kind, test=True, seeds=[1])
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("kind", ["slow heating", "motor", "battery"])
+def test_another_response_is_not_an_input(kind):
+    assert_right(kind, test=True, seeds=[0])
+
+
+def test_other_responses_are_stated():
+    u = steps(3000, 0, 10)
+    choice = choose_columns({"a": u, "b": lag(u, 5.0) + 0.01 * white(3000, 1), "c": 2 * lag(u, 9.0)})
+    assert choice.inputs == ("a",)
+    assert f"{'c' if choice.output == 'b' else 'b'} responds to a too" in choice.reason
+
+
+def test_no_pair_without_a_visible_response_is_proposed():
+    for seed in range(3):
+        choice = choose_columns(make_record("no relation", seed, False).columns)
+        assert (choice.inputs, choice.output, choice.confidence) == ((), "", None)
+        assert "No response of a column to another one is visible" in choice.reason
+
+
+def test_names_in_doubt_do_not_replace_a_response():
+    unrelated = white(1000, 0), white(1000, 1)
+    assert choose_columns(dict(zip(("pump", "level"), unrelated, strict=True))).output == ""
+    sure = choose_columns(dict(zip(("u", "y"), unrelated, strict=True)))
+    assert sure.output == "y"
+    assert sure.confidence <= 0.5
+    assert "no response of y to u is visible" in sure.reason
+
+
+def test_the_response_to_a_single_step_is_visible():
+    assert_right("single step")
+
+
+@pytest.mark.ci
+def test_a_derivative_is_not_an_input_of_its_signal():
+    assert_right("derivative", test=True, seeds=[0])
+
+
+def test_an_integral_is_a_response_if_nothing_else_is():
+    u = steps(2000, 0, 20)
+    columns = {"a": np.cumsum(u), "b": u, "c": white(2000, 3)}
+    choice = choose_columns(columns)
+    assert (choice.inputs, choice.output) == (("b",), "a")
+
+
+def test_codes_of_missing_values_do_not_hide_a_response():
+    columns = make()
+    columns["b"][::100] = -9999.0
     choice = choose_columns(columns)
     assert (choice.inputs, choice.output) == (("a",), "b")
+
+
+def test_counters_and_parts_of_a_file_are_no_signals():
+    k = np.arange(3000.0)
+    counters = {"k": k, "test": np.repeat(np.arange(3.0), 1000), "second": k % 60, "run": k // 100 % 10}
+    choice = choose_columns(counters | make())
+    assert (choice.inputs, choice.output) == (("a",), "b")
+    assert all(is_counter(name, values) for name, values in counters.items())
+    # A binary command and a staircase with other steps are signals.
+    assert not is_counter("a", np.repeat([0.0, 1.0, 0.0, 1.0], 50))
+    assert not is_counter("a", np.repeat([0.0, 2.0, 4.0, 0.0], 50))
 
 
 def test_the_choice_of_the_user_stays():
@@ -62,8 +139,37 @@ def test_the_choice_of_the_user_stays():
     assert choose_columns(columns, ("b",), "a").inputs == ("b",)
     assert choose_columns(columns, ("b",)).output == "a"
     assert choose_columns(columns, (), "a").inputs == ("b",)
+    assert choose_columns(columns, (), "a").confidence < 0.2
 
 
 def test_one_signal_is_not_enough():
     choice = choose_columns({"k": np.arange(100.0), "y": white(100, 0)})
     assert choice.output == ""
+
+
+def test_a_short_record_needs_names():
+    short = {name: values[:50] for name, values in make().items()}
+    assert "Fewer than 80 samples" in choose_columns(short).reason
+    named = {"u": short["a"], "y": short["b"]}
+    assert choose_columns(named).output == "y"
+
+
+@pytest.mark.parametrize("scale", [1e308, 1e-310])
+def test_numbers_at_the_ends_of_their_range(scale):
+    columns = make()
+    choice = choose_columns({"a": columns["a"] * scale, "b": columns["b"]})
+    assert (choice.inputs, choice.output) == (("a",), "b")
+
+
+@pytest.mark.ci
+def test_the_stated_probability_is_the_frequency_of_right_choices():
+    """Columns of other systems than those that the weights are from, in random order without names."""
+    records = make_records(2, True, 5000)
+    assert len(records) == 2 * len(KINDS) >= 40
+    choices = [choose_columns(record.columns) for record in records]
+    right = [record.is_right(choice) for record, choice in zip(records, choices, strict=True)]
+    assert np.mean(right) >= 0.9
+    stated = [
+        (choice.confidence, each) for choice, each in zip(choices, right, strict=True) if choice.confidence
+    ]
+    assert calibration_error(*zip(*stated, strict=True)) <= 0.1

@@ -1,0 +1,123 @@
+"""Shape of a column: whether it looks like a command or like a measured response."""
+
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Levels of a command, at most, and multiple of a jump relative to the range from which on it is large.
+_MOST_LEVELS, _LARGE = 12, 5.0
+
+#: Orders of the differences that bound the noise, and the median of the square of normal noise.
+_ORDERS, _MEDIAN_SQUARE = (4, 6, 8), 0.455
+
+#: Decimal logarithm of the noise, and increments, relative to the standard deviation, that count as none.
+NO_NOISE, _NO_INCREMENT = -4.0, 1e-5
+
+#: Lags of a cross-correlation, at most.
+_MOST_LAGS = 200
+
+#: Error of a column as a sum of a few samples of another one, relative to its increments, and sum of the
+#: weights relative to their size, up to which it is a derivative.
+_DERIVED, _BALANCED = 0.05, 0.01
+
+#: Error of the increments of a column as a sum of others, relative to their size, up to which it is computed.
+_COMPUTED = 1e-3
+
+#: Lags of the other columns that a controller or a logger may compute a column from.
+_COMPUTED_LAGS = 3
+
+#: Part of its increments that a part of the record must have to show whether the column is computed.
+_MOVING = 0.1
+
+
+def measure_command(x: NDArray[np.float64]) -> float:
+    """Return how much a column looks like a command, between 0 and 1.
+
+    A command jumps between a few levels, or is held between large jumps. A coarse sensor is held too, but its
+    jumps are small.
+    """
+    steps = np.diff(x)
+    jumps = np.abs(steps[steps != 0.0])
+    if jumps.size == 0:
+        return 0.0
+    large = min(1.0, _LARGE * float(np.median(jumps)) / float(np.ptp(x)))
+    held = 1.0 - jumps.size / steps.size
+    return large if np.unique(x).size <= _MOST_LEVELS else large * held
+
+
+def measure_noise_level(x: NDArray[np.float64]) -> float:
+    """Return the decimal logarithm of the noise of a column relative to its standard deviation."""
+    bounds = []
+    for order in _ORDERS:
+        median = float(np.median(np.diff(x, order) ** 2))
+        bounds.append(np.sqrt(median / _MEDIAN_SQUARE / comb(2 * order, order)))
+    return max(float(np.log10(min(bounds) / x.std() + 1e-300)), NO_NOISE)
+
+
+def measure_roughness(x: NDArray[np.float64]) -> float:
+    """Return the decimal logarithm of the increments of a column relative to its standard deviation."""
+    return float(np.log10(np.diff(x).std() / x.std() + _NO_INCREMENT)) if np.ptp(x) > 0.0 else 0.0
+
+
+def measure_precedence(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Return whether the increments of y follow those of x (to 1) or precede them (to -1).
+
+    The squared cross-correlation at positive lags is compared with that at negative ones.
+    """
+    one, other = (np.diff(each) - np.diff(each).mean() for each in (x, y))
+    size = one.size
+    spectrum = np.conj(np.fft.rfft(one, 2 * size)) * np.fft.rfft(other, 2 * size)
+    power = np.fft.irfft(spectrum) ** 2
+    lags = min(size // 4, _MOST_LAGS)
+    after, before = float(power[1 : lags + 1].sum()), float(power[-lags:].sum())
+    return (after - before) / max(after + before + float(power[0]), np.finfo(np.float64).tiny)
+
+
+def is_derived(x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
+    """Return whether x is a derivative of y: a sum of a few samples of y with weights that balance."""
+    centred = (y - y.mean()) / y.std()
+    shifted = (centred[3:], centred[2:-1], centred[1:-2], centred[:-3])
+    matrix, target = np.column_stack((*shifted, np.ones(len(y) - 3))), x[2:-1]
+    weights = np.linalg.lstsq(matrix, target, rcond=1e-13)[0]
+    size = float(np.median(np.abs(target - np.median(target)))) or float(target.std())
+    error = float(np.median(np.abs(target - matrix @ weights)))
+    balance = abs(float(weights[:-1].sum())) <= _BALANCED * float(np.abs(weights[:-1]).sum())
+    return bool(error <= _DERIVED * size and balance)
+
+
+def find_computed(signals: NDArray[np.float64]) -> tuple[int, ...]:
+    """Return the columns that the others determine exactly, as those of a control loop with its error.
+
+    A controller that is at its limits for a part of the time is found in the other parts.
+
+    Parameters
+    ----------
+    signals : ndarray, shape (columns, samples)
+        Columns that are not constant.
+    """
+    scaled = (signals - signals.mean(axis=1, keepdims=True)) / signals.std(axis=1, keepdims=True)
+    samples = signals.shape[1] - _COMPUTED_LAGS
+    lagged = [
+        [x[_COMPUTED_LAGS - lag : _COMPUTED_LAGS - lag + samples] for lag in range(_COMPUTED_LAGS + 1)]
+        for x in scaled
+    ]
+    return tuple(place for place in range(len(signals)) if _is_computed(lagged, place))
+
+
+def _is_computed(lagged: list[list[NDArray[np.float64]]], place: int) -> bool:
+    target = lagged[place][0] - lagged[place][1]
+    columns = [
+        x for other, parts in enumerate(lagged) for lag, x in enumerate(parts) if lag > 0 or other != place
+    ]
+    matrix = np.column_stack((*columns, np.ones(target.size)))
+    length = min(target.size, 4 * matrix.shape[1])
+    for first in range(0, target.size - length + 1, length):
+        part = slice(first, first + length)
+        size = float(target[part].std())
+        if size <= _MOVING * float(target.std()):
+            continue
+        weights = np.linalg.lstsq(matrix[part], target[part], rcond=1e-13)[0]
+        if float(np.std(target[part] - matrix[part] @ weights)) <= _COMPUTED * size:
+            return True
+    return False

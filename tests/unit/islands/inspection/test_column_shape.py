@@ -1,0 +1,58 @@
+import numpy as np
+import pytest
+
+from islands.inspection.column_shape import (
+    find_computed,
+    is_derived,
+    measure_command,
+    measure_noise_level,
+    measure_precedence,
+    measure_roughness,
+)
+from support.known_records import lag, steps, white
+
+
+def test_commands_are_held_or_have_few_levels():
+    binary = np.random.default_rng(0).integers(0, 2, 1000) * 12.0
+    assert measure_command(binary) == 1.0
+    assert measure_command(steps(1000, 0)) > 0.8
+    assert measure_command(white(1000, 0)) == 0.0
+    assert measure_command(np.full(100, 3.0)) == 0.0
+
+
+def test_a_coarse_sensor_is_not_a_command():
+    temperature = np.round(20.0 + 5.0 * np.sin(np.arange(2000) / 300), 1)
+    assert np.mean(np.diff(temperature) == 0.0) > 0.8
+    assert measure_command(temperature) < 0.2
+
+
+def test_the_noise_level_is_that_of_added_noise():
+    smooth = np.sin(np.arange(4000) / 50)
+    noisy = smooth + 0.01 * smooth.std() * white(4000, 0)
+    assert measure_noise_level(noisy) == pytest.approx(-2.0, abs=0.1)
+    assert measure_noise_level(smooth) < -3.9
+
+
+def test_a_response_is_smoother_and_follows():
+    u = white(1000, 0)
+    y = lag(u, 10.0)
+    assert measure_roughness(y) < measure_roughness(u) - 0.3
+    assert measure_precedence(u, y) > 0.3
+    assert measure_precedence(u, y) == pytest.approx(-measure_precedence(y, u))
+
+
+@pytest.mark.parametrize("differentiate", [np.gradient, lambda y: np.diff(y, prepend=y[0])])
+def test_a_derivative_is_recognised(differentiate):
+    y = lag(steps(1000, 0), 20.0) + 0.01 * white(1000, 1)
+    assert is_derived(differentiate(y), y)
+    assert not is_derived(steps(1000, 0), y)
+    assert not is_derived(2.0 * y + 1.0, y)
+
+
+def test_columns_of_a_controller_determine_each_other():
+    set_point, measured = steps(800, 0, 40), lag(steps(800, 0, 40), 20.0) + 0.01 * white(800, 1)
+    error = set_point - measured
+    manipulated = np.clip(2.0 * error + 0.1 * np.cumsum(error), -1.0, 1.0)
+    loop = np.array([set_point, manipulated, measured])
+    assert find_computed(loop) == (0, 1, 2)
+    assert find_computed(np.array([set_point, manipulated + 0.01 * white(800, 2), measured])) == ()
