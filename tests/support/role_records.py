@@ -423,6 +423,109 @@ KINDS: Mapping[str, Callable[[Random, bool], tuple[Columns, tuple[Roles, ...]]]]
 }
 
 
+# Files of loggers with many columns, which the weights do not know.
+
+
+def log_heater(rng: Random) -> tuple[Columns, tuple[Roles, ...]]:
+    n = draw_size(rng, 2500, 5000)
+    duty = 100 * np.maximum(0, step_input(rng, n, 200))
+    ambient = 20 + lag(coloured(rng, n, 80.0), 40.0)
+    inside = ambient + 0.4 * lag(duty, rng.uniform(80, 250))
+    case = ambient + 0.3 * lag(inside - ambient, 60.0)
+    current = 0.05 * duty * (1 + 0.01 * rng.standard_normal(n))
+    columns = {
+        "tick": np.arange(float(n)),
+        "duty": np.round(duty, 1),
+        "current": np.round(current, 3),
+        "ambient": np.round(ambient + 0.05 * rng.standard_normal(n), 2),
+        "inside": np.round(inside + 0.05 * rng.standard_normal(n), 2),
+        "case": np.round(case + 0.05 * rng.standard_normal(n), 2),
+        "supply": np.round(24 - 0.1 * current + 0.01 * rng.standard_normal(n), 2),
+        "humidity": np.round(50 - 5 * coloured(rng, n, 200.0), 1),
+        "status": np.zeros(n),
+    }
+    others = "ambient current duty"
+    answers = [roles(name, "duty", others) for name in ("inside", "case", "current")]
+    supply = [roles("supply", name, others) for name in ("duty", "current")]
+    return columns, (*answers, *supply, roles("inside", "current", others))
+
+
+def log_drive(rng: Random) -> tuple[Columns, tuple[Roles, ...]]:
+    n = draw_size(rng, 2000, 4000)
+    wanted = step_input(rng, n, 150) * 100
+    load = 3 * np.maximum(0, step_input(rng, n, 250))
+    speed, torque, x, total = np.empty(n), np.empty(n), 0.0, 0.0
+    for k in range(n):
+        speed[k] = np.round(x + 0.3 * rng.standard_normal(), 1)
+        total += 0.02 * (wanted[k] - speed[k])
+        torque[k] = np.clip(0.5 * (wanted[k] - speed[k]) + total, -20, 20)
+        x += 0.1 * (torque[k] - load[k]) - 0.02 * x
+    columns = {
+        "wanted": wanted,
+        "torque": np.round(torque, 3),
+        "speed": speed,
+        "position": np.cumsum(speed) * 0.01,
+        "winding": np.round(25 + lag(0.2 * torque**2, 300.0) + 0.05 * rng.standard_normal(n), 1),
+        "bus": np.round(325 - 0.2 * np.abs(torque) + 0.3 * rng.standard_normal(n), 1),
+        "beat": np.arange(n) % 2.0,
+    }
+    return columns, tuple(roles(name, "torque") for name in ("speed", "winding", "bus", "position"))
+
+
+def log_tanks(rng: Random) -> tuple[Columns, tuple[Roles, ...]]:
+    n = draw_size(rng, 2000, 4000)
+    pump, valve = 1 + 0.7 * step_input(rng, n, 100), 0.5 + 0.5 * binary(rng, n, 120)
+    flow = lag(pump, 3.0)
+    upper = simulate(lambda x, k: max(x + 0.04 * (flow[k] - np.sqrt(max(x, 0.0))), 0.0), n, 1.0)
+    lower = simulate(
+        lambda x, k: max(x + 0.04 * (np.sqrt(max(upper[k], 0.0)) - valve[k] * np.sqrt(max(x, 0.0))), 0.0),
+        n,
+        1.0,
+    )
+    columns = {
+        "pump": pump,
+        "valve": valve,
+        "flow": add_noise(rng, flow, 0.03),
+        "upper": add_noise(rng, upper, 0.01),
+        "lower": add_noise(rng, lower, 0.01),
+        "minute": np.arange(n) // 60 % 60.0,
+    }
+    upper_inputs = (roles("upper", "pump", "flow"), roles("upper", "flow", "pump"))
+    lower_inputs = tuple(roles("lower", f"{name} valve", "pump flow") for name in ("pump", "flow"))
+    return columns, (*upper_inputs, *lower_inputs, roles("flow", "pump"))
+
+
+def log_building(rng: Random) -> tuple[Columns, tuple[Roles, ...]]:
+    n = draw_size(rng, 4000, 6000)
+    day = np.arange(n) / 288
+    outside = 6 - 5 * np.cos(2 * np.pi * day) + 2 * coloured(rng, n, 150.0)
+    sun = np.maximum(0.0, -np.cos(2 * np.pi * day)) * np.clip(1 + 0.5 * coloured(rng, n, 30.0), 0, 2) * 400
+    wanted = np.where((day % 1 > 0.25) & (day % 1 < 0.9), 21.0, 17.0)
+    room, valve, x = np.empty(n), np.empty(n), 18.0
+    for k in range(n):
+        room[k] = np.round(x + 0.03 * rng.standard_normal(), 2)
+        valve[k] = np.round(np.clip(40 * (wanted[k] - room[k]) + 30, 0, 100))
+        x += 0.008 * (outside[k] + 0.25 * valve[k] + 0.01 * sun[k] - x)
+    columns = {
+        "outside": np.round(outside + 0.05 * rng.standard_normal(n), 1),
+        "sun": np.round(sun),
+        "wanted": wanted,
+        "valve": valve,
+        "room": room,
+        "carbon": np.round(600 + 150 * coloured(rng, n, 100.0)),
+    }
+    return columns, (roles("room", "valve", "outside sun"),)
+
+
+#: Files of loggers, by name.
+LOGGERS: Mapping[str, Callable[[Random], tuple[Columns, tuple[Roles, ...]]]] = {
+    "heater": log_heater,
+    "drive": log_drive,
+    "tanks": log_tanks,
+    "building": log_building,
+}
+
+
 def rename(kind: str, columns: Mapping[str, Signal], answers: tuple[Roles, ...], rng: Random) -> RoleRecord:
     """Return a record with columns in random order under names that say nothing."""
     names = list(columns)
@@ -450,3 +553,12 @@ def make_record(kind: str, seed: int, test: bool) -> RoleRecord:
 
 def make_records(count: int, test: bool, first: int = 0) -> list[RoleRecord]:
     return [make_record(kind, seed, test) for kind in KINDS for seed in range(first, first + count)]
+
+
+def make_logs(count: int, first: int = 0) -> list[RoleRecord]:
+    found = []
+    for kind, make in LOGGERS.items():
+        for seed in range(first, first + count):
+            rng = np.random.default_rng([seed, *map(ord, kind)])
+            found.append(rename(kind, *make(rng), rng))
+    return found

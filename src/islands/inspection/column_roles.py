@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +114,11 @@ def choose_columns(
             return ColumnChoice((), "", None, "Fewer than two columns are signals: name inputs and output.")
         names = [*given & signals.keys(), *(name for name in signals if name not in given)][:_MOST_COLUMNS]
         names = [name for name in signals if name in names]
-        return _compare(names, [signals[name] for name in names]).choose(tuple(inputs), output)
+        choice = _compare(names, [signals[name] for name in names]).choose(tuple(inputs), output)
+    if len(signals) == len(names):
+        return choice
+    left = f"; of {len(signals)} columns {len(names)} are compared."
+    return replace(choice, reason=choice.reason.removesuffix(".") + left)
 
 
 def _first_word(name: str) -> str:

@@ -147,6 +147,12 @@ def test_one_signal_is_not_enough():
     assert choice.output == ""
 
 
+@pytest.mark.ci
+def test_columns_that_are_not_compared_are_stated():
+    columns = make() | {f"c{place}": white(3000, place) for place in range(12)}
+    assert choose_columns(columns).reason.endswith("; of 14 columns 12 are compared.")
+
+
 def test_a_short_record_needs_names():
     short = {name: values[:50] for name, values in make().items()}
     assert "Fewer than 80 samples" in choose_columns(short).reason
