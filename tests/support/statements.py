@@ -40,6 +40,7 @@ EXCLUSIVE = (
     (r"which explain the discrepancy", r"no known effect explains"),
     (r"stopped before a verdict", r"(No significant discrepancy|which explain)"),
     (r"the RMSE falls from", r"%?, by -[\d.]+ %"),
+    (r"(no smaller model is as good|: smallest of \d+ models)", r"try [^;.]*smaller model"),
     (r"Good for: no use that", r"no structure is left in the"),
     (r"drifts by [\d.e+]+ % of its range at constant input", r"Good for: .*Property 1 holds.* Fails at:"),
 )

@@ -9,6 +9,7 @@ from islands.io.result_text.statements import (
     Statement,
     describe_error_level,
     describe_excess,
+    describe_insignificant,
     describe_unexplained_error,
     list_insignificant,
     typical_half_width,
@@ -265,8 +266,7 @@ NEXT_STEPS: Final[tuple[Statement[CoupledFacts], ...]] = (
         "insignificant",
         lambda facts: list_insignificant(facts.model["terms"]),
         lambda facts: (
-            "try a longer record or a smaller model, since the parameter of "
-            f"{list_insignificant(facts.model['terms'])[0]} is within two standard errors of zero"
+            f"try a longer record, since {describe_insignificant(list_insignificant(facts.model['terms']))}"
         ),
     ),
     Statement(

@@ -4,7 +4,7 @@ Each statement has a name, a predicate on the document and a sentence. Every tex
 them, so that a run, its folder, the REST service, the report and a notebook state the same.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import floor
@@ -587,12 +587,15 @@ def _may_grow(facts: ResultFacts) -> bool:
 
 
 def _describe_longer_record(facts: ResultFacts) -> str:
-    weak = facts.insignificant
-    more = f" (and of {len(weak) - 1} more)" if len(weak) > 1 else ""
-    return (
-        f"try a longer record or a smaller model, since the parameter of {weak[0]}{more} is within "
-        "two standard errors of zero"
-    )
+    # The recommended model is the smallest one that is as good as the best, unless by another rule.
+    smaller = " or a smaller model" if facts.document["settings"].get("select") == "fitness" else ""
+    return f"try a longer record{smaller}, since {describe_insignificant(facts.insignificant)}"
+
+
+def describe_insignificant(terms: Sequence[str]) -> str:
+    """State the first of the terms whose parameters are not significant, and the number of the others."""
+    more = f" (and of {len(terms) - 1} more)" if len(terms) > 1 else ""
+    return f"the parameter of {terms[0]}{more} is within two standard errors of zero"
 
 
 def _find_unlikely(facts: ResultFacts) -> tuple[str, float]:

@@ -286,6 +286,11 @@ def test_a_parameter_below_two_standard_errors_is_named(findings):
     model = entry.model.with_parameters(theta, [abs(theta[0]), *(abs(value) / 3 for value in theta[1:])])
     weak = describe(replace(findings, models=(replace(entry, model=model),)))[-1]
     assert "the parameter of y_um(k-1) is within two standard errors of zero" in weak
+    # No smaller model is as good, unless the search alone has chosen the model.
+    assert "smaller model" not in weak
+    settings = {**findings.settings, "select": "fitness", "fitness": "free-run"}
+    fittest = describe(replace(findings, models=(replace(entry, model=model),), settings=settings))[-1]
+    assert "try a longer record or a smaller model, since" in fittest
 
 
 def test_the_uncertainty_has_the_half_width_of_the_band_and_the_doubtful_terms(findings):
