@@ -227,11 +227,15 @@ class ResultFacts(RunFacts):
 
         The measured past then makes the prediction one step ahead worse than an adequate free run.
         """
-        free, one = self.error()["rmse"], self.error("one_step_ahead")["rmse"]
-        if free is None or one is None or self.has_structure or exceeds_limit(self.share("free_run")):
+        if self.document["settings"].get("estimator") != "least-squares":
             return False
-        is_biased = self.document["settings"].get("estimator") == "least-squares"
-        return is_biased and not self.is_rounding(one) and free < _BETTER * one
+        is_adequate = not self.has_structure and not exceeds_limit(self.share("free_run"))
+        return is_adequate and all(map(self._is_free_run_better, ("estimation", "validation")))
+
+    def _is_free_run_better(self, part: str) -> bool:
+        """Return whether the free run is clearly better than the prediction one step ahead."""
+        free, one = self.error(part=part)["rmse"], self.error("one_step_ahead", part)["rmse"]
+        return bool(free is not None and one and not self.is_rounding(one) and free < _BETTER * one)
 
     @cached_property
     def extrapolation(self) -> list[str]:
