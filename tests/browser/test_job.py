@@ -53,6 +53,20 @@ def test_the_convergence_chart_grows_with_the_events(
 
 
 @pytest.mark.ci
+def test_warnings_about_the_data_are_shown_during_the_search(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500, name="piezo")
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    warning = "validation extrapolates: u is -3 to 3 V in the validation data"
+    expect(page.get_by_text("Warning")).to_have_count(0)
+    with stored(desk) as store:
+        lease = taken(store, job)
+        store.leases.report(lease, ProgressReport({"phase": "search", "warnings": [warning]}))
+        expect(page.get_by_text(warning)).to_be_visible()
+
+
+@pytest.mark.ci
 def test_bar_and_time_left_of_a_search_move_from_its_first_phase_on(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:

@@ -17,6 +17,7 @@ from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
 from support.service_processes import Service
+from support.statements import find_contradictions
 from support.stores import LONG, taken
 
 #: Maximum number of transferred bytes: the files of the dashboard and the list of jobs. The history and the
@@ -88,6 +89,7 @@ def test_the_panel_begins_with_the_sentences(
     words = service.ask("GET", f"/v1/jobs/{finished}").json()["summary"]["words"].splitlines()
     expect(page.locator(".sentences > p, .sentences > code")).to_have_text([line.strip() for line in words])
     expect(page.locator(".sentences code")).to_have_text([words[1].strip()])
+    assert not find_contradictions(page.locator("main").inner_text())
 
 
 @pytest.mark.nightly
@@ -194,9 +196,13 @@ def coupled(service: Service) -> str:
 @pytest.mark.ci
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_job_of_two_outputs_shows_both(
-    opened: Callable[..., Any], coupled: str, expect: Any, scheme: str
+    opened: Callable[..., Any], service: Service, coupled: str, expect: Any, scheme: str
 ) -> None:
     page = opened(f"#/jobs/{coupled}", color_scheme=scheme)
+    words = service.ask("GET", f"/v1/jobs/{coupled}").json()["summary"]["words"].splitlines()
+    assert any(line.startswith("As a simulation: ") for line in words)
+    expect(page.locator(".sentences > p, .sentences > code")).to_have_text([line.strip() for line in words])
+    assert not find_contradictions(page.locator("main").inner_text())
     expect(page.locator(".equation math")).to_have_count(2)
     outputs = page.get_by_role("table", name="Errors of the outputs").locator("tbody tr th")
     assert outputs.all_text_contents() == ["y1: y1_mm (mm)", "y2: y2_mm (mm)"]
