@@ -313,9 +313,13 @@ def _compare(names: list[str], columns: Sequence[NDArray[np.float64]]) -> _Compa
     # Names show the roles of columns without a visible response only if they are sure.
     odds = by_name - _MOST_BY_SIGNALS
     odds[at] += np.clip(found.logits, -_MOST_BY_SIGNALS, _MOST_BY_SIGNALS) + _MOST_BY_SIGNALS
-    # If nothing else is visible, one of two columns is the integral of the other as its response.
     visible = gains > 0.0
-    allowed = visible & ~derived if (visible & ~derived).any() else visible
+    # The integral of a column that responds to no other one is a counter, such as a charge, and no output. If
+    # nothing else is visible, one of two columns is the integral of the other as its response.
+    responds = (visible & ~derived & ~derived.T & (unlimited > 0.0)).any(axis=0)
+    counters = (derived & ~responds[:, None]).any(axis=0)
+    candidates = (visible & ~derived & ~counters, visible & ~derived, visible)
+    allowed = next((each for each in candidates if each.any()), visible)
     allowed |= by_name > _MOST_BY_SIGNALS
     places = {int(place): at for at, place in enumerate(moving)}
     return _Comparison(names, odds, unlimited, gains, derived, allowed, set_point, found.influence, places)

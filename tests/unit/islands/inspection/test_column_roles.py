@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import scipy
 from column_roles import calibration_error
 
 from islands.inspection.column_roles import choose_columns, find_role, is_counter
@@ -179,3 +180,15 @@ def test_the_stated_probability_is_the_frequency_of_right_choices():
         (choice.confidence, each) for choice, each in zip(choices, right, strict=True) if choice.confidence
     ]
     assert calibration_error(*zip(*stated, strict=True)) <= 0.1
+
+
+def test_the_charge_that_flows_is_no_output():
+    """A battery cycler writes the integral of the current, which the voltage predicts as well."""
+    rng = np.random.default_rng(3)
+    current = np.repeat(0.5 * rng.integers(-5, 6, 60), 40)
+    charge = np.cumsum(current) / 3600
+    slow = scipy.signal.lfilter([0.0, 0.03 * 0.022], [1.0, -0.97], current)
+    voltage = 3.8 + 0.24 * charge + 0.035 * current + slow + 0.0005 * rng.standard_normal(current.size)
+    choice = choose_columns({"a": charge, "b": voltage, "c": current})
+    assert choice.inputs == ("c",)
+    assert choice.output == "b"
