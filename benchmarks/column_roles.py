@@ -3,11 +3,12 @@
     python benchmarks/column_roles.py [--count N] [--first SEED] [--fit]
 
 Columns have random order and names that say nothing. The weights of `islands.inspection.column_direction` are
-estimated on the systems "calibration"; "test" has other systems of the same kinds with other seeds, and
-"portfolio" the records and laws that test `--library auto`. With ISLANDS_MEASURED_DIR, "measured" has
-measured records. A choice is right if the output and all inputs are. The expected calibration error is the
-mean difference of the stated probability and the frequency of right choices in ten classes of probability.
-With ``--fit`` the weights are estimated and printed.
+estimated on the systems "calibration"; "test" has other systems of the same kinds with other seeds,
+"loggers" files with many columns, and "portfolio" the records and laws that test `--library auto`. With
+ISLANDS_MEASURED_DIR, "measured" has measured records. A choice is right if the output and all inputs are. The
+expected calibration error is the mean difference of the stated probability and the frequency of right choices
+in ten classes of probability. With ``--fit`` the
+weights are estimated and printed.
 """
 
 import argparse
@@ -32,7 +33,7 @@ from islands.inspection import column_roles  # noqa: E402
 from islands.inspection.column_direction import WEIGHTS, estimate_direction, measure_properties  # noqa: E402
 from support.laws import LAWS  # noqa: E402
 from support.portfolio_records import KINDS  # noqa: E402
-from support.role_records import RoleRecord, Roles, make_records, rename, roles  # noqa: E402
+from support.role_records import RoleRecord, Roles, make_logs, make_records, rename, roles  # noqa: E402
 
 #: Classes of probability of the expected calibration error.
 CLASSES = 10
@@ -198,6 +199,7 @@ def main() -> None:
     show("calibration", calibration)
     sets = [
         show("test", make_records(asked.count, True, asked.first + 1000)),
+        show("loggers", make_logs(asked.count, asked.first)),
         show("portfolio", list(make_portfolio(max(1, asked.count // 5), asked.first + 1))),
     ]
     folder = os.environ.get("ISLANDS_MEASURED_DIR")

@@ -337,7 +337,7 @@ def make_motor(rng: Random, test: bool) -> tuple[Columns, tuple[Roles, ...]]:
     u = 12 * (binary(rng, n, 25) if test else step_input(rng, n, 30))
     speed = simulate(lambda x, k: x + 0.08 * (u[k] - x) - 0.02 * np.tanh(20 * x), n)
     current = lag(u - speed, 1.5)
-    columns = {"u": u, "speed": add_noise(rng, speed, 0.01), "current": add_noise(rng, current, 0.03)}
+    columns = {"u": u, "speed": 25 * add_noise(rng, speed, 0.01), "current": add_noise(rng, current, 0.03)}
     if test:
         columns["angle"] = np.cumsum(speed) * 0.01
     answers = tuple(roles(name, "u") for name in columns if name != "u")

@@ -16,6 +16,7 @@ from islands.inspection.column_shape import (
     NO_NOISE,
     find_computed,
     is_derived,
+    is_feedback,
     measure_command,
     measure_noise_level,
     measure_precedence,
@@ -42,6 +43,9 @@ _CONSTANT = -0.73
 
 #: Command-likeness from which on a column is a command.
 _COMMAND = 0.5
+
+#: Root mean square of the error of a controlled column, relative to the standard deviation of its set point.
+_TRACKING = 0.8
 
 #: Gain by which a column predicts a command that a controller computes from it, at least.
 _LEAST_CONTROL = 0.05
@@ -144,6 +148,18 @@ def _rate_collision(visible: NDArray[np.float64], source: int, target: int, othe
     return float(max(independent, default=0.0))
 
 
+def _find_tracked(signals: NDArray[np.float64], command: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return whether a column has the values of a command (row), as a controlled one of its set point."""
+    count = len(signals)
+    found = np.zeros((count, count), dtype=bool)
+    for one in range(count):
+        for other in range(count):
+            if command[one] > _COMMAND >= command[other]:
+                error = float(np.sqrt(np.mean((signals[one] - signals[other]) ** 2)))
+                found[one, other] = error < _TRACKING * float(signals[one].std())
+    return found
+
+
 def _find_manipulated(
     signals: NDArray[np.float64], influence: ColumnInfluence, command: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -153,6 +169,7 @@ def _find_manipulated(
     determine each other exactly: the set point is the one that is predicted least.
     """
     count, leading, visible = len(signals), influence.leading, influence.visible
+    tracked = _find_tracked(signals, command)
     found = np.zeros((count, count))
     places = list(permutations(range(count), 3))
     computed = find_computed(signals) if count > 2 else ()
@@ -175,6 +192,16 @@ def _find_manipulated(
             and leading[source, reference] == 0.0
             and visible[source, target] > 0.0
         ]
+    # A set point is recognised by its values if the columns of the loop are rounded.
+    triples += [
+        (reference, source, target)
+        for reference, source, target in places
+        if tracked[reference, target]
+        and not tracked[source, target]
+        and visible[reference, source] > 0.0
+        and visible[source, target] > 0.0
+        and is_feedback(signals[source], signals[reference], signals[target])
+    ]
     for reference, source, target in triples:
         found[source, target] += 1.0
         found[reference, target] -= 1.0

@@ -39,8 +39,8 @@ _SURE_NAME, _LIKELY_NAME = 3.0, 0.85
 #: Logarithm of the odds by the signals, at most.
 _MOST_BY_SIGNALS = 4.0
 
-#: Logarithm of the odds of an input that is visible only if others are known.
-_BY_INDEPENDENCE = 2.0
+#: Logarithm of the odds of an input that is visible only if others are known, and by its shape, at least.
+_BY_INDEPENDENCE, _LEAST_INDEPENDENT = 2.0, -1.0
 
 #: Weight of the unlimited odds by the signals between pairs with equal odds.
 _TIE = 1e-2
@@ -56,6 +56,12 @@ _MOST_COLUMNS = 12
 
 #: Levels of a column that numbers the parts of a file, at most, and samples of a part, at least.
 _MOST_PARTS, _LEAST_PART = 100, 20
+
+#: Range of a column relative to its values that counts as none.
+_ROUNDING = 1e-13
+
+#: Range of a column whose squares are numbers.
+_USUAL = (1e-100, 1e100)
 
 #: Part of the samples in which a measured signal moves, at least.
 _MOVING = 0.5
@@ -163,8 +169,8 @@ class _Comparison:
         Whether one column is a derivative of the other.
     allowed : ndarray of bool, shape (columns, columns)
         Whether the pair may be chosen.
-    set_point : ndarray of bool, shape (columns, columns)
-        Whether one column is the set point of a loop in which the other is.
+    manipulated : ndarray, shape (columns, columns)
+        As in `ColumnDirection`.
     influence : ColumnInfluence or None
         None for a record that is too short to measure it.
     places : mapping of int to int
@@ -177,7 +183,7 @@ class _Comparison:
     gains: NDArray[np.float64]
     derived: NDArray[np.bool_]
     allowed: NDArray[np.bool_]
-    set_point: NDArray[np.bool_]
+    manipulated: NDArray[np.float64]
     influence: ColumnInfluence | None
     places: Mapping[int, int]
 
@@ -235,9 +241,10 @@ class _Comparison:
             return self._measure_gain(target, chosen, place) > 0.0
         if self._rate_input(place, target) <= 0.0 or self.derived[place, target]:
             return False
-        if any(self.set_point[place, each] for each in chosen):
+        if any(self.manipulated[place, each] < 0.0 for each in chosen):
             return False
-        if any(self.gains[each, place] > 0.0 and self.odds[each, place] > 0.0 for each in chosen):
+        is_response = any(self.gains[each, place] > 0.0 and self.odds[each, place] > 0.0 for each in chosen)
+        if is_response and self.manipulated[place, target] <= 0.0:
             return False
         return self._measure_gain(target, chosen, place) > 0.0
 
@@ -251,7 +258,7 @@ class _Comparison:
             return float(self.odds[place, target])
         if self.gains[target, place] > 0.0:
             return float(self.odds[place, target] - self.odds[target, place])
-        return _BY_INDEPENDENCE
+        return _BY_INDEPENDENCE if self.odds[place, target] > _LEAST_INDEPENDENT else -_BY_INDEPENDENCE
 
     def _measure_gain(self, target: int, known: Sequence[int], added: int) -> float:
         """Return what an input adds to the known ones, alone or by its products with them."""
@@ -301,15 +308,17 @@ def _compare(names: list[str], columns: Sequence[NDArray[np.float64]]) -> _Compa
     by_name = np.array(
         [[_rate_name(one, "input") + _rate_name(other, "output") for other in names] for one in names]
     )
-    unlimited, gains = np.zeros((2, count, count))
-    derived, set_point = np.zeros((2, count, count), dtype=bool)
+    unlimited, gains, manipulated = np.zeros((3, count, count))
+    derived = np.zeros((count, count), dtype=bool)
     if signals.shape[1] < LEAST_SAMPLES:
         allowed = (by_name > 0.0) & ~np.eye(count, dtype=bool)
-        return _Comparison(names, 0.5 * by_name, unlimited, gains, derived, allowed, set_point, None, {})
-    moving = np.flatnonzero(average_middle(signals, 1).std(axis=1) > 0.0)
+        return _Comparison(names, 0.5 * by_name, unlimited, gains, derived, allowed, manipulated, None, {})
+    middle = average_middle(signals, 1)
+    # A smaller range is that of rounding errors.
+    moving = np.flatnonzero(np.ptp(middle, axis=1) > _ROUNDING * np.abs(middle).max(axis=1))
     found, at = estimate_direction(signals[moving]), np.ix_(moving, moving)
     unlimited[at], gains[at], derived[at] = found.logits, found.influence.visible, found.derived
-    set_point[at] = found.manipulated < 0.0
+    manipulated[at] = found.manipulated
     # Names show the roles of columns without a visible response only if they are sure.
     odds = by_name - _MOST_BY_SIGNALS
     odds[at] += np.clip(found.logits, -_MOST_BY_SIGNALS, _MOST_BY_SIGNALS) + _MOST_BY_SIGNALS
@@ -322,11 +331,11 @@ def _compare(names: list[str], columns: Sequence[NDArray[np.float64]]) -> _Compa
     allowed = next((each for each in candidates if each.any()), visible)
     allowed |= by_name > _MOST_BY_SIGNALS
     places = {int(place): at for at, place in enumerate(moving)}
-    return _Comparison(names, odds, unlimited, gains, derived, allowed, set_point, found.influence, places)
+    return _Comparison(names, odds, unlimited, gains, derived, allowed, manipulated, found.influence, places)
 
 
 def _prepare(columns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the middle of columns without missing values and gross errors, between -1 and 1."""
+    """Return the middle of columns without missing values and gross errors."""
     samples = min(len(values) for values in columns)
     first = max(0, samples - MOST_SAMPLES) // 2
     signals = np.array([values[first : min(samples, first + MOST_SAMPLES)] for values in columns])
@@ -335,8 +344,12 @@ def _prepare(columns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     if signals.shape[1] == 0:
         return signals
     low, high = signals.min(axis=1, keepdims=True), signals.max(axis=1, keepdims=True)
-    half = 0.5 * high - 0.5 * low
-    scaled: NDArray[np.float64] = (signals - (0.5 * high + 0.5 * low)) / np.where(half > 0.0, half, 1.0)
+    half, middle = 0.5 * high - 0.5 * low, 0.5 * high + 0.5 * low
+    # Squares of very large and very small numbers have no value; other columns keep their units.
+    is_usual = (half > _USUAL[0]) & (half < _USUAL[1]) & (np.abs(middle) < _USUAL[1])
+    scaled: NDArray[np.float64] = np.where(
+        is_usual, signals, (signals - middle) / np.where(half > 0.0, half, 1.0)
+    )
     return scaled
 
 

@@ -27,6 +27,10 @@ _COMPUTED = 1e-3
 #: Lags of the other columns that a controller or a logger may compute a column from.
 _COMPUTED_LAGS = 3
 
+#: Standard errors from which on a controller responds to a column; and changes of a set point, and the
+#: correlation of the output of the controller with them, at least.
+_SIGNIFICANT, _CHANGES, _AT_ONCE = 5.0, 5, 0.8
+
 #: Part of its increments that a part of the record must have to show whether the column is computed.
 _MOVING = 0.1
 
@@ -84,6 +88,27 @@ def is_derived(x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
     error = float(np.median(np.abs(target - matrix @ weights)))
     balance = abs(float(weights[:-1].sum())) <= _BALANCED * float(np.abs(weights[:-1]).sum())
     return bool(error <= _DERIVED * size and balance)
+
+
+def is_feedback(
+    x: NDArray[np.float64], set_point: NDArray[np.float64], measured: NDArray[np.float64]
+) -> bool:
+    """Return whether a column follows the increments of two others at once, with opposite signs.
+
+    A controller that acts on the difference of set point and measurement does; a response is later.
+    """
+    changes = np.diff(set_point)
+    at = np.flatnonzero(changes)
+    if at.size < _CHANGES or np.ptp(changes[at]) == 0.0 or np.ptp(np.diff(x)[at]) == 0.0:
+        return False
+    if abs(float(np.corrcoef(changes[at], np.diff(x)[at])[0, 1])) < _AT_ONCE:
+        return False
+    steps = np.column_stack([np.diff(set_point), np.diff(measured)])
+    steps /= np.maximum(steps.std(axis=0), np.finfo(np.float64).tiny)
+    target = np.diff(x)
+    weights = np.linalg.lstsq(steps, target, rcond=None)[0]
+    error = float(np.std(target - steps @ weights)) / np.sqrt(target.size)
+    return bool(np.abs(weights).min() > _SIGNIFICANT * error and weights[0] * weights[1] < 0.0)
 
 
 def find_computed(signals: NDArray[np.float64]) -> tuple[int, ...]:

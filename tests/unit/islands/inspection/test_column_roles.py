@@ -5,7 +5,7 @@ from column_roles import calibration_error
 
 from islands.inspection.column_roles import choose_columns, find_role, is_counter
 from support.known_records import delay, lag, steps, white
-from support.role_records import KINDS, make_record, make_records
+from support.role_records import KINDS, LOGGERS, make_logs, make_record, make_records
 
 
 def make(name="a", other="b", noise=0.05, seed=0):
@@ -117,6 +117,11 @@ def test_an_integral_is_a_response_if_nothing_else_is():
     assert (choice.inputs, choice.output) == (("b",), "a")
 
 
+def test_a_constant_column_does_not_matter():
+    choice = choose_columns(make() | {"u": np.full(3000, 0.1)}, (), "b")
+    assert choice.inputs == ("a",)
+
+
 def test_codes_of_missing_values_do_not_hide_a_response():
     columns = make()
     columns["b"][::100] = -9999.0
@@ -171,8 +176,8 @@ def test_numbers_at_the_ends_of_their_range(scale):
 @pytest.mark.ci
 def test_the_stated_probability_is_the_frequency_of_right_choices():
     """Columns of other systems than those that the weights are from, in random order without names."""
-    records = make_records(2, True, 5000)
-    assert len(records) == 2 * len(KINDS) >= 40
+    records = make_records(2, True, 5000) + make_logs(2, 5000)
+    assert len(records) == 2 * (len(KINDS) + len(LOGGERS)) >= 40
     choices = [choose_columns(record.columns) for record in records]
     right = [record.is_right(choice) for record, choice in zip(records, choices, strict=True)]
     assert np.mean(right) >= 0.9

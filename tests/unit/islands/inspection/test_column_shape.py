@@ -4,6 +4,7 @@ import pytest
 from islands.inspection.column_shape import (
     find_computed,
     is_derived,
+    is_feedback,
     measure_command,
     measure_noise_level,
     measure_precedence,
@@ -56,3 +57,11 @@ def test_columns_of_a_controller_determine_each_other():
     loop = np.array([set_point, manipulated, measured])
     assert find_computed(loop) == (0, 1, 2)
     assert find_computed(np.array([set_point, manipulated + 0.01 * white(800, 2), measured])) == ()
+
+
+def test_a_controller_with_rounded_columns_is_a_feedback_and_a_response_is_none():
+    set_point = steps(800, 0, 40)
+    measured = np.round(lag(set_point, 20.0) + 0.01 * white(800, 1), 2)
+    assert is_feedback(np.round(20.0 * (set_point - measured)), set_point, measured)
+    assert not is_feedback(2.0 * lag(set_point, 9.0), set_point, measured)
+    assert not is_feedback(white(800, 3), set_point, measured)
