@@ -14,7 +14,7 @@ import typer
 from rich.table import Table
 
 from islands.cli.console import output
-from islands.cli.engines import ray_pool
+from islands.cli.engines import check_engine, ray_pool
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.stop_requests import stop_requests
 from islands.errors import SettingsError, lookup
@@ -110,6 +110,7 @@ def trials(
             simulated, _select_effects(effects, simulated), counts, np.random.default_rng(seed)
         )
     ]
+    check_engine("ray")
     compile_kernels()
     found: list[TrialOutcome] = []
     with progress("trials") as show, stop_requests() as stop:

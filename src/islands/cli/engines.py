@@ -6,6 +6,7 @@ from importlib.metadata import entry_points
 from importlib.util import find_spec
 
 from islands.distribution import describe_missing_extra
+from islands.errors import SettingsError
 from islands.evolution.engine import Engine, SerialEngine
 from islands.facade.engine_choice import GROUP
 from islands.parallel import ParallelMap
@@ -59,6 +60,18 @@ def ray_pool(
 def has_ray() -> bool:
     """Return whether Ray is installed."""
     return find_spec("ray") is not None
+
+
+def check_engine(name: str) -> None:
+    """Check that the packages of an engine are installed, before the kernels are compiled.
+
+    Raises
+    ------
+    SettingsError
+        They are not.
+    """
+    if name == "ray" and not has_ray():
+        raise SettingsError(describe_missing_extra("the engine ray", "ray"))
 
 
 def serial_notice() -> str:

@@ -46,6 +46,7 @@ from islands.io.result_text.text_layout import wrap
 from islands.processes.pool import process_pool
 from islands.progress import Steps, StoppedError, report_part
 from islands.simulators.interface import Simulator
+from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import ColumnSpec, innermost, parse_spec
 
@@ -112,6 +113,8 @@ def diagnose(
             *(records, validation, options.columns(inputs), channels or [], column),
             *(output_column, dt, rows, reading),
         )
+        if isinstance(inner, FmuSpec):
+            inner.make_model()
     compile_kernels()
     with progress("diagnose", BEFORE_FORMULA * LEAST_FRACTION) as show:
         simulator = make_simulator(spec, data, columns)

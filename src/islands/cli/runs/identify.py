@@ -11,7 +11,7 @@ from typing import Any
 
 import islands
 from islands.cli.console import errors, output, print_message
-from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
+from islands.cli.engines import check_engine, default_engine, has_ray, serial_notice, start_engine
 from islands.cli.output_folder import show_result
 from islands.cli.progress_display import Display, compile_kernels, progress
 from islands.cli.recordings import Recordings, measured_names, state_extrapolation
@@ -108,9 +108,10 @@ def run(
     """
     possible = _resolve_possible(job)
     data, held_out, test_data = _read_data(job, max(each.maximum_lag for each in possible))
+    chosen = run_options.engine_for(possible[0].islands)
+    check_engine(chosen)
     folder.mkdir(parents=True, exist_ok=True)
     compile_kernels()
-    chosen = run_options.engine_for(possible[0].islands)
     if run_options.engine is None and possible[0].islands > 1 and not has_ray():
         print_message(serial_notice())
     with ExitStack() as handlers:
