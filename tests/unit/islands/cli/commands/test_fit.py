@@ -37,7 +37,7 @@ def test_a_missing_extra_is_reported_before_kernels_are_compiled(tmp_path, monke
         ("trials", ["--core", "second-order"], "ray"),
     ],
 )
-def test_a_missing_engine_or_library_of_a_simulation_is_reported_before_kernels_are_compiled(
+def test_a_missing_engine_or_simulator_is_reported_before_kernels_are_compiled(
     tmp_path, monkeypatch, command, options, extra
 ):
     monkeypatch.chdir(tmp_path)
