@@ -35,8 +35,8 @@ from islands.io.result_models import read_shooting_interval
 from islands.models.coupled_narx import CoupledModel
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
+from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands.validation.prediction_bands import PredictionBand
 from islands_service.domain.job import REPORT, Job
@@ -192,7 +192,7 @@ def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     data = found.split.validation
     bands = entry.bands
     band = None if bands is None else bands.predict(entry.model, data, warm_up=entry.warm_up)
-    run = free_run(entry.model, data, entry.warm_up)
+    run = simulate_freely(entry.model, data, entry.warm_up)
     made[f"{rank}/free-run.json"] = _free_run_document(data, run.y, run.outcome, band)
     return made
 

@@ -21,6 +21,7 @@ from islands.estimation.damped_least_squares import find_directions, inner_produ
 from islands.estimation.parameter_constraints import constrain_model
 from islands.estimation.shooting_residual import make_residual
 from islands.models.coupled_narx import AnyModel
+from islands.simulation.initial_outputs import estimate_initial_outputs
 from islands.simulation.outcome import EvaluationOutcome
 
 
@@ -66,6 +67,8 @@ def draw_parameters(
     directions = find_directions(theta, constrained)
     if isinstance(directions, EvaluationOutcome) or not directions.shape[1]:
         return repeated
+    if interval is None:
+        record = estimate_initial_outputs(model, record, warm_up)
     residual = make_residual(model, record, interval, warm_up)
     error = residual(theta)
     if error is None or not np.isfinite(error).all():

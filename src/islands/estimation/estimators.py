@@ -148,7 +148,8 @@ def _extend(
 def _simulate(
     start: FittedStructure, record: Dataset, constraints: str, warm_up: int | None, interval: int | None
 ) -> FittedStructure | EvaluationOutcome:
-    found = refine(start.model, record, interval, constraints, warm_up)
+    # Least squares may be far away from the minimum of the free run.
+    found = refine(start.model, record, interval, constraints, warm_up, max_steps=100)
     if isinstance(found, EvaluationOutcome):
         return found
     return FittedStructure(found.model, found.after)

@@ -202,7 +202,7 @@ def _minimise(
         for _ in range(_MAX_HALVINGS):
             candidate = parameters + step
             step = step / 2.0
-            if not _is_stable(candidate[len(regression.columns) :]):
+            if not is_stable(candidate[len(regression.columns) :]):
                 continue
             sensitivities, error = regression(candidate)
             smaller = dot(error, 0, error, 0, rows)
@@ -217,9 +217,14 @@ def _minimise(
     return parameters
 
 
-def _is_stable(noise: NDArray[np.float64]) -> bool:
-    """Return whether the roots of C lie inside the unit circle (the recursion of Schur and Cohn)."""
-    coefficients = noise
+def is_stable(coefficients: NDArray[np.float64]) -> bool:
+    """Return whether the roots of a polynomial lie inside the unit circle (the recursion of Schur and Cohn).
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (order,)
+        Coefficients of ``q^-1``, ``q^-2``, ... after the leading 1.
+    """
     while coefficients.size:
         reflection = coefficients[-1]
         if not abs(reflection) < 1.0:

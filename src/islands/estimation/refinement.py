@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar, cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from islands.data.compatibility import match_record
@@ -21,7 +22,13 @@ from islands.estimation.damped_least_squares import (
     mean_square,
 )
 from islands.estimation.parameter_constraints import constrain_model
-from islands.estimation.shooting_residual import BlockResidual, ShootingResidual, make_residual
+from islands.estimation.shooting_residual import (
+    BlockResidual,
+    FreeRunResidual,
+    ShootingResidual,
+    make_free_run_residual,
+    make_residual,
+)
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.protocol import DynamicModel
 from islands.simulation.outcome import EvaluationOutcome
@@ -35,7 +42,10 @@ _MIN_GAIN = 1e-8
 
 @dataclass(frozen=True, slots=True)
 class RefinedModel(Generic[M]):
-    """A refined model, its mean squared error before and after, and the number of accepted steps."""
+    """A refined model, its mean squared error before and after, and the number of accepted steps.
+
+    Changes of initial outputs count as errors, but not as samples.
+    """
 
     model: M
     before: float
@@ -49,27 +59,39 @@ class Refinement(Generic[M]):
     Parameters
     ----------
     model : DynamicModel or CoupledModel
-    residual : ShootingResidual or BlockResidual
+    residual : ShootingResidual or FreeRunResidual or BlockResidual
     minimisation : Minimisation
-    directions : ndarray, shape (terms, free)
+        Of the parameters, and of initial outputs after them.
+    directions : ndarray, shape (values, free)
         Directions along which the constraints hold.
     """
 
     def __init__(
         self,
         model: M,
-        residual: ShootingResidual | BlockResidual,
+        residual: ShootingResidual | FreeRunResidual | BlockResidual,
         minimisation: Minimisation,
         directions: NDArray[np.float64],
     ) -> None:
         self._model, self._residual, self._directions = model, residual, directions
         self.minimisation = minimisation
+        self._samples = minimisation.error.size - (len(directions) - len(model.parameters))
 
     @property
     def model(self) -> M:
         """Model with the parameters so far, without standard errors."""
-        found: M = self._model.with_parameters(self.minimisation.theta.tolist(), None)  # type: ignore[assignment]
+        found: M = self._model.with_parameters(self._theta.tolist(), None)  # type: ignore[assignment]
         return found
+
+    @property
+    def mean_squared_error(self) -> float:
+        """Squared errors and squared changes of initial outputs, for each predicted sample."""
+        error = self.minimisation.error
+        return mean_square(error) * error.size / self._samples
+
+    @property
+    def _theta(self) -> NDArray[np.float64]:
+        return self.minimisation.theta[: len(self._model.parameters)]
 
     def estimate_errors(self) -> M:
         """Return the model with the parameters so far and with their standard errors.
@@ -79,9 +101,10 @@ class Refinement(Generic[M]):
         found, directions = self.minimisation, self._directions
         jacobian = self._residual.differentiate(found.theta, directions)
         covariance = sandwich_of_jacobian(jacobian, found.error, self._residual.intervals)
+        directions = directions[: len(self._model.parameters)]
         squares = np.einsum("ti,ij,tj->t", directions, covariance, directions)
         errors = np.sqrt(np.maximum(squares, 0.0)).tolist()
-        refined: M = self._model.with_parameters(found.theta.tolist(), errors)  # type: ignore[assignment]
+        refined: M = self._model.with_parameters(self._theta.tolist(), errors)  # type: ignore[assignment]
         return refined
 
 
@@ -104,7 +127,8 @@ def refine(
         are refined together.
     record : Dataset or CoupledRecord
     interval : int or None
-        Length of a shooting interval in samples. None is the free run.
+        Length of a shooting interval in samples. None is the free run, whose initial outputs are estimated
+        with the parameters of a NARX model: their noise may have an effect on the whole run.
     constraints : str
         Statements of ``constraint``. The refined model meets them.
     warm_up : int or None
@@ -137,10 +161,10 @@ def refine(
     if isinstance(begun, EvaluationOutcome):
         return begun
     found = begun.minimisation
-    before = mean_square(found.error)
+    before = begun.mean_squared_error
     found.advance(max_steps, stop)
     refined = begun.estimate_errors() if standard_errors else begun.model
-    return RefinedModel(refined, before, mean_square(found.error), found.steps)
+    return RefinedModel(refined, before, begun.mean_squared_error, found.steps)
 
 
 def begin_refinement(
@@ -168,8 +192,16 @@ def begin_refinement(
     directions = find_directions(theta, constrained)
     if isinstance(directions, EvaluationOutcome):
         return directions
-    residual = make_residual(model, record, interval, warm_up)
-    error = residual(theta)
+    free = make_free_run_residual(model, record, warm_up) if interval is None else None
+    residual = free or make_residual(model, record, interval, warm_up)
+    if free is not None:
+        scale = np.std(np.asarray(record.y)) or 1.0
+        directions = scipy.linalg.block_diag(directions, scale * np.eye(free.changes))
+    terms, values = theta.size, np.append(theta, np.zeros(len(directions) - theta.size))
+    error = residual(values)
     assert error is not None, "the initial simulation did not diverge"
-    minimisation = Minimisation(residual, theta, error, directions, _MIN_GAIN, constrained.has_signs)
+    minimisation = Minimisation(
+        *(residual, values, error, directions, _MIN_GAIN),
+        lambda values: constrained.has_signs(values[:terms]),
+    )
     return Refinement(model, residual, minimisation, directions)

@@ -11,9 +11,16 @@ from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
 from islands.program.term_pool import link
 from islands.simulation.blocks import make_simulator
+from islands.simulation.initial_outputs import change_initial_outputs, count_segments
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound, find_divergence_bound
 from islands.simulation.sensitivities import make_sensitivities
+
+#: Step of a difference of initial outputs as a fraction of the output range.
+_STEP = 1e-4
+
+#: Largest number of initial outputs that are estimated with the parameters.
+_LARGEST_CHANGES = 64
 
 
 class ShootingResidual(Residual):
@@ -70,6 +77,76 @@ class ShootingResidual(Residual):
         )
 
 
+class FreeRunResidual(Residual):
+    """The error of the free run of a model as a function of its parameters and of the initial outputs.
+
+    The values are the parameters, followed by the changes of the outputs before the first prediction of every
+    segment. The initial outputs are measured, too: the changes are the last errors.
+
+    Parameters
+    ----------
+    model : Model
+        Model whose free parameters are passed to the calls.
+    record : Dataset
+        Record without missing outputs.
+    warm_up : int or None
+        Number of samples before the first prediction. None is the largest lag.
+    """
+
+    def __init__(self, model: Model, record: Dataset, warm_up: int | None) -> None:
+        self._model, self._record = model, record
+        self._first = model.maximum_lag if warm_up is None else warm_up
+        self._depth, self._segments = model.output_lag, count_segments(record, self._first)
+        self._step = _STEP * record.output_range
+        self._started = np.zeros(self.changes), ShootingResidual(model, record, None, warm_up)
+        #: Number of samples of every segment, in the order of time; then every initial output.
+        self.intervals = np.append(self._started[1].intervals, np.ones(self.changes, np.int64))
+
+    @property
+    def changes(self) -> int:
+        """Number of initial outputs."""
+        return self._segments * self._depth
+
+    def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return prediction minus measurement and the changes, or None after a divergence."""
+        parameters, changes = np.split(theta, [self._model.size])
+        error = self._start(changes)(parameters)
+        return None if error is None else np.append(error, changes)
+
+    def differentiate(
+        self, theta: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the derivatives along directions, shape (free, samples + changes)."""
+        terms = self._model.size
+        parameters, changes = np.split(theta, [terms])
+        slopes = self._start(changes).differentiate(parameters, np.eye(terms))
+        samples, ends = slopes.shape[1], np.cumsum(self.intervals[: self._segments])
+        derivatives = np.zeros((len(theta), samples + self.changes))
+        derivatives[:terms, :samples] = slopes
+        derivatives[terms:, samples:] = np.eye(self.changes)
+        for place in range(self._depth):
+            # A change in one segment has no effect on the others.
+            moved = np.zeros((self._segments, self._depth))
+            moved[:, place] = self._step
+            errors = [self._start(changes + sign * moved.ravel())(parameters) for sign in (1.0, -1.0)]
+            if errors[0] is None or errors[1] is None:
+                continue
+            slope = (errors[0] - errors[1]) / (2.0 * self._step)
+            for segment, (begin, end) in enumerate(zip((0, *ends[:-1]), ends, strict=True)):
+                derivatives[terms + segment * self._depth + place, begin:end] = slope[begin:end]
+        along: NDArray[np.float64] = np.einsum("tf,tk->fk", directions, derivatives)
+        return along
+
+    def _start(self, changes: NDArray[np.float64]) -> ShootingResidual:
+        """Return the residual from changed initial outputs."""
+        if not np.array_equal(changes, self._started[0]):
+            record = change_initial_outputs(
+                self._record, changes.reshape(self._segments, self._depth), self._first
+            )
+            self._started = changes, ShootingResidual(self._model, record, None, self._first)
+        return self._started[1]
+
+
 class BlockResidual(Residual):
     """The simulation error of the block of a model as a function of its parameters.
 
@@ -121,6 +198,17 @@ class BlockResidual(Residual):
             ((run - self._y) / self._scales).T.reshape(-1) if (np.abs(run) <= self._bounds).all() else None
             for run in runs
         ]
+
+
+def make_free_run_residual(model: AnyModel, record: AnyRecord, warm_up: int | None) -> FreeRunResidual | None:
+    """Return the error of the free run with its initial outputs as parameters.
+
+    None if the model is not a NARX model of one output, or if there are none or more than 64 initial outputs.
+    """
+    if not (isinstance(model, Model) and isinstance(record, Dataset)):
+        return None
+    residual = FreeRunResidual(model, record, warm_up)
+    return residual if 0 < residual.changes <= _LARGEST_CHANGES else None
 
 
 def make_residual(

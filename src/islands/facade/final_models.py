@@ -11,6 +11,7 @@ from islands.data.split import Split
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.estimators import estimate_with
+from islands.estimation.output_error import fit_output_error
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import Refinement, begin_refinement, refine
 from islands.estimation.structure_selection.deviations import Offsets, estimate_deviations, subtract_offsets
@@ -21,11 +22,13 @@ from islands.evolution.individual import Individual, unique_structures
 from islands.evolution.problem import Problem
 from islands.evolution.search_result import rank_models
 from islands.evolution.settings import Settings
+from islands.facade.trials.library import make_trial_library
 from islands.models.narx import require_narx
 from islands.models.protocol import DynamicModel
 from islands.progress import Steps
+from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import free_run, free_run_error, multiple_shooting
+from islands.simulation.predictors import free_run_error, multiple_shooting
 from islands.validation.assessment import Assessment, assess
 from islands.validation.ensemble import ValidatedModel
 
@@ -156,7 +159,23 @@ def estimate_candidates(
             count = count[::-1]
         kept = screen(compared, validation, settings.maximum_lag, *count)
         found += _estimate_models(kept, settings, split, offsets, steps)
-    return found
+    # A search without a model reports why it has none.
+    return [*found, *_fit_simulations(settings, split, steps)] if found else []
+
+
+def _fit_simulations(settings: Settings, split: Split, steps: Steps) -> list[Candidate]:
+    """Return the linear models that minimise the error of the free run, if the settings refine parameters."""
+    library = make_trial_library(settings)
+    is_other = settings.select == "fitness" or settings.estimator not in ("", "free-run")
+    if (
+        not (settings.library and library.has_simulations and settings.refine)
+        or is_other
+        or steps.skip(_REFINEMENT)
+    ):
+        return []
+    fitted = fit_output_error(split.estimation, library.delays, library.lags, settings.max_terms)
+    models = [each.model for each in fitted]
+    return _without_diverged(_validate(models, None, split.validation, settings.maximum_lag))
 
 
 def _evaluate_structures(hall_of_fame: HallOfFame, problem: Problem) -> tuple[Individual, ...]:
@@ -309,7 +328,7 @@ def _validate(
 ) -> list[Candidate]:
     """Simulate models on the validation data and return them, least error first."""
     validated = (
-        ValidatedModel(model, interval, free_run(model, validation, warm_up).mean_squared_error)
+        ValidatedModel(model, interval, simulate_freely(model, validation, warm_up).mean_squared_error)
         for model in models
     )
     return sorted(validated, key=lambda entry: entry.order)

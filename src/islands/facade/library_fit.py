@@ -19,6 +19,7 @@ from islands.estimation.forward_selection import (
     select_forward,
     select_pool,
 )
+from islands.estimation.output_error import fit_output_error
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.certificate import SubsetSearch, combine_certificates
 from islands.estimation.structure_selection.deviations import (
@@ -61,6 +62,9 @@ _SCREENED = 150
 
 #: Name of the step that computes bounds on the error of all models.
 CERTIFICATES = "bounds of the errors of all models"
+
+#: Estimators to which linear models of the free run are added: others state the noise.
+_SIMULATING = "least-squares", "free-run"
 
 #: Name of the step that fits a library again.
 _REFIT = "fit of better subsets"
@@ -212,6 +216,9 @@ def fit_library(
     exchange = bool(settings.certificate)
     structures, searches, started, warm_up = _select(split, rated, swaps, exchange, subsets, steps)
     models, outcomes = _estimate(structures, split, settings, swaps, warm_up, steps)
+    simulated = _fit_simulations(split, rated, settings, swaps, warm_up, steps)
+    models += simulated
+    outcomes["ok"] += len(simulated)
     best_of_size: dict[int, Assessment] = {}
     for ranked in rank_models(models):
         best_of_size.setdefault(ranked.model.size, ranked)
@@ -235,7 +242,11 @@ def fit_library(
     result = SearchResult(record, split, seed, described, search, tuple(best_of_size.values()))
     minimised = ESTIMATORS[settings.estimator].interval(interval)
     estimates = [
-        ValidatedModel(entry.model, minimised, entry.metrics["validation"]["free_run"].rmse ** 2)
+        ValidatedModel(
+            entry.model,
+            None if entry in simulated else minimised,
+            entry.metrics["validation"]["free_run"].rmse ** 2,
+        )
         for entry in models
     ]
 
@@ -298,6 +309,24 @@ def _estimate(
             "record"
         )
     return models, outcomes
+
+
+def _fit_simulations(
+    split: Split, library: TrialLibrary, settings: FitSettings, swaps: Settings, warm_up: int, steps: Steps
+) -> list[Assessment]:
+    """Return the linear models that minimise the error of the free run, and not that of one step.
+
+    Measurement noise hides slow modes from the one-step-ahead error, by which structures are selected.
+    """
+    if not library.has_simulations or settings.estimator not in _SIMULATING:
+        return []
+    steps.report("linear models of the free run", None)
+    if steps.skip("linear models of the free run"):
+        return []
+    return [
+        assess(found.model, split, swaps.shooting, warm_up, library.constraints)
+        for found in fit_output_error(split.estimation, library.delays, library.lags, settings.max_terms)
+    ]
 
 
 def _describe_outcomes(outcomes: Mapping[str, int]) -> str:

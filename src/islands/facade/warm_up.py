@@ -16,6 +16,7 @@ from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
+from islands.estimation.output_error import fit_output_error
 from islands.estimation.structure_selection.certificate import SubsetSearch
 from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.presets import resolve_settings
@@ -83,6 +84,7 @@ def _use_all_kernels() -> None:
             changes: SettingChanges = {**SMALL, "constraints": constraints}
             identify(record, preset="hysteresis", **changes)
     fit(record, library="phi-polynomial", max_terms=3)
+    fit_output_error(record)
     _simulate_two_outputs(record)
 
 
@@ -105,6 +107,7 @@ def use_other_kernels() -> None:
         row_address(primitive)
     free_run(model, record)
     estimate(model.regressors, record)
+    fit_output_error(record)
     _simulate_two_outputs(record)
 
 

@@ -19,7 +19,7 @@ from islands.figures.hysteresis_loop import draw_loop, draw_loop_panel
 from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
 from islands.models.protocol import DynamicModel
-from islands.simulation.predictors import free_run
+from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.assessment import Assessment, assess_residual
 from islands.validation.predictable_residual import ResidualStructure
 from islands.validation.prediction_bands import PredictionBands
@@ -34,11 +34,11 @@ RecordFigure = Callable[[DynamicModel, Dataset, int, PredictionBands | None], Fi
 
 def _free_run_on(model: DynamicModel, record: Dataset, warm_up: int, bands: PredictionBands | None) -> Figure:
     band = None if bands is None else bands.predict(model, record, warm_up=warm_up)
-    return draw_free_run(record, free_run(model, record, warm_up).y, band=band)
+    return draw_free_run(record, simulate_freely(model, record, warm_up).y, band=band)
 
 
 def _loop_on(model: DynamicModel, record: Dataset, warm_up: int, _bands: PredictionBands | None) -> Figure:
-    return draw_loop(record, free_run(model, record, warm_up).y)
+    return draw_loop(record, simulate_freely(model, record, warm_up).y)
 
 
 def _hold_on(model: DynamicModel, record: Dataset, _warm_up: int, _bands: PredictionBands | None) -> Figure:
@@ -101,7 +101,7 @@ def draw_record_figure(
         raise SettingsError(
             f"the figure {kind} has several panels: leave ax out, or take {', '.join(PANELS)}"
         )
-    PANELS[kind](ax, record, free_run(model, record, warm_up).y)
+    PANELS[kind](ax, record, simulate_freely(model, record, warm_up).y)
     return cast("Figure", ax.get_figure(root=True))
 
 

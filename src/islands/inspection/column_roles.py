@@ -325,8 +325,8 @@ def _compare(names: list[str], columns: Sequence[NDArray[np.float64]]) -> _Compa
     visible = gains > 0.0
     # The integral of a column that responds to no other one is a counter, such as a charge, and no output. If
     # nothing else is visible, one of two columns is the integral of the other as its response.
-    responds = (visible & ~derived & ~derived.T & (unlimited > 0.0)).any(axis=0)
-    counters = (derived & ~responds[:, None]).any(axis=0)
+    responds = np.any(visible & ~derived & ~derived.T & (unlimited > 0.0), axis=0, keepdims=True)
+    counters = np.any(derived & ~responds.T, axis=0)
     candidates = (visible & ~derived & ~counters, visible & ~derived, visible)
     allowed = next((each for each in candidates if each.any()), visible)
     allowed |= by_name > _MOST_BY_SIGNALS

@@ -149,6 +149,7 @@ def _model_document(
             for part, by_name in assessment.recordings.items()
         },
         "warm_up": assessment.warm_up,
+        "estimated_start": assessment.has_estimated_start,
         "information": asdict(assessment.information),
         "constraints": [
             {**asdict(entry), "named": named_statement(entry.text, require_narx(model))}

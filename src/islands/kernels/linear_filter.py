@@ -40,6 +40,39 @@ def _low_pass(x, weights, decay, y):
         before, here, after = here, after, later
 
 
+@kernel
+def _divide_rows(a, x, ends, y):
+    """Divide every row of ``x`` by ``1 + a1 q^-1 + ...``, from rest at the start of every segment."""
+    for row in range(x.shape[0]):
+        begin = 0
+        for segment in range(ends.size):
+            for k in range(begin, ends[segment]):
+                value = x[row, k]
+                for n in range(min(a.size, k - begin)):
+                    value -= a[n] * y[row, k - 1 - n]
+                y[row, k] = value
+            begin = ends[segment]
+
+
+def divide_rows(a, x, ends):
+    """Divide series by ``1 + a1 q^-1 + a2 q^-2 + ...``, from rest at the start of every segment.
+
+    Parameters
+    ----------
+    a : ndarray, shape (order,)
+    x : ndarray, shape (series, samples)
+    ends : ndarray of int64, shape (segments,)
+        Sample after the last one of every segment.
+
+    Returns
+    -------
+    ndarray, shape (series, samples)
+    """
+    y = np.empty_like(x)
+    _divide_rows(np.ascontiguousarray(a), np.ascontiguousarray(x), ends, y)
+    return y
+
+
 def filter_linearly(b, a, x, state=None):
     """Filter a signal by ``(b0 + b1 q^-1 + ...) / (1 + a1 q^-1 + ...)``.
 

@@ -114,6 +114,11 @@ class Model:
         return max(item.maximum_lag for item in self.regressors)
 
     @property
+    def output_lag(self) -> int:
+        """Number of past outputs that the model reads."""
+        return max((lag for item in self.regressors for channel, lag in item.lags if channel == 0), default=0)
+
+    @property
     def parameters(self) -> tuple[float, ...]:
         """Parameters of an estimated model.
 

@@ -14,8 +14,9 @@ from islands.errors import RecordError
 from islands.estimation.constraints.checks import ConstraintCheck, check_constraints
 from islands.estimation.parameter_constraints import count_free_parameters
 from islands.models.protocol import DynamicModel
+from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import Simulation, multiple_shooting
+from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure
@@ -58,6 +59,12 @@ class Checks:
     def residual(self) -> tuple[ResidualTests, ResidualStructure]:
         """Tests of the residuals on the validation data; see `assess_residual`."""
         return assess_residual(self._model, self._split.validation, self._warm_up)
+
+    @cached_property
+    def has_estimated_start(self) -> bool:
+        """Whether the free run on the validation data starts from estimated outputs."""
+        validation = self._split.validation
+        return estimate_initial_outputs(self._model, validation, self._warm_up) is not validation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,6 +126,11 @@ class Assessment:
         """Predictable part of the residuals on the same recording, and a verdict."""
         return self.checks.residual[1]
 
+    @property
+    def has_estimated_start(self) -> bool:
+        """Whether the free run on the validation data starts from estimated outputs."""
+        return self.checks.has_estimated_start
+
 
 def assess(
     model: DynamicModel, split: Split, shooting: int, warm_up: int | None = None, constraints: str = "none"
@@ -147,13 +159,17 @@ def assess(
         The warm-up is shorter than the model's largest lag, the interval is less than 1, the estimation data
         has too few samples for the number of free parameters, or the constraint is unknown.
     """
-    intervals = dict(zip(MODES, (1, shooting, None), strict=True))
     errors: dict[str, dict[str, Metrics]] = {}
     outcomes: dict[str, dict[str, EvaluationOutcome]] = {}
     recordings: dict[str, dict[str, Metrics]] = {}
     runs: dict[str, dict[str, Simulation]] = {}
     for part, record in zip(PARTS, (split.estimation, split.validation), strict=True):
-        found = {mode: multiple_shooting(model, record, m, warm_up) for mode, m in intervals.items()}
+        simulated = (
+            one_step_ahead(model, record, warm_up),
+            multiple_shooting(model, record, shooting, warm_up),
+            simulate_freely(model, record, warm_up),
+        )
+        found = dict(zip(MODES, simulated, strict=True))
         outcomes[part] = {mode: run.outcome for mode, run in found.items()}
         errors[part] = {
             mode: metrics(record.y, run.y) if run.outcome else _UNDEFINED for mode, run in found.items()
@@ -218,7 +234,7 @@ def assess_residual(
     first = model.maximum_lag if warm_up is None else warm_up
     recording = _find_longest_recording(record, first)
     samples = recording.samples - first
-    runs = [multiple_shooting(model, recording, interval, warm_up) for interval in (1, None)]
+    runs = [one_step_ahead(model, recording, warm_up), simulate_freely(model, recording, warm_up)]
     one_step, simulated = ((recording.y - run.y)[first:] if run.outcome else None for run in runs)
     structure = measure_structure(
         one_step, simulated, recording.u[first:], recording.y[first:], record.output_range

@@ -25,6 +25,7 @@ from islands.data.split import Split
 from islands.estimation.block_bootstrap import draw_parameters
 from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
+from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
 from islands.simulation.predictors import free_run, free_runs
 
 M = TypeVar("M", bound=AnyModel)
@@ -152,7 +153,10 @@ class Ensemble:
         runs = []
         for each in self.structures:
             first = max(warm_up, each.model.maximum_lag)
-            found = free_runs(each.model, each.parameters, record, first)
+            # The members of a structure start from the same outputs, those of its first member.
+            member = each.model.with_parameters(each.parameters[0].tolist())
+            given = estimate_initial_outputs(member, record, first)
+            found = free_runs(each.model, each.parameters, given, first)
             for begin, end in record.bounds:
                 started = slice(begin, min(begin + first, end))
                 found[:, started] = record.y[started]
@@ -230,8 +234,9 @@ def make_ensemble(
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(position,)))
         drawn = draw_parameters(model, split.estimation, candidate.interval, constraints, warm_up, count, rng)
         # The divergence of a member gives NaN, which is not plausible either.
-        predicted = find_predicted(free_run(model, split.validation, warm_up).y)
-        runs = free_runs(model, drawn, split.validation, warm_up)
+        started = estimate_initial_outputs(model, split.validation, warm_up)
+        predicted = find_predicted(free_run(model, started, warm_up).y)
+        runs = free_runs(model, drawn, started, warm_up)
         errors = mean_squares(split.validation, runs, predicted)
         plausible = errors <= _IMPLAUSIBLE * candidate.error + floor
         members = drawn[plausible] if plausible.any() else np.array([model.parameters])
@@ -294,7 +299,7 @@ def _find_laws(models: Sequence[AnyModel], record: AnyRecord, warm_up: int) -> l
 
     A model that contains all terms of the shorter one is another law: it states a further effect.
     """
-    runs = [free_run(model, record, warm_up).y for model in models]
+    runs = [simulate_freely(model, record, warm_up).y for model in models]
     ranges = (
         np.array(record.output_range)
         if isinstance(record, Dataset)
@@ -336,7 +341,7 @@ def _weigh(
     """
     if not candidates:
         return []
-    best = free_run(candidates[0].model, validation, warm_up).y
+    best = simulate_freely(candidates[0].model, validation, warm_up).y
     residual = (validation.y - best)[find_predicted(best)]
     count = sum(map(effective_samples, np.atleast_2d(residual.T)))
     errors = np.array([candidate.error for candidate in candidates]) + floor

@@ -25,6 +25,7 @@ from islands.data.split import Split
 from islands.errors import SettingsError, check_numbers
 from islands.models.coupled_narx import CoupledModel
 from islands.models.protocol import DynamicModel
+from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import Ensemble, effective_samples
 
@@ -107,7 +108,7 @@ class PredictionBands:
             The record does not match the model, or is too short for it or for a member of the ensemble.
         """
         first = model.maximum_lag if warm_up is None else warm_up
-        run = free_run(model, record, first).y
+        run = simulate_freely(model, record, first).y
         return self.band(run, self.ensemble.simulate(record, first), level)
 
     def band(
@@ -171,7 +172,7 @@ def calibrate_bands(
     ]
 
     def calibrate(model: DynamicModel) -> PredictionBands | None:
-        simulated = [free_run(model, record, warm_up) for record, _ in parts]
+        simulated = [simulate_freely(model, record, warm_up) for record, _ in parts]
         if not all(run.outcome for run in simulated):
             return None
         outputs = [

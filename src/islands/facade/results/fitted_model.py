@@ -264,13 +264,14 @@ class FittedModel:
     ) -> NDArray[np.float64]:
         """Return the free run of the model, one value for every row of the data.
 
-        It starts from the first samples of the output, as many as the largest lag of the model. `simulate`
-        starts later, after the warm-up of `metrics`.
+        It starts from the first samples of the output, as many as the largest lag of the model. If their
+        noise has an effect on the whole run, they are estimated from the first samples that are known: the
+        first 100 of a segment, or the first tenth. `simulate` starts later, after the warm-up of `metrics`.
 
         Parameters
         ----------
         record : Dataset, data frame or array
-            Inputs, and the output, of which only the first samples are used; the rest may be missing.
+            Inputs, and the output, of which only the first samples are used; others may be missing.
         y, dt, inputs, output
             As in `as_record`. By default the columns and the sampling time are those of the model.
 
@@ -298,7 +299,8 @@ class FittedModel:
     ) -> Simulation:
         """Simulate the model on a record.
 
-        On the validation data, the errors of the simulation are those in `metrics`.
+        On the validation data, the errors of the simulation are those in `metrics`. A free run starts as that
+        of `predict`.
 
         Parameters
         ----------

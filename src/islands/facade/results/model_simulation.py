@@ -12,8 +12,9 @@ from islands.errors import RecordError, SettingsError, lookup, suggest
 from islands.io.data_frames import as_record, column_names, states_time
 from islands.io.records.column_names import find_column
 from islands.models.protocol import DynamicModel
+from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import Simulation, free_run, multiple_shooting
+from islands.simulation.predictors import Simulation, multiple_shooting
 
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
@@ -67,7 +68,10 @@ def simulate(
     interval = lookup(intervals, mode, "mode")
     if isinstance(model, DynamicModel):
         record = record_of_model(model, record)
-        return multiple_shooting(model, match_rate(model, record), interval, warm_up)
+        record = match_rate(model, record)
+        if interval is None:
+            return simulate_freely(model, record, warm_up)
+        return multiple_shooting(model, record, interval, warm_up)
     if interval is not None:
         raise SettingsError(f"a simulator has no mode {mode!r}: take free-run")
     # Import the simulators of the discrepancy analysis only if they are used.
@@ -139,7 +143,7 @@ def predict(model: DynamicModel, record: Dataset, warm_up: int | None = None) ->
         The record does not match the model, is too short, or its output is missing in the warm-up.
     """
     data = match_rate(model, record)
-    simulated = free_run(model, data, warm_up).y
+    simulated = simulate_freely(model, data, warm_up).y
     if data is record:
         return simulated
     predicted = np.full(record.samples, np.nan)

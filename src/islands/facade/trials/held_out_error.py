@@ -14,6 +14,7 @@ from islands.estimation.forward_selection import (
     select_forward,
     select_pool,
 )
+from islands.estimation.output_error import fit_output_error
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.deviations import (
     OPERATING_POINT,
@@ -26,6 +27,7 @@ from islands.evolution.swap_search import swap_search
 from islands.facade.trials.library import TrialLibrary
 from islands.models.regressor import Regressor
 from islands.progress import Steps, StoppedError
+from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run_error
 
@@ -83,6 +85,24 @@ def measure_library(
     """
     checked = steps or Steps()
     return tuple(_find_least_error(split, library, checked) ** 0.5 for split in splits)
+
+
+def measure_output_error(splits: Sequence[Split], library: TrialLibrary) -> tuple[float, ...]:
+    """Return the root mean squared error of the best linear model of the free run on each held-out part.
+
+    It is infinite without such a model. The measure is for libraries of polynomials without constraints.
+    """
+    return tuple(
+        min(
+            (
+                simulate_freely(found.model, split.validation).mean_squared_error ** 0.5
+                for found in fit_output_error(split.estimation, library.delays, library.lags, _SWAP_TERMS)
+                if split.validation.samples > found.model.maximum_lag
+            ),
+            default=inf,
+        )
+        for split in splits
+    )
 
 
 def _find_least_error(split: Split, library: TrialLibrary, steps: Steps) -> float:

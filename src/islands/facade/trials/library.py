@@ -33,6 +33,11 @@ class TrialLibrary:
         shooting = None if self.shooting is None else count_means(self.shooting, count)
         return replace(self, shooting=shooting, delays=tuple(delay // count for delay in self.delays))
 
+    @property
+    def has_simulations(self) -> bool:
+        """Whether linear models that minimise the error of the free run belong to the library."""
+        return self.name == "polynomial" and self.constraints == "none"
+
     def with_delays(self, delays: Sequence[int]) -> "TrialLibrary":
         """Return the library with other dead times."""
         return replace(self, delays=tuple(delays))

@@ -421,7 +421,9 @@ def _describe_error(facts: ResultFacts) -> str:
         parts.append(f"mean absolute error {free['mape']:.3g} % of the output range")
     if free["r2"] is not None:
         parts.append(f"R2 {free['r2']:.5f}")
-    head = f"Error: free run on the validation data, from the inputs alone, {', '.join(parts)}"
+    estimated = facts.model.get("estimated_start", False)
+    start = "and initial outputs estimated from its first samples" if estimated else "alone"
+    head = f"Error: free run on the validation data, from the inputs {start}, {', '.join(parts)}"
     return f"{head}; one step ahead {_describe_one_step(facts)}."
 
 

@@ -6,9 +6,9 @@ from scipy.signal import lfilter
 
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.extended_least_squares import (
-    _is_stable,
     _NoiseRegression,
     extended_least_squares,
+    is_stable,
 )
 from islands.estimation.least_squares import least_squares
 from islands.simulation.outcome import Status
@@ -128,4 +128,4 @@ def test_sensitivities_are_the_derivatives_of_the_prediction():
 @pytest.mark.parametrize("roots", [[0.5], [-0.95, 0.3], [1.05, 0.2], [0.9j, -0.9j], [1.1j, -1.1j], [-1.2]])
 def test_stability_agrees_with_the_roots(roots):
     coefficients = np.real(np.poly(roots))[1:]
-    assert _is_stable(coefficients) == (np.abs(roots).max() < 1.0)
+    assert is_stable(coefficients) == (np.abs(roots).max() < 1.0)

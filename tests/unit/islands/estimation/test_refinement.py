@@ -100,7 +100,11 @@ def test_refinement_never_increases_the_error_and_keeps_constraints(seed, interv
     assert found.before == pytest.approx(simulated.mean_squared_error, rel=1e-12)
     assert found.after <= found.before
     after = multiple_shooting(found.model, record, interval)
-    assert found.after == pytest.approx(after.mean_squared_error, rel=1e-12)
+    if interval is None:
+        # The least error from any initial outputs is not larger than that from the measured ones.
+        assert found.after <= after.mean_squared_error * (1.0 + 1e-6)
+    else:
+        assert found.after == pytest.approx(after.mean_squared_error, rel=1e-12)
     if constraints == "hysteresis":
         assert all(abs(entry.sum - entry.target) < 1e-9 for entry in cluster_sums(found.model))
         assert found.model.parameters[0] != start.parameters[0] or interval == 1

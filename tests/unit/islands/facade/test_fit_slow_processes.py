@@ -1,0 +1,47 @@
+"""Fits of processes with slow modes, which measurement noise hides from the one-step-ahead error."""
+
+import numpy as np
+import pytest
+
+import islands
+from islands.simulation.predictors import free_run
+from support.slow_processes import BATTERY_NOISE, BATTERY_POLE, TANK_NOISE, make_battery, make_tank
+
+
+def error(result):
+    return result.best.metrics["validation"]["free_run"].rmse
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("library", ["auto", "polynomial"])
+def test_level_of_a_tank_has_the_two_terms_of_its_law(library):
+    result = islands.fit(make_tank(1, 600), library=library)
+    assert result.best.model.parameter_names == ("y(k-1)", "u1(k-1)")
+    assert result.best.model.theta == pytest.approx((1.0, 0.02), abs=3e-4)
+    assert error(result) < 1.15 * TANK_NOISE
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", range(1, 4))
+def test_free_run_of_a_battery_has_the_error_of_the_noise(seed):
+    result = islands.fit(make_battery(seed))
+    assert error(result) < 0.0006
+    model = result.best.model
+    assert model.size == 5
+    assert np.sort(np.roots([1.0, *(-value for value in model.theta[:2])])) == pytest.approx(
+        [BATTERY_POLE, 1.0], abs=1e-3
+    )
+
+
+@pytest.mark.ci
+def test_simulation_of_a_battery_has_the_error_that_the_result_states():
+    result = islands.fit(make_battery(1, 2000), library="polynomial", degree=1, feedthrough="yes")
+    validation = result.search_result.split.validation
+    run = result.best.simulate(validation)
+    assert run.mean_squared_error**0.5 == pytest.approx(error(result), rel=1e-9)
+    assert error(result) < 1.2 * BATTERY_NOISE
+    measured = free_run(result.best.model, validation, result.best.warm_up)
+    assert measured.mean_squared_error**0.5 > 5.0 * BATTERY_NOISE
+    assert "and initial outputs estimated from its first samples, RMSE" in " ".join(str(result).split())
+    band = result.best.bands(validation)
+    assert np.nanmax(band.upper - band.y) < 10.0 * BATTERY_NOISE

@@ -1,0 +1,105 @@
+"""Initial outputs of a free run: estimated where their noise matters, and measured elsewhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import join
+from islands.expressions.parsing import parse
+from islands.models.narx import make_model
+from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
+from islands.simulation.predictors import free_run
+from support.slow_processes import TANK_NOISE, make_tank
+
+TANK = make_model([(parse("y(k-1)"), 1.0), (parse("u(k-1)"), 0.02)], ("q",), "h")
+
+
+def law(**terms):
+    return make_model([(parse(text), value) for text, value in terms.items()], ("q",), "h")
+
+
+def rmse(run):
+    return run.mean_squared_error**0.5
+
+
+def test_free_run_of_an_integrator_has_the_error_of_the_noise():
+    measured, estimated = [], []
+    for seed in range(20):
+        record = make_tank(seed, 400)
+        measured.append(rmse(free_run(TANK, record)))
+        estimated.append(rmse(simulate_freely(TANK, record)))
+    assert max(estimated) < 1.15 * TANK_NOISE
+    assert max(measured) > 1.8 * TANK_NOISE
+
+
+def test_only_the_outputs_before_the_first_prediction_change():
+    record = make_tank(5, 400)
+    started = estimate_initial_outputs(TANK, record, 3)
+    assert started is not record
+    assert np.flatnonzero(started.y != record.y).tolist() == [2]
+    assert abs(started.y[2] - record.y[2]) < 4.0 * TANK_NOISE
+
+
+def test_initial_outputs_are_estimated_for_each_segment():
+    record = join((make_tank(5, 300), make_tank(6, 200)))
+    started = estimate_initial_outputs(TANK, record)
+    assert np.flatnonzero(started.y != record.y).tolist() == [0, 300]
+    alone = [estimate_initial_outputs(TANK, make_tank(seed, count)) for seed, count in ((5, 300), (6, 200))]
+    assert started.y == pytest.approx(np.concatenate([each.y for each in alone]), abs=1e-12)
+
+
+def test_samples_after_the_first_part_have_no_influence():
+    record = make_tank(5, 400)
+    later = np.array(record.y)
+    later[200:] += 0.002
+    started = [estimate_initial_outputs(TANK, each).y[0] for each in (record, replace(record, y=later))]
+    assert started[0] == pytest.approx(started[1], abs=1e-12)
+
+
+def test_record_without_noise_is_not_changed():
+    record = make_tank(0, 400, noise=0.0)
+    assert estimate_initial_outputs(TANK, record) is record
+
+
+def test_initial_outputs_of_a_model_that_forgets_them_are_the_measured_ones():
+    record = make_tank(0, 400)
+    model = law(**{"y(k-1)": 0.5, "u(k-1)": 0.02})
+    assert estimate_initial_outputs(model, record) is record
+
+
+def test_error_of_a_wrong_model_is_not_taken_for_noise():
+    record = make_tank(0, 400, noise=1e-5)
+    wrong = law(**{"y(k-1)": 1.0, "u(k-1)": 0.01})
+    assert estimate_initial_outputs(wrong, record) is record
+
+
+def test_known_outputs_are_used_and_missing_ones_are_not_needed():
+    record = make_tank(5, 400)
+    y = np.array(record.y)
+    y[60:] = np.nan
+    some = estimate_initial_outputs(TANK, replace(record, y=y))
+    assert some.y[0] == pytest.approx(1.0, abs=0.5 * TANK_NOISE)
+    y[1:] = np.nan
+    first_only = replace(record, y=y)
+    assert estimate_initial_outputs(TANK, first_only) is first_only
+
+
+def test_initial_outputs_of_a_nonlinear_model_are_estimated():
+    # A logistic growth without input; its initial value shifts the curve in time.
+    model = law(**{"y(k-1)": 1.02, "y(k-1)^2": -0.02})
+    record = make_tank(0, 600)
+    y = np.empty(600)
+    y[0] = 0.02
+    for k in range(1, 600):
+        y[k] = 1.02 * y[k - 1] - 0.02 * y[k - 1] ** 2
+    noisy = replace(record, y=y + np.random.default_rng(1).normal(0, 0.005, 600))
+    assert rmse(simulate_freely(model, noisy)) < 1.1 * 0.005
+    assert rmse(free_run(model, noisy)) > 2.0 * 0.005
+
+
+def test_diverging_free_run_starts_from_the_measured_outputs():
+    record = make_tank(0, 400)
+    model = law(**{"y(k-1)": 1.2, "u(k-1)": 0.02})
+    assert estimate_initial_outputs(model, record) is record
+    assert not simulate_freely(model, record).outcome
