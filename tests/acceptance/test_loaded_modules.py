@@ -19,7 +19,7 @@ finally:
 LIMITS = {
     "--version": (280, ""),
     "fit --help": (700, ""),
-    "inspect {record}": (535, ""),
+    "inspect {record}": (538, ""),
     "jobs --help": (870, ""),
     "jobs list --url http://127.0.0.1:9": (820, ""),
     "show published:13": (925, "numba scipy"),
