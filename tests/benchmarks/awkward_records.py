@@ -6,8 +6,8 @@ Each file holds a measurement of a known law. `islands fit` reads it by defaults
 that `islands inspect` suggests if that has other options. A result is right if the RMSE of its free run, on a
 test record that is sampled correctly and has no fault, is at most 1.2 times that of the true structure, whose
 parameters minimise the error of the free run on the record without faults. Otherwise it is announced if the
-file is refused with a remedy or the verdict on the use as a simulation is not "good", and silently wrong if
-not. Exit status 1 if a result is silently wrong.
+file is refused with a remedy, the verdict on the use as a simulation is not "good", or the output is stated
+to be perhaps saturated, and silently wrong if not. Exit status 1 if a result is silently wrong.
 """
 
 import argparse

@@ -81,7 +81,7 @@ def fit(
     words += f"{verdict[1].strip() if verdict else ''}; {fails[1] if fails else ''}"
     if ratio <= CLOSE:
         return Outcome(RIGHT, ratio, "")
-    is_good = verdict is None or verdict[1].startswith("good")
+    is_good = (verdict is None or verdict[1].startswith("good")) and "may be saturated" not in printed
     return Outcome(SILENT if is_good else ANNOUNCED, ratio, words)
 
 

@@ -10,7 +10,10 @@ from islands.data.channel_names import AT_ONCE, parse_unit
 from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_inputs
 from islands.errors import RecordError, name_option
+from islands.inspection.channel import channels
 from islands.inspection.gross_errors import find_gross_errors, find_input_codes
+from islands.inspection.quantisation import find_quantisation
+from islands.inspection.saturation import find_saturation
 from islands.io.records.column_names import (
     find_column,
     list_inputs,
@@ -44,6 +47,9 @@ from islands.io.records.validation import (
     check_values,
     check_varies,
 )
+
+#: Known samples of an output of which it is stated that it may be saturated, at least.
+_LEAST_SATURATED = 100
 
 
 def read_table(
@@ -120,6 +126,8 @@ def read_table(
         note = find_time_scale(source, columns).note
         found = replace(found, steps=(*([note] if note else []), *found.steps))
     record = _make_record(found, sources, output, structures, columns.units, file)
+    if output is not None and (note := _describe_saturation(record)):
+        record = replace(record, reading=(*record.reading, note))
     return advance_inputs(record, _find_advanced(inputs, sources))
 
 
@@ -241,6 +249,20 @@ def exclude_gross_errors(
         numbers[output] = y
         excluded.append(f"gross errors of {output}: {errors.describe(columns.rows.row)}")
     return replace(columns, numbers=numbers), tuple(excluded)
+
+
+def _describe_saturation(record: Dataset) -> str:
+    """Return that the output is flat at an extreme; empty if it is not, or if its samples are few.
+
+    A limited output and the output of a system at its limit look the same, so that the samples are used.
+    """
+    channel = channels(record)[-1]
+    if channel.known.size < _LEAST_SATURATED or np.ptp(channel.known) == 0.0:
+        return ""
+    fact = find_saturation(channel, find_quantisation(channel))
+    if not fact.value:
+        return ""
+    return f"{fact.sentence.removesuffix('.')}; these samples are used"
 
 
 def _repair(

@@ -102,3 +102,11 @@ def test_an_input_that_is_a_signal_is_read_at_the_samples_of_a_slow_output(tmp_p
     assert np.allclose(record.u[:, 1], simulated[::10], atol=1e-6)
     assert np.allclose(record.u[:, 0], u.reshape(-1, 10).mean(axis=1), atol=1e-6)
     assert "with the value at each for s, with the mean from each to the next for u" in record.reading[0]
+
+
+def test_an_output_that_is_flat_at_an_extreme_is_stated(tmp_path):
+    file = write(tmp_path / "r.csv", y=np.minimum(Y, np.quantile(Y, 0.9)))
+    (note,) = read_record(file, ["u"], "y").reading
+    assert note.startswith("y is flat at its maximum 14.21")
+    assert note.endswith("in 9.7 % of the samples: it may be saturated; these samples are used")
+    assert read_record(write(tmp_path / "s.csv"), ["u"], "y").reading == ()
