@@ -17,6 +17,7 @@ from islands.data.dataset import Dataset
 from islands.data.split import Split, average_split
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import forward_selection
+from islands.estimation.output_error import fit_output_error
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import RefinedModel, refine
 from islands.estimation.structure_selection.deviations import (
@@ -29,8 +30,9 @@ from islands.facade.trials.library import TrialLibrary
 from islands.inspection.oversampling import COUNTS, is_noisy, keeps_bandwidth
 from islands.models.narx import Model
 from islands.progress import Steps
+from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import Simulation, free_run
+from islands.simulation.predictors import Simulation
 
 #: Samples are averaged if the error is at most this fraction of the error without averaging.
 CLEAR_GAIN = 0.8
@@ -152,10 +154,12 @@ def compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[n
     pool = library.screen(estimation)
     structures = forward_selection(pool, estimation, library.constraints, _TERMS)
     warm_up = max(item.maximum_lag for item in pool)
-    estimated = (
+    estimated: list[FittedStructure | EvaluationOutcome] = [
         estimate(structure, estimation, library.constraints, warm_up, standard_errors=False)
         for structure in (() if isinstance(structures, EvaluationOutcome) else structures)
-    )
+    ]
+    if library.has_simulations:
+        estimated += fit_output_error(estimation, library.delays, library.lags, _TERMS)
     best = min(_simulate(estimated, validation, warm_up), key=_squared_error, default=None)
     if best is None:
         return np.full(sum(length // count for length in validation.segments), inf)
@@ -175,7 +179,7 @@ def _simulate(
     """Yield the estimated models and their free runs on the validation data, except for diverging ones."""
     for found in estimated:
         if not isinstance(found, EvaluationOutcome):
-            run = free_run(found.model, validation, warm_up)
+            run = simulate_freely(found.model, validation, warm_up)
             if isfinite(run.mean_squared_error):
                 yield found.model, run
 
