@@ -371,6 +371,7 @@ class _FileInspection:
     ) -> tuple[InspectedColumn, ...]:
         inputs = {find_column(name, self.table.names) for name in choice.inputs}
         roles: dict[str | None, str] = {
+            self.table.clocks.get(self.found.time or ""): "date",
             self.found.time: "time",
             choice.output: "output",
             **dict.fromkeys(inputs, "input"),

@@ -103,6 +103,9 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
     if own and dt is None and seconds is not None and (common := common_step(clocks)) is not None:
         # The rows are those of several clocks, and irregular for this reason.
         dt, sampling_problem = float(f"{common * seconds:.12g}"), ""
+    if time is not None and time in table.clocks:
+        # The column of the dates is read with that of the time of day.
+        problems[table.clocks[time]] = ""
     for name, column in columns.items():
         problems.setdefault(name, _find_problem(column, name, name == time, name in own))
     warnings = (

@@ -165,3 +165,16 @@ def test_text_has_80_columns(tmp_path):
         lines = [line for line in text.splitlines() if "very_long" not in line and str(tmp_path) not in line]
         assert max(map(len, lines)) <= WIDTH
         assert "Next:" in text
+
+
+def test_a_column_of_dates_is_read_with_that_of_the_time_of_day(tmp_path):
+    """It was stated as unusable, with the advice to rename it."""
+    lines = ["Datum;Uhrzeit;u;y"]
+    lines += [
+        f"0{2 + k // 30}.03.2026;{'23:59' if k < 30 else '00:00'}:{2 * (k % 30):02d};{k % 7};{k % 5}"
+        for k in range(60)
+    ]
+    (tmp_path / "r.txt").write_text("\n".join(lines) + "\n")
+    found = islands.inspect_record(tmp_path / "r.txt")
+    assert [(column.role, column.problem) for column in found.columns[:2]] == [("date", ""), ("time", "")]
+    assert found.sampling.dt == 2.0
