@@ -20,6 +20,7 @@ EXCLUSIVE = (
     (r"the residual is a rounding error", r"[%] of the free-run residual is predictable"),
     (r"the free run on the validation data diverges", r"Good for: [^.]*simulation from the inputs alone"),
     (r"the free run on the validation data diverges", r"times that on the estimation data"),
+    (r"As a simulation: good", r"(on|of) the estimation data (diverges|is [\d.e+]+ times)"),
     (r"every term has an inclusion probability", r"doubtful terms"),
     (r"every term has an inclusion probability", r"models without .* are about as good"),
     (r"diverges in \d+ of \d+ holds", r"Good for: [^.]*bounded at inputs held"),

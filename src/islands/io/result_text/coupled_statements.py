@@ -8,6 +8,7 @@ from islands.io.result_text.statements import (
     RunFacts,
     Statement,
     describe_error_level,
+    describe_estimation_error,
     describe_excess,
     describe_insignificant,
     describe_unexplained_error,
@@ -197,6 +198,11 @@ OUTPUT_FAILURES: Final[tuple[Statement[OutputFacts], ...]] = (
         "error-ratio",
         lambda output: output.generalises_poorly,
         lambda output: f"{output.name}: {describe_excess(output)}",
+    ),
+    Statement(
+        "estimation-error",
+        lambda output: output.fits_poorly,
+        lambda output: f"{output.name}: {describe_estimation_error(output)}",
     ),
 )
 

@@ -4,10 +4,11 @@ Each statement has a name, a predicate on the document and a sentence. Every tex
 them, so that a run, its folder, the REST service, the report and a notebook state the same.
 """
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import floor
+from math import floor, inf
 from typing import Any, Final, Generic, TypeVar
 
 from islands.data.preprocessing_steps import Preprocessing
@@ -31,6 +32,9 @@ _LARGE_RATIO = 2.0
 #: Ratio of the free-run error and that one step ahead below which the free run is better.
 _BETTER = 0.95
 
+#: Ratio of the errors on estimation data and validation data above which the latter is too favourable.
+_LARGE_INVERSE_RATIO = 3.0
+
 #: RMSE as a fraction of the output range that is a rounding error: its ratio to another one says nothing.
 _ROUNDING = 1e-6
 
@@ -48,6 +52,9 @@ _UNLIKELY = 0.5
 
 #: Closure of a loop, in per cent of the output range, above which the loop is open.
 _OPEN_PERCENT = 5.0
+
+#: Regressor that is linear in the signals, or a constant.
+_SIGNAL = re.compile(r"[uy]\d*\(k[^()]*\)|[-\d.]+")
 
 #: Where to look for missing terms, by correlation test.
 _HINTS = {
@@ -172,6 +179,19 @@ class RunFacts:
         return float(validated / estimated)
 
     @property
+    def inverse_ratio(self) -> float:
+        """Error on the estimation data divided by that on the validation data; infinite if it diverges."""
+        estimated, validated = (self.error(part=part)["rmse"] for part in ("estimation", "validation"))
+        if not validated or (estimated is not None and self.is_rounding(estimated)):
+            return 0.0
+        return inf if estimated is None else float(estimated / validated)
+
+    @property
+    def fits_poorly(self) -> bool:
+        """Whether the error on the estimation data is much larger than that on the validation data."""
+        return self.inverse_ratio > _LARGE_INVERSE_RATIO
+
+    @property
     def generalises_poorly(self) -> bool:
         """Whether the error on the validation data is much larger than that on the estimation data."""
         return self.error_ratio > _LARGE_RATIO
@@ -227,10 +247,16 @@ class ResultFacts(RunFacts):
 
         The measured past then makes the prediction one step ahead worse than an adequate free run.
         """
-        if self.document["settings"].get("estimator") != "least-squares":
+        # Linear models that minimise the error of the free run are among the candidates.
+        if self.document["settings"].get("estimator") != "least-squares" or self._is_linear:
             return False
         is_adequate = not self.has_structure and not exceeds_limit(self.share("free_run"))
         return is_adequate and all(map(self._is_free_run_better, ("estimation", "validation")))
+
+    @property
+    def _is_linear(self) -> bool:
+        """Whether every term is a signal or a constant."""
+        return all(_SIGNAL.fullmatch(term["regressor"]) for term in self.model["terms"])
 
     def _is_free_run_better(self, part: str) -> bool:
         """Return whether the free run is clearly better than the prediction one step ahead."""
@@ -531,6 +557,14 @@ def describe_unexplained_error(facts: RunFacts) -> str:
     )
 
 
+def describe_estimation_error(facts: RunFacts) -> str:
+    """State how much larger the free-run error on the estimation data is than that on the validation data."""
+    ratio = facts.inverse_ratio
+    if ratio == inf:
+        return "the free run on the estimation data diverges"
+    return f"the free-run error on the estimation data is {ratio:.2g} times that on the validation data"
+
+
 def describe_excess(facts: RunFacts) -> str:
     """State how much larger the free-run error on the validation data is than that on the estimation data."""
     ratio = f"{facts.error_ratio:.2g}"
@@ -791,6 +825,7 @@ FAILURES: Final[tuple[Statement[ResultFacts], ...]] = (
         ),
     ),
     Statement("error-ratio", lambda facts: facts.generalises_poorly, describe_excess),
+    Statement("estimation-error", lambda facts: facts.fits_poorly, describe_estimation_error),
     Statement(
         "extrapolation",
         lambda facts: facts.extrapolation,
