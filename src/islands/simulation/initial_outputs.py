@@ -103,7 +103,7 @@ def estimate_initial_outputs(model: AnyModel, record: AnyRecord, warm_up: int | 
         return record
     first = model.maximum_lag if warm_up is None else warm_up
     # A warm-up that is too short, or a model without parameters, is an error of the free run.
-    if model.theta is None or first < model.maximum_lag:
+    if model.theta is None or not isinstance(first, int) or first < model.maximum_lag:
         return record
     return _estimate(model, record, first)
 

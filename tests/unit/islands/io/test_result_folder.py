@@ -69,7 +69,16 @@ def test_a_result_has_every_field_of_the_contract(findings):
         assert list(model) == [
             *("rank", "recommended", "size", "equation", "latex", "signals", "named_equation"),
             *("named_signals", "terms", "bands", "metrics"),
-            *("outcomes", "recordings", "warm_up", "information", "constraints", "physics", "residual_tests"),
+            *(
+                "outcomes",
+                "recordings",
+                "warm_up",
+                "estimated_start",
+                "information",
+                "constraints",
+                "physics",
+            ),
+            "residual_tests",
         ]
         for term in model["terms"]:
             assert list(term) == ["regressor", "parameter", "standard_error", "term", "inclusion"]
