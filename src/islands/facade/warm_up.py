@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,6 +15,7 @@ import numpy as np
 from islands.available_cpus import count_cpus
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
+from islands.errors import ExtrapolationWarning
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
 from islands.estimation.output_error import fit_output_error
@@ -71,7 +73,9 @@ def warm_up(report: Callable[[str], None] = print) -> bool:
     bool
         Whether kernels had to be compiled.
     """
-    return ready(_use_all_kernels, report)
+    # The record of the kernels is none of the user.
+    with warnings.catch_warnings(action="ignore", category=ExtrapolationWarning):
+        return ready(_use_all_kernels, report)
 
 
 def _use_all_kernels() -> None:

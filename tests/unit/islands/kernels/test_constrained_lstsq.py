@@ -30,6 +30,9 @@ from islands.program.regressor_matrix import arrange_rows, gram_matrix, regresso
 from islands.program.term_pool import link
 from islands.simulation.outcome import OK
 
+# The kernels are compiled with the types of these tests; the evaluation of structures tests them as well.
+pytestmark = pytest.mark.ci
+
 seeds = st.integers(0, 2**32 - 1)
 
 #: Required sums of the groups.

@@ -16,6 +16,9 @@ from islands.simulators.specification.table import ColumnSpec, LinearSpec, Model
 from support.equation_programs import OCTAVE, compare, extend, list_effects, run_c, run_matlab
 from support.simulated_records import MODEL_SPEC, recorded, wave
 
+# Every program is compiled.
+pytestmark = pytest.mark.ci
+
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 needs_octave = pytest.mark.skipif(OCTAVE is None, reason="no octave-cli: install Octave to run the MATLAB")
 

@@ -18,6 +18,9 @@ from support.block_cases import OF_BLOCKS, OF_STATES, block_case
 from support.exported_programs import needs_compiler, run_fmu
 from support.programs import HOSTILE_NAMES, model
 
+# Every FMU is compiled.
+pytestmark = pytest.mark.ci
+
 FORMATS = ("fmu", "fmu2")
 
 #: Blocks that are simulated for every change; others are at the nightly level.

@@ -12,6 +12,9 @@ from islands.simulators.fmu.fmi_description import read_description
 from islands.systems.published_models import PUBLISHED
 from support.oscillator_fmus import write_oscillator
 
+# The library of FMUs is imported, which takes seconds.
+pytestmark = pytest.mark.ci
+
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 
 #: Attributes that FMI 1.0 requires.

@@ -23,7 +23,11 @@ from islands.simulators.ode.program import generate_program
 from islands.simulators.ode.sampled_signal import interpolate_linearly
 from support.oscillator_fmus import write_oscillator
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
+# The library of FMUs is imported and compiled for, which takes seconds.
+pytestmark = [
+    pytest.mark.ci,
+    pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc"),
+]
 
 DT = 0.005
 T = DT * np.arange(300)

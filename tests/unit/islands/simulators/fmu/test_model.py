@@ -9,6 +9,9 @@ from islands.errors import SettingsError
 from islands.simulators.fmu.fmi_description import FmiDescription, FmiInterface, FmiVariable
 from islands.simulators.fmu.model import MAX_DEFAULT_PARAMETERS, FmuParameterChoice, choose_variables
 
+# The library of FMUs is imported, which takes seconds.
+pytestmark = pytest.mark.ci
+
 
 def describe(**changes: Any) -> FmiDescription:
     given: dict[str, Any] = {

@@ -31,7 +31,11 @@ from islands.simulators.specification.factory import make_simulator
 from support.oscillator_fmus import write_oscillator
 from support.simulated_records import DT, EQUATIONS, FMUS, MODEL, recorded, simulate_oscillator, wave
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
+# The library of FMUs is imported and compiled for, which takes seconds.
+pytestmark = [
+    pytest.mark.ci,
+    pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc"),
+]
 
 Array = NDArray[np.float64]
 

@@ -35,7 +35,11 @@ from islands.simulators.specification.factory import make_simulator
 from support.oscillator_fmus import write_oscillator
 from support.simulated_records import FMUS, recorded, wave
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
+# The library of FMUs is imported and compiled for, which takes seconds.
+pytestmark = [
+    pytest.mark.ci,
+    pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc"),
+]
 
 Array = NDArray[np.float64]
 

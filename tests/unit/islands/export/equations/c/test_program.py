@@ -26,6 +26,9 @@ from islands.simulators.specification.table import LocalExtendedSpec
 from support.equation_programs import compare, extend, fix_states, list_effects, run_c
 from support.simulated_records import EQUATIONS, made, recorded, wave
 
+# Every program is compiled.
+pytestmark = pytest.mark.ci
+
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 
 BUILT_IN = ("second-order", "cascaded-tanks", "rigid-axis", "bouc-wen-piezo")
