@@ -15,6 +15,8 @@ from islands.evolution.problem import make_problem
 from islands.simulation.outcome import Status
 from support.searches import SMALL, exactly, islands_of, record
 
+pytestmark = pytest.mark.ci
+
 GENERATIONS = 9
 
 #: Settings under which some individuals fail.

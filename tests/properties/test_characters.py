@@ -21,6 +21,8 @@ from support.migrations import (
 )
 from support.searches import exactly, islands_of
 
+pytestmark = pytest.mark.ci
+
 every_profile = pytest.mark.parametrize("profile", ISLAND_PROFILES)
 
 #: Settings that a profile may change. None of them affects the model or fitness of an individual.

@@ -32,6 +32,8 @@ from support.migrations import (
 )
 from support.searches import SMALL, exactly
 
+pytestmark = pytest.mark.ci
+
 
 def expected(island, arriving):
     """Return the expected immigrants: the first of every new structure, in the order of the sources."""

@@ -18,7 +18,7 @@ from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LinearSpec
 from support.simulated_records import SAMPLES, made, name_parameters
 
-pytestmark = pytest.mark.usefixtures("toy_class")
+pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("toy_class")]
 
 #: First sample of every recording, and the sample after the last.
 EDGES = (0, 250, 330, SAMPLES)

@@ -29,7 +29,7 @@ from islands.simulators.ode import simulator as ode
 from islands.simulators.specification.table import SIMULATORS, PhysicalSpec
 from support.simulated_records import made, name_parameters, names
 
-pytestmark = pytest.mark.usefixtures("toy_class")
+pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("toy_class")]
 
 #: Classes of the simulators that are not physical systems; those of "held" and "terms" are
 #: inside an extension.

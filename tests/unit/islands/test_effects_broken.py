@@ -13,6 +13,8 @@ from islands.errors import SettingsError
 from support.built_in_simulators import make_piezo
 from support.simulated_records import recorded, wave
 
+pytestmark = pytest.mark.ci
+
 
 @pytest.fixture(scope="module")
 def record() -> Dataset:

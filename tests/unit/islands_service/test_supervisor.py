@@ -16,6 +16,8 @@ import pytest
 from islands_service.supervisor import DataDirLockedError, folder_lock
 from support.processes import alive, eventually
 
+pytestmark = pytest.mark.ci
+
 #: Runs roles until it ends, with some constants of the supervisor changed.
 DRIVER = """
 import json, os, signal, sys

@@ -8,6 +8,8 @@ import pytest
 from islands.figures.monte_carlo import MonteCarloGroup, ScanLine, draw_groups, draw_scan
 from islands.figures.themes import THEMES
 
+pytestmark = pytest.mark.ci
+
 
 def make_group(label, diverged=0, **changes):
     errors = list(np.linspace(1.0, 3.0, 10))

@@ -18,6 +18,8 @@ from islands.simulators.ode.program import generate_program
 from islands.simulators.ode.sampled_signal import SampledSignal
 from islands.simulators.ode.system_document import make_system
 
+pytestmark = pytest.mark.ci
+
 Array = NDArray[np.float64]
 
 #: Mass of the oscillator.

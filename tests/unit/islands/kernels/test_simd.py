@@ -26,6 +26,8 @@ from islands.kernels.simd import (
     write,
 )
 
+pytestmark = pytest.mark.ci
+
 #: Numbers of vectors for which the operations are compiled.
 COUNTS = (1, 13, *(pytest.param(count, marks=pytest.mark.nightly) for count in (3, 4)))
 

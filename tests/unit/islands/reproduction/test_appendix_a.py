@@ -32,6 +32,8 @@ from islands.reproduction.tasks import ReproductionOptions
 from islands.systems import appendix
 from islands.systems.appendix import SOFT_VARIANCE
 
+pytestmark = pytest.mark.ci
+
 
 def make_runs(count, unstable=0, size=10, prediction=1.0):
     return [

@@ -22,7 +22,7 @@ from support.stores import CANCELLED, FAILED, FOUND, brought_on
 
 SPEC = {"inputs": ["u_V"], "output": "y_um"}
 
-pytestmark = pytest.mark.usefixtures("quick")
+pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("quick")]
 
 #: Generations that a job reports between its claim and its end.
 GENERATIONS = range(1, 7)

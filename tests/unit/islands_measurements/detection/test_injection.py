@@ -15,6 +15,8 @@ from islands_measurements.detection.injection.plant import Force, simulate_plant
 from islands_measurements.detection.injection.rig import Rig
 from islands_measurements.detection.injection.tanks import TANKS, Tanks
 
+pytestmark = pytest.mark.ci
+
 #: Every system, with the length of a short record in seconds.
 SYSTEMS = {"piezo": (PIEZO, 5.0), "oscillator": (OSCILLATOR, 4.0), "tanks": (TANKS, 2048.0)}
 

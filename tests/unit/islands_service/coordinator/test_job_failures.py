@@ -23,6 +23,8 @@ from support.coordinators import DONE, replace_runner, wait_until_finished
 from support.processes import eventually
 from support.stores import ALICE, contents
 
+pytestmark = pytest.mark.ci
+
 Coordinators = Callable[..., Thread]
 
 

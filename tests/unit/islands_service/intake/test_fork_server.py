@@ -9,6 +9,8 @@ from islands_service.intake.confined_process import REQUESTS, make_message
 from islands_service.intake.fork_server import _PRELOADED
 from islands_service.intake.reader_process import open_memory
 
+pytestmark = pytest.mark.ci
+
 #: Prints what a forked process has before its confinement: open files, environment, modules, threads.
 STATE = """
 import json, os, sys

@@ -10,6 +10,8 @@ import pytest
 from islands_service.intake.reader_process import open_memory
 from support.processes import alive, descendants, eventually, kill
 
+pytestmark = pytest.mark.ci
+
 #: Reads a file of the first argument until it is killed.
 CLIENT = """
 import sys

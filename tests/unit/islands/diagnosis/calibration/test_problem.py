@@ -18,6 +18,8 @@ from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec
 from support.simulated_records import made, recorded, wave
 
+pytestmark = pytest.mark.ci
+
 SPRING = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})
 
 

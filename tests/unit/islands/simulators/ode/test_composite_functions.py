@@ -11,6 +11,8 @@ from islands.simulators.ode.program import generate_program
 from islands.simulators.ode.sampled_signal import interpolate_linearly
 from islands.simulators.ode.system_document import make_system
 
+pytestmark = pytest.mark.ci
+
 
 def evaluate(function: str, argument: np.ndarray) -> np.ndarray:
     """Return a function of the input of a system whose state is constant."""

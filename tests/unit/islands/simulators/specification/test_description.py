@@ -33,7 +33,7 @@ from islands.simulators.specification.table import (
 )
 from support.simulated_records import SpecAndRecord, made, name_parameters, names
 
-pytestmark = pytest.mark.usefixtures("toy_class")
+pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("toy_class")]
 
 NAMES = names()
 

@@ -19,6 +19,8 @@ from islands_service.store.monitor_states import STATE_SCHEMA
 from islands_service.store.tables import metadata
 from support.stores import ALICE, BOB, asked, child, contents, kinds, submitted
 
+pytestmark = pytest.mark.ci
+
 #: Written by `dump.py` when each revision was the last one.
 DUMPS = Path(__file__).parent
 

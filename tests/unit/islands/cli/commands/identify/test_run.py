@@ -19,6 +19,8 @@ from islands.io.checkpoints import read_checkpoint, state_document, write_checkp
 from islands.io.records import write_record
 from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models, record, refused
 
+pytestmark = pytest.mark.ci
+
 # Stopped and resumed.
 
 

@@ -17,6 +17,8 @@ from islands.simulators.ode.program import OdeProgram, generate_program
 from islands.simulators.ode.sampled_signal import interpolate_linearly, make_time
 from islands.simulators.ode.system_document import make_system
 
+pytestmark = pytest.mark.ci
+
 DT, SAMPLES = 0.01, 200
 TIME = DT * np.arange(SAMPLES)
 FORCE = 3.0 * np.sin(7.0 * TIME) + 2.0 * np.cos(3.1 * TIME)
