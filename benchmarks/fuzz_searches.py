@@ -32,7 +32,7 @@ from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.result import Diagnosis
-from islands.errors import IslandsError
+from islands.errors import ExtrapolationWarning, IslandsError
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.results.identification import Result
@@ -382,6 +382,8 @@ def run_case(case: Case) -> Ending:
         # The matrices are small: several threads take more time.
         with warnings.catch_warnings(), threadpool_limits(1, user_api="blas"):
             warnings.simplefilter("error")
+            # A warning about the data of a case is none about the code.
+            warnings.simplefilter("ignore", ExtrapolationWarning)
             check_result(case.run())
     except IslandsError as error:
         outcome = type(error).__name__

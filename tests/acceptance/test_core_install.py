@@ -111,7 +111,7 @@ def test_a_simulation_is_diagnosed(folder):
         ),
         (
             ("identify", "record.csv", *COLUMNS, *SEARCH, "--engine", "ray", "--out", "never"),
-            "islands identify needs the extra 'ray'",
+            "the engine ray needs the extra 'ray'",
         ),
     ],
 )
