@@ -180,7 +180,7 @@ def count_segments(record: Dataset, first: int) -> int:
     return sum(end - begin > first for begin, end in record.bounds)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def _perturb(record: Dataset, depth: int, first: int, step: float) -> Dataset:
     """Return copies of a record: unchanged, and with one initial output of every segment changed."""
     segments = count_segments(record, first)

@@ -16,7 +16,7 @@ _OVERHEAD_LANES = 24
 
 
 # The layouts of recent calls are kept: a search simulates many models on few records, which never change.
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def layout(
     record: Dataset, warm_up: int, interval: int | None = None, widths: tuple[int, ...] | None = None
 ) -> Layout:
