@@ -23,6 +23,7 @@ from contextlib import contextmanager, suppress
 from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
+from threading import Lock
 from typing import Any, ClassVar
 
 import numba
@@ -216,15 +217,23 @@ class _Cache(FunctionCache):
             super().save_overload(sig, data)
 
 
+#: Held while Numba's folder of caches is set.
+_setting = Lock()
+
+
 @contextmanager
 def _numba_caches_in(folder: Path) -> Iterator[None]:
-    """Set the folder of the caches created in this context; Numba reads its setting at their creation."""
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(folder)
-    try:
-        yield
-    finally:
-        config.CACHE_DIR = before
+    """Set the folder of the caches created in this context; Numba reads its setting at their creation.
+
+    The setting is that of the process, so that threads wait for each other.
+    """
+    with _setting:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(folder)
+        try:
+            yield
+        finally:
+            config.CACHE_DIR = before
 
 
 @contextmanager

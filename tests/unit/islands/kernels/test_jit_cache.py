@@ -8,11 +8,14 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from numba.core import config
 
 import islands
+from islands.kernels import jit_cache
 from support.forks import Fork, fork_server
 from support.kernel_processes import Start, get_output, process_starter, start_interpreter, wait_for_file
 
@@ -379,3 +382,17 @@ def test_cache_folder_may_be_deleted_at_any_time(start, moment):
     assert get_output(start(code, moment)) == [True, 3.0, moment == "before"]
     assert get_output(start(code, "never"))[0] is (moment != "before")
     assert get_output(start(code, "never")) == [False, 3.0, True]
+
+
+def test_threads_create_their_caches_one_after_the_other(tmp_path):
+    """A folder that another thread had reset was the current one: kernels were stored in it."""
+    before, folders = config.CACHE_DIR, [tmp_path / str(count) for count in range(8)]
+
+    def read(folder):
+        with jit_cache._numba_caches_in(folder):
+            time.sleep(0.002)
+            return config.CACHE_DIR
+
+    with ThreadPoolExecutor(len(folders)) as threads:
+        assert list(threads.map(read, folders)) == list(map(str, folders))
+    assert before == config.CACHE_DIR
