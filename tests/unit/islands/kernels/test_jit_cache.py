@@ -12,10 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from numba.core import config
 
 import islands
-from islands.kernels import jit_cache
 from support.forks import Fork, fork_server
 from support.kernel_processes import Start, get_output, process_starter, start_interpreter, wait_for_file
 
@@ -386,6 +384,9 @@ def test_cache_folder_may_be_deleted_at_any_time(start, moment):
 
 def test_threads_create_their_caches_one_after_the_other(tmp_path):
     """A folder that another thread had reset was the current one: kernels were stored in it."""
+    from islands.kernels import jit_cache  # Numba takes a second
+
+    config = jit_cache.config
     before, folders = config.CACHE_DIR, [tmp_path / str(count) for count in range(8)]
 
     def read(folder):
