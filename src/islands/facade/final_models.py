@@ -11,7 +11,6 @@ from islands.data.split import Split
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.estimators import estimate_with
-from islands.estimation.output_error import fit_output_error
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import Refinement, begin_refinement, refine
 from islands.estimation.structure_selection.deviations import Offsets, estimate_deviations, subtract_offsets
@@ -173,8 +172,7 @@ def _fit_simulations(settings: Settings, split: Split, steps: Steps) -> list[Can
         or steps.skip(_REFINEMENT)
     ):
         return []
-    fitted = fit_output_error(split.estimation, library.delays, library.lags, settings.max_terms)
-    models = [each.model for each in fitted]
+    models = [each.model for each in library.fit_simulations(split.estimation, settings.max_terms)]
     return _without_diverged(_validate(models, None, split.validation, settings.maximum_lag))
 
 

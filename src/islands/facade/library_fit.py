@@ -19,7 +19,6 @@ from islands.estimation.forward_selection import (
     select_forward,
     select_pool,
 )
-from islands.estimation.output_error import fit_output_error
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.certificate import SubsetSearch, combine_certificates
 from islands.estimation.structure_selection.deviations import (
@@ -325,7 +324,7 @@ def _fit_simulations(
         return []
     return [
         assess(found.model, split, swaps.shooting, warm_up, library.constraints)
-        for found in fit_output_error(split.estimation, library.delays, library.lags, settings.max_terms)
+        for found in library.fit_simulations(split.estimation, settings.max_terms)
     ]
 
 

@@ -14,7 +14,6 @@ from islands.estimation.forward_selection import (
     select_forward,
     select_pool,
 )
-from islands.estimation.output_error import fit_output_error
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.deviations import (
     OPERATING_POINT,
@@ -90,13 +89,13 @@ def measure_library(
 def measure_output_error(splits: Sequence[Split], library: TrialLibrary) -> tuple[float, ...]:
     """Return the root mean squared error of the best linear model of the free run on each held-out part.
 
-    It is infinite without such a model. The measure is for libraries of polynomials without constraints.
+    It is infinite without such a model.
     """
     return tuple(
         min(
             (
                 simulate_freely(found.model, split.validation).mean_squared_error ** 0.5
-                for found in fit_output_error(split.estimation, library.delays, library.lags, _SWAP_TERMS)
+                for found in library.fit_simulations(split.estimation, _SWAP_TERMS)
                 if split.validation.samples > found.model.maximum_lag
             ),
             default=inf,

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from islands.data.averaging import count_means
 from islands.data.dataset import Dataset
 from islands.errors import check_integers
+from islands.estimation.estimate import FittedStructure
+from islands.estimation.output_error import fit_output_error
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.settings import Settings
@@ -37,6 +39,12 @@ class TrialLibrary:
     def has_simulations(self) -> bool:
         """Whether linear models that minimise the error of the free run belong to the library."""
         return self.name == "polynomial" and self.constraints == "none"
+
+    def fit_simulations(self, record: Dataset, max_terms: int) -> list[FittedStructure]:
+        """Fit the linear models that minimise the error of the free run; none if the library has none."""
+        if not self.has_simulations:
+            return []
+        return fit_output_error(record, self.delays, self.lags, max_terms)
 
     def with_delays(self, delays: Sequence[int]) -> "TrialLibrary":
         """Return the library with other dead times."""

@@ -17,7 +17,6 @@ from islands.data.dataset import Dataset
 from islands.data.split import Split, average_split
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import forward_selection
-from islands.estimation.output_error import fit_output_error
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import RefinedModel, refine
 from islands.estimation.structure_selection.deviations import (
@@ -158,8 +157,7 @@ def compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[n
         estimate(structure, estimation, library.constraints, warm_up, standard_errors=False)
         for structure in (() if isinstance(structures, EvaluationOutcome) else structures)
     ]
-    if library.has_simulations:
-        estimated += fit_output_error(estimation, library.delays, library.lags, _TERMS)
+    estimated += library.fit_simulations(estimation, _TERMS)
     best = min(_simulate(estimated, validation, warm_up), key=_squared_error, default=None)
     if best is None:
         return np.full(sum(length // count for length in validation.segments), inf)
