@@ -10,9 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from support.known_laws import Measurement, Signal
-
-#: Time of the first sample.
-START = datetime(2026, 11, 22, 14, 5, 3, 250_000)
+from support.odd_files import START, write_hdf5, write_mat, write_npz, write_tdms, write_workbook
 
 #: Samples of a record.
 SAMPLES = 1200
@@ -158,29 +156,9 @@ def _clipped(y: Signal) -> Signal:
 # Files of programs.
 
 
-def write_npz(path: Path, m: Measurement) -> None:
-    np.savez(path, u_V=m.u[:, 0], y_um=m.y, fs=1.0 / m.dt)
-
-
-def write_mat(path: Path, m: Measurement) -> None:
-    from scipy.io import savemat
-
-    savemat(path, {"run": {"t": m.t, "u_V": m.u[:, 0], "y_um": m.y}})
-
-
-def write_workbook(path: Path, m: Measurement) -> None:
-    import openpyxl
-
-    book = openpyxl.Workbook()
-    book.active.title = "Notes"
-    book.active.append(["Operator", "A. Bee"])
-    sheet = book.create_sheet("Data")
-    sheet.append(["Measured", START])
-    sheet.append(["Time", "u", "y"])
-    sheet.append(["s", "V", "um"])
-    for row in zip(m.t.tolist(), m.u[:, 0].tolist(), m.y.tolist(), strict=True):
-        sheet.append(row)
-    book.save(path)
+def single(write: Callable[[Path, Signal, Signal, Signal], object]) -> Callable[[Path, Measurement], object]:
+    """Return a writer of a measurement with one input."""
+    return lambda path, m: write(path, m.t, m.u[:, 0], m.y)
 
 
 def write_dated_workbook(path: Path, m: Measurement) -> None:
@@ -193,34 +171,12 @@ def write_dated_workbook(path: Path, m: Measurement) -> None:
     book.save(path)
 
 
-def write_hdf5(path: Path, m: Measurement) -> None:
-    import h5py
-
-    with h5py.File(path, "w") as file:
-        group = file.create_group("bench/run 1")
-        for name, values in (("t_s", m.t), ("u_V", m.u[:, 0]), ("y_um", m.y)):
-            group.create_dataset(name, data=values, compression="gzip")
-        file.create_group("empty")
-
-
 def write_parquet(path: Path, m: Measurement) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     times = np.datetime64(START, "ns") + (m.t * 1e9).round().astype("timedelta64[ns]")
     pq.write_table(pa.table({"time": times, "u_V": m.u[:, 0], "y_um": m.y}), path)
-
-
-def write_tdms(path: Path, m: Measurement) -> None:
-    from nptdms import ChannelObject, TdmsWriter
-
-    with TdmsWriter(path) as writer:
-        writer.write_segment(
-            [
-                ChannelObject("Bench", name, values, properties={"unit_string": unit, "wf_increment": m.dt})
-                for name, values, unit in (("u", m.u[:, 0], "Volts"), ("y", m.y, "um"))
-            ]
-        )
 
 
 def write_mdf(path: Path, m: Measurement) -> None:
@@ -648,15 +604,15 @@ AWKWARD_RECORDS = (
         "y_um",
     ),
     AwkwardRecord("zip", "square", "r.zip", write_zip, ONE, "y_um"),
-    AwkwardRecord("NumPy", "bilinear", "r.npz", write_npz, ONE, "y_um"),
-    AwkwardRecord("MATLAB", "cubic", "r.mat", write_mat, ("run.u_V",), "run.y_um"),
-    AwkwardRecord("workbook", "first order", "r.xlsx", write_workbook, ("u",), "y"),
+    AwkwardRecord("NumPy", "bilinear", "r.npz", single(write_npz), ONE, "y_um"),
+    AwkwardRecord("MATLAB", "cubic", "r.mat", single(write_mat), ("run.u_V",), "run.y_um"),
+    AwkwardRecord("workbook", "first order", "r.xlsx", single(write_workbook), ("u",), "y"),
     AwkwardRecord(
         "workbook with dates", "temperature", "r.xlsx", write_dated_workbook, ("Ventil",), "Temperatur", 10.0
     ),
-    AwkwardRecord("HDF5", "dead time", "r.h5", write_hdf5, ONE, "y_um"),
+    AwkwardRecord("HDF5", "dead time", "r.h5", single(write_hdf5), ONE, "y_um"),
     AwkwardRecord("Parquet", "square", "r.parquet", write_parquet, ONE, "y_um"),
-    AwkwardRecord("TDMS", "second order", "r.tdms", write_tdms, ("u",), "y"),
+    AwkwardRecord("TDMS", "second order", "r.tdms", single(write_tdms), ("u",), "y"),
     AwkwardRecord("MDF", "bilinear", "r.mf4", write_mdf, ("u",), "y"),
     # Gross errors, clocks, cells, and structures.
     AwkwardRecord("spikes", "first order", "r.csv", text(changed(UNITS, _spikes)), ONE, "y_um"),

@@ -79,17 +79,20 @@ def replaced(line, cell, column=1):
     return "\n".join(rows)
 
 
-def write_npz(path):
-    np.savez(path, u_V=U, y_um=Y, fs=100.0)
+# Files of programs, with signals from time 0.
 
 
-def write_mat(path):
+def write_npz(path, t=T, u=U, y=Y):
+    np.savez(path, u_V=u, y_um=y, fs=1.0 / t[1])
+
+
+def write_mat(path, t=T, u=U, y=Y):
     from scipy.io import savemat
 
-    savemat(path, {"run": {"t": T, "u_V": U, "y_um": Y}})
+    savemat(path, {"run": {"t": t, "u_V": u, "y_um": y}})
 
 
-def write_workbook(path):
+def write_workbook(path, t=T, u=U, y=Y):
     import openpyxl
 
     book = openpyxl.Workbook()
@@ -99,29 +102,29 @@ def write_workbook(path):
     sheet.append(["Measured", START])
     sheet.append(["Time", "u", "y"])
     sheet.append(["s", "V", "um"])
-    for row in zip(T.tolist(), U.tolist(), Y.tolist(), strict=True):
+    for row in zip(t.tolist(), u.tolist(), y.tolist(), strict=True):
         sheet.append(row)
     book.save(path)
 
 
-def write_hdf5(path):
+def write_hdf5(path, t=T, u=U, y=Y):
     import h5py
 
     with h5py.File(path, "w") as file:
         group = file.create_group("bench/run 1")
-        for name, values in (("t_s", T), ("u_V", U), ("y_um", Y)):
+        for name, values in (("t_s", t), ("u_V", u), ("y_um", y)):
             group.create_dataset(name, data=values, compression="gzip")
         file.create_group("empty")
 
 
-def write_tdms(path):
+def write_tdms(path, t=T, u=U, y=Y):
     from nptdms import ChannelObject, TdmsWriter
 
     with TdmsWriter(path) as writer:
         writer.write_segment(
             [
-                ChannelObject("Bench", "u", U, properties={"unit_string": "Volts", "wf_increment": 0.01}),
-                ChannelObject("Bench", "y", Y, properties={"unit_string": "um", "wf_increment": 0.01}),
+                ChannelObject("Bench", name, values, properties={"unit_string": unit, "wf_increment": t[1]})
+                for name, values, unit in (("u", u, "Volts"), ("y", y, "um"))
             ]
         )
 
