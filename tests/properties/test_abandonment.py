@@ -69,7 +69,6 @@ def history(setting):
     return make_history(name)
 
 
-@pytest.mark.ci
 def test_abandonment_does_not_change_halls_elites_and_genes(setting, history):
     complete = islands_of(Evaluator(record(), setting, abandon=False), GENERATIONS)
     for one, other in zip(history, complete, strict=True):
@@ -103,7 +102,6 @@ def test_abandoned_individuals_exceed_the_threshold_when_evaluated(setting, hist
         assert all(each.fitness < inf for each in island.hall_of_fame.entries)
 
 
-@pytest.mark.ci
 def test_cache_contents_do_not_affect_abandonment(setting, history):
     """This includes individuals whose exact fitness is cached."""
     warm = Evaluator(record(), setting)

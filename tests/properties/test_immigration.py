@@ -104,7 +104,6 @@ def test_first_immigrants_are_taken_of_equal_or_too_many(replaced):
     assert {id(each) for each in after.population} == {id(one), id(two)}
 
 
-@pytest.mark.ci
 @given(islands(), arrivals())
 def test_worst_policy_evaluates_abandoned_individuals(island, arriving):
     after = receive_migrants(island, arriving, evaluator(), replace(SETTINGS, replaced="worst"))
@@ -132,7 +131,6 @@ def test_random_policy_replaces_every_position():
         assert (own == drawn) == (purpose is Purpose.IMMIGRATION)
 
 
-@pytest.mark.ci
 @every_replacement_policy
 @given(islands(), arrivals())
 def test_immigration_does_not_depend_on_the_cache(replaced, island, arriving):

@@ -16,7 +16,7 @@ from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LinearSpec
-from support.simulated_records import SAMPLES, made, name_parameters
+from support.simulated_records import SAMPLES, made, names
 
 pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("toy_class")]
 
@@ -50,11 +50,7 @@ def take_part(record: Dataset) -> list[Dataset]:
     return [replace(record[part], start=0.0) for part in PARTS]
 
 
-#: Simulators whose parameters are estimated for every part, or that are compiled, which takes time.
-SLOW = ("second-order", "held", "extended", "fmu")
-
-
-@pytest.mark.parametrize("name", name_parameters(SLOW))
+@pytest.mark.parametrize("name", names())
 def test_simulation_of_joined_recordings_is_that_of_each(name: str) -> None:
     record, columns = made()[name].record, made()[name].columns
     alone = make_simulation(name, slice(0, SAMPLES))
@@ -88,7 +84,7 @@ def test_simulation_of_joined_recordings_is_that_of_each(name: str) -> None:
     assert whole.simulate(values).tolist() == np.concatenate(expected).tolist()
 
 
-@pytest.mark.parametrize("name", name_parameters())
+@pytest.mark.parametrize("name", names())
 def test_one_segment_is_a_single_recording(name: str) -> None:
     alone = make_simulation(name, slice(0, SAMPLES))
     given = replace(alone, context=replace(alone.context, segments=(SAMPLES,)))

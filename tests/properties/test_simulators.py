@@ -27,7 +27,7 @@ from islands.simulators.fmu import simulator as fmu
 from islands.simulators.interface import Simulator
 from islands.simulators.ode import simulator as ode
 from islands.simulators.specification.table import SIMULATORS, PhysicalSpec
-from support.simulated_records import made, name_parameters, names
+from support.simulated_records import made, names
 
 pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("toy_class")]
 
@@ -65,7 +65,7 @@ def make(name: str) -> Simulator:
     return found.simulator if name in {"held", "terms"} else found
 
 
-@pytest.fixture(params=name_parameters())
+@pytest.fixture(params=names())
 def name(request: pytest.FixtureRequest) -> str:
     return request.param
 
@@ -95,7 +95,6 @@ def possible_effects(simulator: Simulator, context: SimulationContext) -> list[E
     )
 
 
-@pytest.mark.ci
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 def test_every_simulator_has_a_record() -> None:
     package = Path(intersample.__file__).parent

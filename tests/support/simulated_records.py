@@ -1,14 +1,13 @@
 """A specification of every simulator, each with a short record that the simulator could have produced."""
 
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import pytest
 import scipy
 from numpy.typing import NDArray
 
@@ -88,11 +87,6 @@ def names() -> list[str]:
         for name in (*SIMULATORS, "class", "held", "terms", "extended")
         if name != "fmu" or find_compiler()
     ]
-
-
-def name_parameters(slow: Collection[str] = ("fmu",)) -> list[object]:
-    """Return the names as parameters of a test, those of slow simulators for the level ci."""
-    return [pytest.param(name, marks=pytest.mark.ci) if name in slow else name for name in names()]
 
 
 class _Made(dict[str, SpecAndRecord]):

@@ -203,7 +203,6 @@ def test_role_is_restarted_with_a_role_that_it_uses(supervised: Start) -> None:
     assert len(running.entries("start", "ray")) == 2
 
 
-@pytest.mark.ci
 def test_role_on_demand_runs_while_another_role_needs_it(supervised: Start) -> None:
     ray = role("ray", on_demand=True)
     running = supervised(role("api"), role("work", NEEDY, needs=["ray"]), ray, _LINGER_SECONDS=0.3)
@@ -249,7 +248,7 @@ def test_role_that_has_run_before_is_restarted_when_misconfigured(supervised: St
     assert running.process.returncode == 0
 
 
-@pytest.mark.parametrize("heartbeat", [pytest.param("heartbeat(); ", marks=pytest.mark.ci), ""])
+@pytest.mark.parametrize("heartbeat", ["heartbeat(); ", ""])
 def test_role_that_always_fails_at_its_start_ends_the_supervisor(supervised: Start, heartbeat: str) -> None:
     """A coordinator sends heartbeats before its first error."""
     running = supervised(role("api"), role("work", f"note('start'); {heartbeat}sys.exit(7)"))

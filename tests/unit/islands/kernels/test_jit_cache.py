@@ -134,7 +134,7 @@ def test_kernels_are_stored_in_the_chosen_folder_only(start, tmp_path):
     assert [path.parent.parent for path in tmp_path.rglob("*.nbi")] == [folder]
 
 
-@pytest.mark.parametrize("kind", ["start", pytest.param("start_new", marks=pytest.mark.ci)])
+@pytest.mark.parametrize("kind", ["start", "start_new"])
 def test_second_process_loads_the_kernels_of_the_first_silently(request, kind):
     start = request.getfixturevalue(kind)
     first = get_output(start(READY))

@@ -132,7 +132,6 @@ def moved_by_address(x, x_at, out, out_at):
     return x.size + out.size
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("name", ["add", "subtract", "multiply"])
 @given(st.data())

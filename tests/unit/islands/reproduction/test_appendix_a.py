@@ -78,7 +78,6 @@ def test_table_a3_agrees_with_itself():
 # Runs.
 
 
-@pytest.mark.ci
 def test_a_run_takes_the_model_that_select_fitness_recommends():
     (found,) = run_searches("s1", 0.1, 0.5, 7, 1)["runs"]
     record, white = appendix.soft_record(appendix.S1, 7, variance=0.1), appendix.white_record(appendix.S1, 7)
@@ -240,7 +239,7 @@ def test_a_count_that_differs_names_the_variances_at_which_it_agrees():
     assert row[3].endswith(f"(95 %); in the scan it agrees at the variance {VARIANCES[0]:g}")
 
 
-@pytest.mark.parametrize("quick", [True, pytest.param(False, marks=pytest.mark.ci)])
+@pytest.mark.parametrize("quick", [True, False])
 def test_figures_are_drawn_in_both_themes(quick):
     options = ReproductionOptions(runs=3, quick=quick)
     section = summarise(make_results(options, lambda _system, prune: 1 if prune == 0 else 0), options)

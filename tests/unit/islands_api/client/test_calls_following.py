@@ -165,7 +165,6 @@ def test_wait_survives_a_restart_of_the_service(
     assert client.wait(job).state == JobState.SUCCEEDED
 
 
-@pytest.mark.ci
 def test_wait_works_with_a_short_timeout_and_an_idle_job(connect: Any, service: Service, me: Any) -> None:
     # The service must not hold back an answer for longer than the client's timeout.
     client = connect(service.url, me.secret, timeout=1.5, retry=0.0)

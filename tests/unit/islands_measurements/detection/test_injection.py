@@ -26,7 +26,6 @@ def faulty_record(system: str, *names: str, seed: int = 1, **options: object) ->
     return inject(names, np.random.default_rng(seed), seconds, system=rig, **options)  # type: ignore[arg-type]
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("variant", [False, True], ids=["standard", "variant"])
 @pytest.mark.parametrize("system", ["piezo", "tanks", "oscillator"])
 def test_every_fault_reaches_a_band_of_misfits(system: str, variant: bool) -> None:
@@ -77,14 +76,7 @@ def test_a_fault_next_to_a_gain_error_keeps_its_misfit() -> None:
     assert faulty_record("piezo", "sensor-gain", "periodic-disturbance", band=(2.0, 3.0)).misfit > 2.0
 
 
-@pytest.mark.parametrize(
-    "force",
-    [
-        *(pytest.param(each, marks=pytest.mark.ci) for each in (force_faults.cube, force_faults.drag)),
-        force_faults.hysteresis,
-        None,
-    ],
-)
+@pytest.mark.parametrize("force", [force_faults.cube, force_faults.drag, force_faults.hysteresis, None])
 def test_the_oscillator_matches_a_reference_solution(force: object) -> None:
     rng = np.random.default_rng(2)
     made: tuple[Force, ...] = () if force is None else (force(rng, 0.1),)  # type: ignore[operator]
@@ -158,7 +150,6 @@ def test_an_unreachable_misfit_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
         inject(["delay"], np.random.default_rng(1), 512.0, system=TANKS, band=(1e6, 1e7))
 
 
-@pytest.mark.ci
 def test_a_record_in_which_a_fault_is_invisible_is_redrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """The highest peak of the first record is in the held-out part, where saturation is not visible."""
 

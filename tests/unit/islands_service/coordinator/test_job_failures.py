@@ -67,12 +67,9 @@ def test_failed_job_has_a_typed_problem_and_does_not_block_others(
     "error",
     [
         OSError(errno.ESTALE, "Stale file handle", "/data/blobs/ab"),
-        pytest.param(MemoryError(), marks=pytest.mark.ci),
-        pytest.param(ConnectionResetError(), marks=pytest.mark.ci),
-        pytest.param(
-            ImportError("/data/lib.so: failed to map segment from shared object", path="/data/lib.so"),
-            marks=pytest.mark.ci,
-        ),
+        MemoryError(),
+        ConnectionResetError(),
+        ImportError("/data/lib.so: failed to map segment from shared object", path="/data/lib.so"),
     ],
 )
 def test_job_is_tried_again_after_a_transient_error(
@@ -95,7 +92,6 @@ def test_job_is_tried_again_after_a_transient_error(
     assert "/data" not in notes[0]
 
 
-@pytest.mark.ci
 def test_repeated_transient_errors_fail_the_job_with_their_reason(
     store: Store, job: Job, coordinator: Coordinators, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -211,7 +207,6 @@ def remove(settings: ServiceSettings) -> None:
         path.unlink()
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("kind", ["identification", "discrepancy", "unknown"])
 @pytest.mark.parametrize("harm", [damage, remove, lambda _: None])
 def test_no_message_of_a_failed_job_contains_a_path(

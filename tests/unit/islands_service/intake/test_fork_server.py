@@ -74,7 +74,6 @@ def test_a_forked_process_has_standard_streams_and_the_readers_and_nothing_else(
     assert not [name for name in one["environment"] if name.startswith("ISLANDS_") and name != REQUESTS]
 
 
-@pytest.mark.ci
 def test_a_forked_process_can_only_read_its_file(programs, tmp_path):
     given, other = tmp_path / "given.csv", tmp_path / "other.csv"
     given.write_text("1")

@@ -29,7 +29,6 @@ def find_servers(pid):
     return [child for child, line in descendants(pid).items() if "intake.fork_server" in line]
 
 
-@pytest.mark.ci
 def test_a_server_that_has_ended_is_started_again(programs):
     server = programs("import os; print(os.getppid(), flush=True)")
     pids = []
@@ -63,7 +62,6 @@ def test_waiting_has_a_limit_and_a_killed_process_has_ended(programs):
         assert process.wait(60.0) == -signal.SIGKILL
 
 
-@pytest.mark.ci
 def test_a_killed_client_leaves_no_process(tmp_path):
     os.mkfifo(tmp_path / "a.csv")
     client = subprocess.Popen([sys.executable, "-c", CLIENT, tmp_path / "a.csv"])

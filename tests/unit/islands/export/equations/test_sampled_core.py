@@ -92,7 +92,6 @@ def test_a_program_in_c_simulates_like_the_package(name, tmp_path):
         compare(run_c(spec, RECORD, tmp_path, COLUMNS), expected)
 
 
-@pytest.mark.ci
 @needs_octave
 def test_a_matlab_function_simulates_like_the_package(tmp_path):
     specs, outputs = make_programs(SIMULATIONS)
@@ -105,7 +104,7 @@ def test_a_matlab_function_simulates_like_the_package(tmp_path):
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=pytest.mark.ci if name in ("model", "column") else pytest.mark.nightly)
+        pytest.param(name, marks=() if name in ("model", "column") else pytest.mark.nightly)
         for name in SIMULATIONS
     ],
 )

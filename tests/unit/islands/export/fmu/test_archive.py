@@ -27,7 +27,6 @@ FORMATS = ("fmu", "fmu2")
 ESSENTIAL = ("many parts", "several inputs", "two masses")
 
 
-@pytest.mark.ci
 @needs_compiler
 @pytest.mark.parametrize("kind", FORMATS)
 @pytest.mark.parametrize(

@@ -31,20 +31,15 @@ from islands.simulators.specification.table import (
     innermost,
     parse_spec,
 )
-from support.simulated_records import SpecAndRecord, made, name_parameters, names
+from support.simulated_records import SpecAndRecord, made, names
 
 pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("toy_class")]
-
-NAMES = names()
-
-#: Simulators whose effects are tested one by one at the fast level.
-FAST = ("bouc-wen-piezo", "column")
 
 #: Samples after which the free run of a model no longer depends on its initial outputs.
 TRANSIENT = 100
 
 
-@pytest.fixture(params=name_parameters())
+@pytest.fixture(params=names())
 def case(request: pytest.FixtureRequest) -> SpecAndRecord:
     return made()[request.param]
 
@@ -108,16 +103,10 @@ def assert_same_output(case: SpecAndRecord, fit: CalibrationResult) -> None:
     )
 
 
-@pytest.mark.ci
 def test_a_document_has_the_output_of_the_written_simulation(case: SpecAndRecord) -> None:
     assert_same_output(case, extend(case, effect_of_each_site(case)))
 
 
-@pytest.mark.parametrize(
-    "case",
-    [name if name in FAST else pytest.param(name, marks=pytest.mark.ci) for name in NAMES],
-    indirect=True,
-)
 def test_each_single_effect_has_the_output_of_the_written_simulation(case: SpecAndRecord) -> None:
     found = stateless_effects(case)
     if has_initial_states(ExtendedSimulator(case.simulator, (), extend(case, []).simulation.context)):
@@ -153,7 +142,6 @@ def test_effects_of_channels_find_the_columns_of_the_record() -> None:
         simulate_spec(document, resting)
 
 
-@pytest.mark.ci
 def test_a_document_is_unchanged_after_reading_and_writing(case: SpecAndRecord) -> None:
     text = extended_json(extend(case, effect_of_each_site(case)), case.record)
     spec = LocalExtendedSpec.model_validate(json.loads(text))
@@ -188,7 +176,6 @@ def test_a_file_of_an_extension_is_parsed_as_a_model(case: SpecAndRecord, tmp_pa
     assert as_json(parse_spec(f"model:{path}")) == text
 
 
-@pytest.mark.ci
 def test_an_extension_can_be_extended_again(case: SpecAndRecord) -> None:
     """The outer extension contains the effects of the inner one, at their values."""
     first, *_ = effect_of_each_site(case)
@@ -202,7 +189,7 @@ def test_an_extension_can_be_extended_again(case: SpecAndRecord) -> None:
 @pytest.mark.parametrize(
     ("kind", "name", "point"),
     [
-        pytest.param("column", "jump", (1.0, 2.0), marks=pytest.mark.ci),
+        ("column", "jump", (1.0, 2.0)),
         pytest.param("bouc-wen-piezo", "even-nonlinearity", (1e-3,), marks=pytest.mark.nightly),
         pytest.param("linear", "delay", (0.02,), marks=pytest.mark.nightly),
     ],

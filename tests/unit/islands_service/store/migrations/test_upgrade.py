@@ -252,7 +252,6 @@ def test_repeated_preparation_changes_nothing(database):
         assert contents(store) == before
 
 
-@pytest.mark.ci
 def test_concurrent_preparation_of_new_databases_succeeds(empty_database, tmp_path):
     urls = [empty_database]
     if empty_database.startswith("sqlite"):

@@ -24,7 +24,6 @@ pytestmark = pytest.mark.ci
 # Stopped and resumed.
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize(
     ("generation", "number", "budget"),
     [(0, signal.SIGINT, STEPWISE), (2, signal.SIGTERM, STEPWISE), (2, signal.SIGINT, TWO)],
@@ -59,7 +58,6 @@ def test_stopped_run_keeps_the_best_and_resumes_to_the_same_result(
     assert one == other
 
 
-@pytest.mark.ci
 def test_ctrl_c_in_the_last_generation_leaves_out_the_refinement(run, interrupted, tmp_path):
     interrupted(3)
     code, _, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out")
@@ -72,7 +70,6 @@ def test_ctrl_c_in_the_last_generation_leaves_out_the_refinement(run, interrupte
     assert models(tmp_path / "out") == models(tmp_path / "whole")
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize(
     ("signals", "code"),
     [((signal.SIGINT, signal.SIGINT), 130), ((signal.SIGTERM, signal.SIGTERM), 0)],
@@ -87,7 +84,6 @@ def test_second_ctrl_c_interrupts_and_keeps_finished_epochs(run, interrupted, tm
     assert read_checkpoint(tmp_path / "out/checkpoint.json")[0].generation == 1
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("outputs", ["y_um", "y_um,z_um"])
 def test_ctrl_c_while_the_engine_ends_keeps_the_result(run, monkeypatch, tmp_path, outputs):
     """Ray takes a second to end."""
@@ -109,7 +105,6 @@ def test_ctrl_c_while_the_engine_ends_keeps_the_result(run, monkeypatch, tmp_pat
     assert (tmp_path / "out/result.json").exists()
 
 
-@pytest.mark.ci
 def test_epoch_is_kept_if_its_display_fails(run, watched, tmp_path):
     def broken(state):
         if state.archipelago.generation == 2:
@@ -137,7 +132,6 @@ def test_infinite_fitness_is_stored_as_null_and_restored(tmp_path):
     assert command.load_run(tmp_path) == ({"seed": 5}, state, 12.5)
 
 
-@pytest.mark.ci
 def test_failing_engine_loses_no_finished_epoch(run, engines, tmp_path):
     assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "whole")[0] == 0
     engines(Broken())
@@ -149,7 +143,6 @@ def test_failing_engine_loses_no_finished_epoch(run, engines, tmp_path):
     assert models(tmp_path / "out") == models(tmp_path / "whole")
 
 
-@pytest.mark.ci
 def test_checkpoints_are_written_every_ten_seconds(run, watched, monkeypatch, tmp_path):
     """An epoch takes six seconds of the replaced clock."""
     clock, found = [0.0], []
@@ -168,7 +161,6 @@ def test_checkpoints_are_written_every_ten_seconds(run, watched, monkeypatch, tm
     assert json.loads((tmp_path / "out/checkpoint.json").read_text())["about"]["wall_s"] == 42.0
 
 
-@pytest.mark.ci
 def test_slow_checkpoints_are_written_less_often(run, watched, monkeypatch, tmp_path):
     """A checkpoint takes one second of the replaced clock and an epoch ten; the limit is a twentieth."""
     clock, written = [0.0], []
@@ -189,7 +181,6 @@ def test_slow_checkpoints_are_written_less_often(run, watched, monkeypatch, tmp_
     assert written == [0, 3, 6, 6]
 
 
-@pytest.mark.ci
 def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
     clock = [50.0]
     for module in (command, timed_engine):
@@ -213,7 +204,6 @@ def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
     assert run("--resume", "out")[2] == ""
 
 
-@pytest.mark.ci
 def test_wall_time_of_a_resumed_run_includes_earlier_processes(run, interrupted, tmp_path):
     interrupted(0)
     assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[0] == 130
@@ -228,7 +218,6 @@ def test_wall_time_of_a_resumed_run_includes_earlier_processes(run, interrupted,
     assert search["evaluations_per_second"] == pytest.approx(40 / search["wall_s"])
 
 
-@pytest.mark.ci
 def test_resuming_a_finished_run_gives_the_same_result(run, tmp_path):
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
     before = models(tmp_path / "out")
@@ -236,7 +225,6 @@ def test_resuming_a_finished_run_gives_the_same_result(run, tmp_path):
     assert models(tmp_path / "out") == before
 
 
-@pytest.mark.ci
 def test_run_can_be_resumed_from_another_folder(run, interrupted, tmp_path, monkeypatch):
     write_record(record(seed=1), "v.csv")
     interrupted(1)
@@ -246,7 +234,6 @@ def test_run_can_be_resumed_from_another_folder(run, interrupted, tmp_path, monk
     assert run("--resume", "../out")[0] == 0
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize(
     "changed", ["r.csv", *(pytest.param(name, marks=pytest.mark.nightly) for name in ("v.csv", "t.csv"))]
 )
@@ -300,7 +287,6 @@ def test_resume_rejects_record_and_settings(run, more):
 # Engines do not change the result.
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize(
     ("number", "words", "expected"),
     [
@@ -321,7 +307,6 @@ def test_ray_runs_several_islands_by_default(run, engines, number, words, expect
     assert requested == [expected] * 2
 
 
-@pytest.mark.ci
 def test_islands_of_a_preset_select_the_engine(run, engines, monkeypatch):
     several = {"several": resolve_settings("hysteresis", {"islands": 2})}
     monkeypatch.setattr(sys.modules["islands.evolution.presets"], "PRESETS", several)
@@ -348,7 +333,6 @@ def test_unknown_engine_is_rejected(run, tmp_path, more):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.ci
 def test_engine_may_change_on_resuming(run, engines, interrupted, tmp_path):
     requested = engines(SerialEngine())
     assert run("r.csv", *COLUMNS, *TWO, "--out", "whole")[0] == 0

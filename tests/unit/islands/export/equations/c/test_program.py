@@ -86,7 +86,6 @@ def test_a_built_in_system_with_effects_is_simulated_like_the_package(name, fold
     compare(run_c(spec, made()[name].record, folder), expected)
 
 
-@pytest.mark.ci
 @needs_compiler
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_every_effect_of_a_built_in_system_has_a_program(name, folder):
@@ -102,7 +101,7 @@ def test_every_effect_of_a_built_in_system_has_a_program(name, folder):
 HELD = [
     pytest.param(
         *(name, hold, times),
-        marks=pytest.mark.ci if name == "second-order" or hold == "zero-order" else pytest.mark.nightly,
+        marks=() if name == "second-order" or hold == "zero-order" else pytest.mark.nightly,
     )
     for name in BUILT_IN
     for hold, times in (("first-order", 3), ("zero-order", 2), ("band-limited", 3))
@@ -142,9 +141,7 @@ def make_example(name):
 
 
 @needs_compiler
-@pytest.mark.parametrize(
-    "name", [*EXAMPLES[:3], *(pytest.param(each, marks=pytest.mark.ci) for each in EXAMPLES[3:])]
-)
+@pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_simulated_like_the_package(name, folder):
     """All states at the first sample are known, so that the package fits none."""
     spec, record = make_example(name)
@@ -155,7 +152,7 @@ def test_an_example_is_simulated_like_the_package(name, folder):
 
 
 @needs_compiler
-@pytest.mark.parametrize("hold", ["first-order", pytest.param("zero-order", marks=pytest.mark.ci)])
+@pytest.mark.parametrize("hold", ["first-order", "zero-order"])
 def test_discovered_terms_are_in_the_program(hold, folder):
     spec, record = make_example("second-order")
     system = spec.make_system()
@@ -184,7 +181,6 @@ def test_a_system_without_states_is_simulated(folder):
     compare(run_c(extended, record, folder), expected)
 
 
-@pytest.mark.ci
 @needs_compiler
 def test_creep_of_a_resting_simulation_starts_before_the_record(folder):
     record = recorded(np.full(300, 3.0), np.full(300, 3.0))
@@ -213,7 +209,6 @@ def test_effects_of_channels_read_their_columns(folder):
     compare(run_c(extended, record, folder), expected)
 
 
-@pytest.mark.ci
 @needs_compiler
 def test_an_extension_of_an_extension_has_the_effects_of_both(folder):
     record = made()["bouc-wen-piezo"].record
@@ -254,7 +249,6 @@ def test_the_program_of_an_axis_says_that_it_is_a_free_run():
 
 
 @needs_compiler
-@pytest.mark.ci
 @pytest.mark.parametrize("unit", ["*/ int broken = ;", "/* u", "\n#error", "\\\n", "µ°??/\n"])
 def test_a_name_or_unit_cannot_break_the_file(unit, folder):
     spec, record = make_example("second-order")
