@@ -4,6 +4,11 @@ from typing import Final
 
 from islands.data.split import compare_input_ranges
 from islands.io.result_text.statements import (
+    EXTRAPOLATION,
+    NO_SIMULATION,
+    SIMULATION_USES,
+    TEST,
+    VERDICTS,
     Document,
     RunFacts,
     Statement,
@@ -73,6 +78,12 @@ class CoupledFacts:
         """Whether a check fails."""
         return bool(write_statements(FAILURES, self) or self.list_failures())
 
+    @property
+    def measured(self) -> str:
+        """Measured quantities of the verdict, by output."""
+        listed = ((output.name, write_statements(OUTPUT_DETAILS, output)) for output in self.outputs)
+        return "; ".join(f"{name}: {', '.join(parts)}" for name, parts in listed if parts)
+
     def list_failures(self) -> list[str]:
         """Return the checks that an output fails."""
         return [text for output in self.outputs for text in write_statements(OUTPUT_FAILURES, output)]
@@ -122,15 +133,6 @@ def _describe_output(output: OutputFacts) -> str:
     return text
 
 
-def _describe_verdict(word: str, facts: CoupledFacts) -> str:
-    listed = [
-        f"{output.name}: {', '.join(parts)}"
-        for output in facts.outputs
-        if (parts := write_statements(OUTPUT_DETAILS, output))
-    ]
-    return f"As a simulation: {word} ({'; '.join(listed)})." if listed else f"As a simulation: {word}."
-
-
 def _list_names(outputs: list[OutputFacts]) -> str:
     return " and ".join(output.name for output in outputs)
 
@@ -163,11 +165,7 @@ OUTPUT_DETAILS: Final[tuple[Statement[OutputFacts], ...]] = (
 
 #: Checks that an output fails.
 OUTPUT_FAILURES: Final[tuple[Statement[OutputFacts], ...]] = (
-    Statement(
-        "no-simulation",
-        lambda output: output.error()["rmse"] is None,
-        lambda _: "simulation from the inputs alone: the free run diverges",
-    ),
+    NO_SIMULATION,
     Statement(
         "poor-simulation",
         lambda output: output.error()["rmse"] is not None and not output.simulates,
@@ -207,52 +205,15 @@ OUTPUT_FAILURES: Final[tuple[Statement[OutputFacts], ...]] = (
 )
 
 #: Checks that the model fails.
-FAILURES: Final[tuple[Statement[CoupledFacts], ...]] = (
-    Statement(
-        "extrapolation",
-        lambda facts: facts.extrapolation,
-        lambda facts: "; ".join(f"extrapolation: {each}" for each in facts.extrapolation),
-    ),
-)
+FAILURES: Final[tuple[Statement[CoupledFacts], ...]] = (EXTRAPOLATION,)
 
 #: What the model can be used for.
 USES: Final[tuple[Statement[CoupledFacts], ...]] = (
-    Statement(
-        "simulation",
-        lambda facts: facts.simulates and not facts.has_limits,
-        lambda _: "simulation from the inputs alone",
-    ),
-    Statement(
-        "simulation-within-limits",
-        lambda facts: facts.simulates and facts.has_limits,
-        lambda _: "simulation from the inputs alone, within the limits below",
-    ),
-    Statement(
-        "prediction",
-        lambda facts: not facts.simulates and facts.predicts,
-        lambda _: "prediction one step ahead",
-    ),
+    *SIMULATION_USES,
     Statement(
         "adequate-residual",
         _find_unstructured,
         lambda facts: f"no structure is left in the residual of {_list_names(_find_unstructured(facts))}",
-    ),
-)
-
-#: The verdict on the use as a simulation; one of them holds.
-VERDICTS: Final[tuple[Statement[CoupledFacts], ...]] = (
-    Statement(
-        "good",
-        lambda facts: facts.simulates and not facts.has_limits,
-        lambda facts: _describe_verdict("good", facts),
-    ),
-    Statement(
-        "usable",
-        lambda facts: facts.simulates and facts.has_limits,
-        lambda facts: _describe_verdict("usable, with limits", facts),
-    ),
-    Statement(
-        "unsuitable", lambda facts: not facts.simulates, lambda facts: _describe_verdict("unsuitable", facts)
     ),
 )
 
@@ -275,9 +236,5 @@ NEXT_STEPS: Final[tuple[Statement[CoupledFacts], ...]] = (
             f"try a longer record, since {describe_insignificant(list_insignificant(facts.model['terms']))}"
         ),
     ),
-    Statement(
-        "test",
-        lambda _: True,
-        lambda _: "check the model on a record that was not used (islands simulate)",
-    ),
+    TEST,
 )

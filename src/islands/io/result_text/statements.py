@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import floor, inf
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, Generic, Protocol, TypeVar
 
 from islands.data.preprocessing_steps import Preprocessing
 from islands.data.split import compare_input_ranges
@@ -69,6 +69,36 @@ _HINTS = {
 Document = Mapping[str, Any]
 
 F = TypeVar("F")
+F_contra = TypeVar("F_contra", contravariant=True)
+
+
+class SimulationFacts(Protocol):
+    """Quantities that decide on the use of a result of one output or several as a simulation."""
+
+    @property
+    def simulates(self) -> bool:
+        """Whether the free run follows every output."""
+        ...
+
+    @property
+    def predicts(self) -> bool:
+        """Whether the prediction one step ahead follows every output."""
+        ...
+
+    @property
+    def has_limits(self) -> bool:
+        """Whether a check fails."""
+        ...
+
+    @property
+    def extrapolation(self) -> list[str]:
+        """Inputs of the validation data that leave the range of the estimation data."""
+        ...
+
+    @property
+    def measured(self) -> str:
+        """Measured quantities of the verdict."""
+        ...
 
 
 class RunFacts:
@@ -250,8 +280,7 @@ class ResultFacts(RunFacts):
         # Linear models that minimise the error of the free run are among the candidates.
         if self.document["settings"].get("estimator") != "least-squares" or self._is_linear:
             return False
-        is_adequate = not self.has_structure and not exceeds_limit(self.share("free_run"))
-        return is_adequate and all(map(self._is_free_run_better, ("estimation", "validation")))
+        return self.is_unpredictable and all(map(self._is_free_run_better, ("estimation", "validation")))
 
     @property
     def _is_linear(self) -> bool:
@@ -272,6 +301,16 @@ class ResultFacts(RunFacts):
         return compare_input_ranges(
             columns["names"]["inputs"], columns["units"]["inputs"], ranges["estimation"], ranges["validation"]
         )
+
+    @property
+    def has_limits(self) -> bool:
+        """Whether a check fails."""
+        return bool(find_statements(FAILURES, self))
+
+    @property
+    def measured(self) -> str:
+        """Measured quantities of the verdict."""
+        return "; ".join(write_statements(VERDICT_DETAILS, self))
 
     @cached_property
     def doubtful(self) -> list[tuple[str, float]]:
@@ -316,7 +355,7 @@ class ResultFacts(RunFacts):
 
 
 @dataclass(frozen=True, slots=True)
-class Statement(Generic[F]):
+class Statement(Generic[F_contra]):
     """A statement about a result.
 
     Attributes
@@ -329,8 +368,8 @@ class Statement(Generic[F]):
     """
 
     name: str
-    holds: Callable[[F], object]
-    write: Callable[[F], str]
+    holds: Callable[[F_contra], object]
+    write: Callable[[F_contra], str]
 
 
 def find_statements(statements: Iterable[Statement[F]], facts: F) -> list[Statement[F]]:
@@ -505,18 +544,14 @@ def _describe_unmet_constraint(check: Document) -> str:
     return f"the constraint {_name_constraint(check)} (value {value})"
 
 
-def _describe_verdict(word: str) -> Callable[[ResultFacts], str]:
+def _describe_verdict(word: str) -> Callable[[SimulationFacts], str]:
     """Return a writer of the verdict, with the measured quantities of the free run in brackets."""
 
-    def write(facts: ResultFacts) -> str:
-        measured = "; ".join(write_statements(VERDICT_DETAILS, facts))
+    def write(facts: SimulationFacts) -> str:
+        measured = facts.measured
         return f"As a simulation: {word} ({measured})." if measured else f"As a simulation: {word}."
 
     return write
-
-
-def _has_limits(facts: ResultFacts) -> bool:
-    return bool(find_statements(FAILURES, facts))
 
 
 def exceeds_limit(share: float | None) -> bool:
@@ -661,6 +696,58 @@ def _suggest_terms(facts: ResultFacts) -> str:
     return f"try {_HINTS[worst['name']].format(input=name)}"
 
 
+# Statements about one output and about several outputs alike.
+
+#: What a result can be used for as a simulation.
+SIMULATION_USES: Final[tuple[Statement[SimulationFacts], ...]] = (
+    Statement(
+        "simulation",
+        lambda facts: facts.simulates and not facts.has_limits,
+        lambda _: "simulation from the inputs alone",
+    ),
+    Statement(
+        "simulation-within-limits",
+        lambda facts: facts.simulates and facts.has_limits,
+        lambda _: "simulation from the inputs alone, within the limits below",
+    ),
+    Statement(
+        "prediction",
+        lambda facts: not facts.simulates and facts.predicts,
+        lambda _: "prediction one step ahead",
+    ),
+)
+
+#: The verdict on the use as a simulation; one of them holds.
+VERDICTS: Final[tuple[Statement[SimulationFacts], ...]] = (
+    Statement("good", lambda facts: facts.simulates and not facts.has_limits, _describe_verdict("good")),
+    Statement(
+        "usable",
+        lambda facts: facts.simulates and facts.has_limits,
+        _describe_verdict("usable, with limits"),
+    ),
+    Statement("unsuitable", lambda facts: not facts.simulates, _describe_verdict("unsuitable")),
+)
+
+NO_SIMULATION: Final[Statement[RunFacts]] = Statement(
+    "no-simulation",
+    lambda facts: facts.error()["rmse"] is None,
+    lambda _: "simulation from the inputs alone: the free run diverges",
+)
+
+EXTRAPOLATION: Final[Statement[SimulationFacts]] = Statement(
+    "extrapolation",
+    lambda facts: facts.extrapolation,
+    lambda facts: "; ".join(f"extrapolation: {each}" for each in facts.extrapolation),
+)
+
+TEST: Final[Statement[object]] = Statement(
+    "test",
+    lambda _: True,
+    lambda _: "check the model on a record that was not used (islands simulate)",
+)
+
+# Statements about one output.
+
 #: Remarks on the equation.
 _REMARKS: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement(
@@ -740,21 +827,7 @@ VERDICT_DETAILS: Final[tuple[Statement[ResultFacts], ...]] = (
 
 #: What the model can be used for.
 USES: Final[tuple[Statement[ResultFacts], ...]] = (
-    Statement(
-        "simulation",
-        lambda facts: facts.simulates and not _has_limits(facts),
-        lambda _: "simulation from the inputs alone",
-    ),
-    Statement(
-        "simulation-within-limits",
-        lambda facts: facts.simulates and _has_limits(facts),
-        lambda _: "simulation from the inputs alone, within the limits below",
-    ),
-    Statement(
-        "prediction",
-        lambda facts: not facts.simulates and facts.predicts,
-        lambda _: "prediction one step ahead",
-    ),
+    *SIMULATION_USES,
     Statement(
         "adequate-residual",
         lambda facts: facts.is_unpredictable and not facts.exceeds_noise,
@@ -781,11 +854,7 @@ FAILURES: Final[tuple[Statement[ResultFacts], ...]] = (
             _describe_unmet_constraint(check) for check in facts.constraints if not check["met"]
         ),
     ),
-    Statement(
-        "no-simulation",
-        lambda facts: facts.error()["rmse"] is None,
-        lambda _: "simulation from the inputs alone: the free run diverges",
-    ),
+    NO_SIMULATION,
     Statement(
         "poor-simulation",
         lambda facts: facts.error()["rmse"] is not None and not facts.simulates,
@@ -826,22 +895,7 @@ FAILURES: Final[tuple[Statement[ResultFacts], ...]] = (
     ),
     Statement("error-ratio", lambda facts: facts.generalises_poorly, describe_excess),
     Statement("estimation-error", lambda facts: facts.fits_poorly, describe_estimation_error),
-    Statement(
-        "extrapolation",
-        lambda facts: facts.extrapolation,
-        lambda facts: "; ".join(f"extrapolation: {each}" for each in facts.extrapolation),
-    ),
-)
-
-#: The verdict on the use as a simulation; one of them holds.
-VERDICTS: Final[tuple[Statement[ResultFacts], ...]] = (
-    Statement("good", lambda facts: facts.simulates and not _has_limits(facts), _describe_verdict("good")),
-    Statement(
-        "usable",
-        lambda facts: facts.simulates and _has_limits(facts),
-        _describe_verdict("usable, with limits"),
-    ),
-    Statement("unsuitable", lambda facts: not facts.simulates, _describe_verdict("unsuitable")),
+    EXTRAPOLATION,
 )
 
 #: What to do next.
@@ -883,15 +937,19 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
         lambda facts: not facts.insignificant and _find_unlikely(facts)[1] < _UNLIKELY,
         _describe_unlikely,
     ),
-    Statement(
-        "test",
-        lambda _: True,
-        lambda _: "check the model on a record that was not used (islands simulate)",
-    ),
+    TEST,
 )
 
 #: All statements, in the order of the text.
-STATEMENTS: Final = (*_REMARKS, *MEASURES, *VERDICT_DETAILS, *VERDICTS, *USES, *FAILURES, *NEXT_STEPS)
+STATEMENTS: Final[tuple[Statement[ResultFacts], ...]] = (
+    *_REMARKS,
+    *MEASURES,
+    *VERDICT_DETAILS,
+    *VERDICTS,
+    *USES,
+    *FAILURES,
+    *NEXT_STEPS,
+)
 
 
 def name_statements(document: Document) -> list[str]:
