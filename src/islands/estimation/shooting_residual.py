@@ -11,13 +11,10 @@ from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
 from islands.program.term_pool import link
 from islands.simulation.blocks import make_simulator
-from islands.simulation.initial_outputs import change_initial_outputs, count_segments
+from islands.simulation.initial_outputs import STEP, change_initial_outputs, count_segments
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound, find_divergence_bound
 from islands.simulation.sensitivities import make_sensitivities
-
-#: Step of a difference of initial outputs as a fraction of the output range.
-_STEP = 1e-4
 
 #: Largest number of initial outputs that are estimated with the parameters.
 _LARGEST_CHANGES = 64
@@ -97,7 +94,7 @@ class FreeRunResidual(Residual):
         self._model, self._record = model, record
         self._first = model.maximum_lag if warm_up is None else warm_up
         self._depth, self._segments = model.output_lag, count_segments(record, self._first)
-        self._step = _STEP * record.output_range
+        self._step = STEP * record.output_range
         self._started = np.zeros(self.changes), ShootingResidual(model, record, None, warm_up)
         #: Number of samples of every segment, in the order of time; then every initial output.
         self.intervals = np.append(self._started[1].intervals, np.ones(self.changes, np.int64))

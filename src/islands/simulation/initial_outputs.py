@@ -36,8 +36,8 @@ _LARGEST_CHANGE = 4.0
 #: 20 times that of the noise.
 _MEDIAN_TO_DEVIATION = 1.4826 / 20.0**0.5
 
-#: Step of a difference as a fraction of the output range.
-_STEP = 1e-4
+#: Step of a difference of initial outputs as a fraction of the output range.
+STEP = 1e-4
 
 #: Linearisations of a model that is not linear in its past outputs.
 _ITERATIONS = 3
@@ -69,6 +69,11 @@ def simulate_freely(model: AnyModel, record: AnyRecord, warm_up: int | None = No
         As for `free_run`.
     """
     return free_run(model, estimate_initial_outputs(model, record, warm_up), warm_up)
+
+
+def has_estimated_start(model: AnyModel, record: AnyRecord, warm_up: int | None = None) -> bool:
+    """Return whether `simulate_freely` starts from estimated outputs."""
+    return estimate_initial_outputs(model, record, warm_up) is not record
 
 
 def estimate_initial_outputs(model: AnyModel, record: AnyRecord, warm_up: int | None = None) -> AnyRecord:
@@ -113,7 +118,7 @@ def estimate_initial_outputs(model: AnyModel, record: AnyRecord, warm_up: int | 
 def _estimate(model: Model, record: Dataset, first: int) -> Dataset:
     depth = model.output_lag
     at_rate = match_rate(model, record)
-    step = _STEP * at_rate.output_range if depth else 0.0
+    step = STEP * at_rate.output_range if depth else 0.0
     segments = count_segments(at_rate, first)
     if not (step > 0.0 and segments):
         return record

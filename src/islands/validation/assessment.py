@@ -14,7 +14,7 @@ from islands.errors import RecordError
 from islands.estimation.constraints.checks import ConstraintCheck, check_constraints
 from islands.estimation.parameter_constraints import count_free_parameters
 from islands.models.protocol import DynamicModel
-from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
+from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
@@ -63,8 +63,7 @@ class Checks:
     @cached_property
     def has_estimated_start(self) -> bool:
         """Whether the free run on the validation data starts from estimated outputs."""
-        validation = self._split.validation
-        return estimate_initial_outputs(self._model, validation, self._warm_up) is not validation
+        return has_estimated_start(self._model, self._split.validation, self._warm_up)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

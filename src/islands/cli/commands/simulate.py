@@ -33,7 +33,7 @@ from islands.io.records.table_reading import read_table
 from islands.io.records.writer import write_coupled_simulation
 from islands.models.coupled_narx import coupled_signals
 from islands.models.equations import named_signals
-from islands.simulation.initial_outputs import ESTIMATED_START, estimate_initial_outputs
+from islands.simulation.initial_outputs import ESTIMATED_START, has_estimated_start
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 
@@ -164,7 +164,7 @@ def _simulate_model(found: FittedModel, request: _Request) -> None:
     first = found.warm_up if request.warm_up is None else request.warm_up
     band = None if request.bands is None else found.bands(data, request.bands, first)
     simulation = found.simulate(data, mode, first, request.shooting)
-    if mode == "free-run" and estimate_initial_outputs(model, data, first) is not data:
+    if mode == "free-run" and has_estimated_start(model, data, first):
         output.print(ESTIMATED_START, markup=False)
     line = f"{mode} after a warm-up of {first} samples: {simulation.outcome}"
     _print_metrics(data, simulation.y, line, request.out, band)
