@@ -5,6 +5,9 @@ import sys
 
 import pytest
 
+from islands.io.models import write_model
+from islands.systems.published_models import get_published_model
+
 PROGRAM = """
 import sys
 from islands_api.cli import main
@@ -22,7 +25,7 @@ LIMITS = {
     "inspect {record}": (542, ""),
     "jobs --help": (870, ""),
     "jobs list --url http://127.0.0.1:9": (820, ""),
-    "show published:13": (932, "numba scipy"),
+    "show {model}": (560, ""),
     "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1310, "numba scipy"),
     "simulate published:13 {record} --input u_V --output y_um": (1240, "numba scipy"),
     # Other processes draw the report.
@@ -36,13 +39,15 @@ def record(tmp_path_factory):
     folder = tmp_path_factory.mktemp("examples")
     done = subprocess.run([sys.executable, "-m", "islands", "examples", "copy", folder], check=False)
     assert done.returncode == 0
+    write_model(get_published_model("13").model, folder / "model.json")
     return folder / "piezo.csv"
 
 
 @pytest.mark.ci
 @pytest.mark.parametrize("command", LIMITS)
 def test_a_command_loads_the_modules_that_it_needs(command, record):
-    arguments = [part.format(record=record, folder=record.parent / "fit") for part in command.split()]
+    names = {"record": record, "model": record.parent / "model.json", "folder": record.parent / "fit"}
+    arguments = [part.format(**names) for part in command.split()]
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, *arguments], capture_output=True, text=True, check=False
     )

@@ -1,6 +1,5 @@
 """`load`: a result, a model, a diagnosis or a simulation, whatever file or folder holds it."""
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -15,6 +14,7 @@ from islands.facade.results.identification import Result
 from islands.facade.results.reader import read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
 from islands.io.models import read_coupled_model, read_model
+from islands.io.saved_documents import KINDS, open_document
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.table import EXTENDED_FILE, LocalExtendedSpec, parse_spec
@@ -24,16 +24,7 @@ from islands.systems.published_models import get_published_model
 Loaded: TypeAlias = Result | FittedModel | FittedCoupledModel | SavedSimulation | SavedDiagnosis
 
 #: A JSON object.
-_Document: TypeAlias = dict[str, Any]
-
-#: Files and folders that can be loaded, for messages.
-KINDS = (
-    "a result folder, a model file, the folder of a diagnosis, an extended.json, ode:FILE.toml, "
-    "fmu:FILE.fmu, or published:12, :13, :14"
-)
-
-#: Files that say what a folder holds; the first one that exists counts.
-_DOCUMENTS = ("discrepancy.json", EXTENDED_FILE, "result.json", "model.json")
+_Document: TypeAlias = Mapping[str, Any]
 
 
 def load(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Loaded:
@@ -66,32 +57,11 @@ def load(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> 
         return FittedModel.from_model(get_published_model(rest).model)
     if kind in ("ode", "fmu"):
         return SavedSimulation(_read_equations(str(path)))
-    file = _find_document(Path(path))
-    document = _read_document(file)
-    schema = str(document.get("schema", "islands.model/1" if "terms" in document else ""))
-    reader = _READERS.get(schema.partition("/")[0])
+    saved = open_document(path)
+    reader = _READERS.get(saved.schema)
     if reader is None:
-        raise ModelError(f"{file} holds no model, result or simulation: give {KINDS}")
-    return reader(file, document, primitives)
-
-
-def _find_document(path: Path) -> Path:
-    if path.is_dir():
-        found = [path / name for name in _DOCUMENTS if (path / name).is_file()]
-        if not found:
-            raise ModelError(f"{path} has no {', '.join(sorted(_DOCUMENTS))}: give {KINDS}")
-        return found[0]
-    if not path.is_file():
-        raise ModelError(f"there is no file or folder {path}: give {KINDS}")
-    return path
-
-
-def _read_document(file: Path) -> _Document:
-    try:
-        document = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise ModelError(f"{file} cannot be read ({error}): give {KINDS}") from error
-    return document if isinstance(document, dict) else {}
+        raise ModelError(f"{saved.file} holds no model, result or simulation: give {KINDS}")
+    return reader(saved.file, saved.content, primitives)
 
 
 def _read_equations(text: str) -> OdeSpec | FmuSpec:

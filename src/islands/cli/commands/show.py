@@ -5,18 +5,18 @@ from typing import Annotated
 
 import typer
 
+import islands
 from islands.cli import options
 from islands.cli.record_options import with_reading_options
 from islands.errors import SettingsError, lookup
-from islands.export import EXPORTS, FILE_EXPORTS
-from islands.facade.load import load
-from islands.facade.results.fitted_model import FittedModel
-from islands.facade.results.identification import Result
+from islands.export import EXPORTS, FILE_EXPORTS, export_or_write
 from islands.figures.names import MODEL_FIGURES
 from islands.io.records import read_dataset
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands.io.result_text.text_layout import term_table, wrap
+from islands.io.saved_documents import open_document, read_saved_model
+from islands.models.coupled_narx import CoupledModel
 from islands.models.equations import named_signals
 
 
@@ -58,13 +58,22 @@ def show(
         return
     if record is not None:
         raise SettingsError("--record is for --figure: name one")
-    loaded = load(model)
-    if kind is None and out is None and isinstance(loaded, Result | FittedModel):
-        found = loaded.best.model if isinstance(loaded, Result) else loaded.model
+    # `load` imports the search and its kernels, which takes longer than everything else.
+    found = read_saved_model(open_document(model)) if Path(model).exists() else None
+    if found is None:
+        loaded = islands.load(model)
+        if not isinstance(loaded, islands.FittedModel):
+            _print(loaded.export(kind or "plain", out))
+            return
+        found = loaded.model
+    if kind is None and out is None and not isinstance(found, CoupledModel):
         stated = named_signals(found)
-        typer.echo("\n".join([*term_table(found), *(wrap(f"where {stated}") if stated else [])]))
+        _print("\n".join([*term_table(found), *(wrap(f"where {stated}") if stated else [])]))
         return
-    text = loaded.export(kind or "plain", out)
+    _print(export_or_write(found, kind or "plain", out))
+
+
+def _print(text: str | None) -> None:
     if text is not None:
         typer.echo(text.rstrip("\n"))
 
@@ -84,9 +93,9 @@ def _draw(
         raise SettingsError(
             f"--figure {figure} draws the model on a record: give --record FILE and --out FILE"
         )
-    loaded = load(name)
-    model = loaded.best if isinstance(loaded, Result) else loaded
-    if not isinstance(model, FittedModel):
+    loaded = islands.load(name)
+    model = loaded.best if isinstance(loaded, islands.Result) else loaded
+    if not isinstance(model, islands.FittedModel):
         raise SettingsError(f"--figure is for a model of one output, and {name} is none")
     stated = model.model
     data = read_dataset(record, stated.column_names, stated.output_name, dt, rows, options=reading)

@@ -13,9 +13,8 @@ from islands.expressions.tree import Primitive
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
 from islands.io.ensembles import bands_from_document, ensemble_from_document
-from islands.io.models import read_model, terms_document
 from islands.io.result_models import check_single_output, read_shooting_interval
-from islands.models.protocol import DynamicModel
+from islands.io.saved_documents import find_recommended, read_listed_model
 from islands.validation.metrics import Metrics
 from islands.validation.recommendation import Recommendation
 
@@ -50,7 +49,7 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
         check_single_output(document, folder)
     try:
         entries = document["models"]
-        models = [_read_model(folder, entry, primitives) for entry in entries]
+        models = [read_listed_model(folder, entry, primitives) for entry in entries]
         # Results of earlier versions have no ensemble and no warm-up, and recommend no model.
         ensemble = ensemble_from_document(document.get("ensemble"), models[0], primitives)
         shooting = read_shooting_interval(document)
@@ -67,27 +66,11 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
             )
             for entry, model in zip(entries, models, strict=True)
         )
-        chosen = document.get("recommended", {"rank": 1, "reasons": ()})
-        recommendation = Recommendation(entries[chosen["rank"] - 1]["rank"], tuple(chosen["reasons"]))
+        reasons = document.get("recommended", {}).get("reasons", ())
+        recommendation = Recommendation(find_recommended(document)["rank"], tuple(reasons))
     except (KeyError, TypeError, IndexError, ValueError) as error:
         raise ModelError(f"{file} is damaged or of another version: {error!r} is missing or wrong") from error
     return Result(stored, recommendation, document["settings"], folder, MappingProxyType(document))
-
-
-def _read_model(folder: Path, entry: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> DynamicModel:
-    """Read the file of an entry of ``result.json``, which must be the model of the entry."""
-    path = folder / "models" / f"{entry['rank']:02d}.json"
-    model = read_model(path, primitives)
-    written, expected = (
-        [(term["regressor"], term["parameter"]) for term in terms]
-        for terms in (terms_document(model), entry["terms"])
-    )
-    if written != expected:
-        raise ModelError(
-            f"{path} is not the model of {folder / 'result.json'}, whose errors and bands belong to another: "
-            "give a changed model as a file outside of the folder"
-        )
-    return model
 
 
 def _read_metrics(document: Mapping[str, Any]) -> dict[str, dict[str, Metrics]]:
