@@ -129,11 +129,15 @@ class ExtremeTest:
     ranges : float
         Largest distance of the output from its recorded range, in ranges. Infinite after a divergence, or if
         the recorded output is constant and the output changed.
+    drift : float
+        Difference of the means of the output over the third and the last quarter of the hold, in ranges: the
+        output of an integrator moves on, that of a limit cycle or of a settled model does not.
     """
 
     level: float
     bounded: bool
     ranges: float
+    drift: float
 
     @property
     def plausible(self) -> bool:
@@ -353,10 +357,12 @@ def _evaluate_hold(kind: tuple[float, bool], y: NDArray[np.float64], output_rang
 
 def _evaluate_extreme(level: float, y: NDArray[np.float64], record: Dataset) -> ExtremeTest:
     if np.isnan(y).any():
-        return ExtremeTest(level, False, np.inf)
+        return ExtremeTest(level, False, np.inf, np.inf)
+    third, last = (np.mean(part) for part in np.array_split(y, 4)[2:])
     low, high = np.nanmin(record.y), np.nanmax(record.y)
     distance = max(0.0, low - y.min(), y.max() - high)
-    return ExtremeTest(level, True, percent_of_range(distance, record.output_range) / 100)
+    ranges, drift = (percent_of_range(each, record.output_range) / 100 for each in (distance, last - third))
+    return ExtremeTest(level, True, ranges, drift)
 
 
 def _evaluate_excursion(

@@ -31,6 +31,12 @@ NEGLIGIBLE_EXCESS = 0.01
 #: RMSE as a fraction of the output range below which errors count as equal.
 ROUNDING = 1e-6
 
+#: Distance of the output at held inputs from its recorded range, in ranges, that is not stated.
+_NEAR = 1.0
+
+#: Drift of the output at the end of such a hold, in ranges, that is not stated.
+_STILL = 0.01
+
 #: Largest number of consecutive blocks of the validation data whose errors are compared between models.
 BLOCKS = 20
 
@@ -194,12 +200,31 @@ def _describe_physics(sound: bool, hysteresis: bool, physics: PhysicsChecks) -> 
         kind: " and ".join(f"{factor:g}" for named, factor in EXCURSIONS if named == kind)
         for kind in ("amplitude", "rate")
     }
+    state, remark = "bounded", ""
+    if sound and (moves := _describe_motion(held, physics)):
+        state, remark = "no divergence", f" (where {moves})"
     checks = (
-        f"bounded at inputs held at up to {held:g} times their recorded amplitude about the midpoint, at "
-        f"{factors['amplitude']} times the amplitude and at {factors['rate']} times the rate"
+        f"{state} at inputs held at up to {held:g} times their recorded amplitude about the midpoint{remark}"
+        f", at {factors['amplitude']} times the amplitude and at {factors['rate']} times the rate"
     )
     checks += ", and Property 1 holds" if hysteresis else ""
     return checks if sound else f"no model passes the physics checks ({checks})"
+
+
+def _describe_motion(held: float, physics: PhysicsChecks) -> str:
+    """State how the output leaves its recorded range at held inputs; empty if it rests in or near it.
+
+    A hold cannot show that an output which moves on, as that of an integrator, is bounded.
+    """
+    tests = [each for each in physics.extremes if abs(each.level) <= held]
+    ranges, drift = (
+        max(values, default=0.0) for values in ([t.ranges for t in tests], [t.drift for t in tests])
+    )
+    if ranges <= _NEAR and drift <= _STILL:
+        return ""
+    leaves = f"leaves its recorded range by up to {ranges:.3g} ranges" if ranges > 0.0 else ""
+    moves = "is still moving at the end" if drift > _STILL else ""
+    return f"the output {' and '.join(filter(None, (leaves, moves)))}"
 
 
 def _rmse(entry: Assessment) -> float:

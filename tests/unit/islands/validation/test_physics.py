@@ -339,3 +339,18 @@ def test_the_output_at_an_extreme_is_compared_with_its_recorded_range():
         model({"u(k-1)": 4.0 / AMPLITUDE, "1": 3.0 - 4.0 * MIDPOINT / AMPLITUDE}), record()
     )
     assert [entry.ranges for entry in checked.extremes] == pytest.approx([0.1, 0.0, 0.0, 0.1], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("terms", "drift"),
+    [
+        ({"y(k-1)": 1.0, "u(k-1)": 0.001}, "grows"),
+        ({"y(k-1)": 0.9, "u(k-1)": 0.1}, "settles"),
+        ({"y(k-1)": -1.0, "u(k-1)": 0.1}, "settles"),
+    ],
+)
+def test_an_integrator_drifts_at_held_inputs_and_an_oscillation_does_not(terms, drift):
+    for entry in check_physics(model(terms), record()).extremes:
+        assert entry.bounded
+        assert (entry.drift > 0.05) == (drift == "grows")
+        assert drift == "grows" or entry.drift < 0.01

@@ -1,5 +1,6 @@
 """Recommended model: the smallest that is as good as the best, bounded, and with the claimed physics."""
 
+import re
 from dataclasses import dataclass
 from math import nan, sqrt
 from types import SimpleNamespace
@@ -10,7 +11,7 @@ import pytest
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
-from islands.validation.physics import ClusterSum, ExcursionTest, HoldTest, PhysicsChecks
+from islands.validation.physics import ClusterSum, ExcursionTest, ExtremeTest, HoldTest, PhysicsChecks
 from islands.validation.recommendation import compare_blocks, recommend, recommend_fittest
 
 LOST = EvaluationOutcome(Status.DIVERGED, "at sample 3")
@@ -26,6 +27,8 @@ class Candidate:
     bounded: bool = True
     property_1: bool = True
     trained: float = nan
+    ranges: float = 0.0
+    drift: float = 0.0
 
     def assessment(self):
         physics = PhysicsChecks(
@@ -33,6 +36,10 @@ class Candidate:
             True,
             (HoldTest(0.0, True, True, True, 0.0),),
             (ExcursionTest("rate x 5", self.bounded, 0.0, 100.0),),
+            (
+                ExtremeTest(1.0, True, self.ranges / 2.0, 0.0),
+                ExtremeTest(1.2, True, self.ranges, self.drift),
+            ),
         )
         known = len(self.blocks) > 0
         rmse = sqrt(np.mean(self.blocks)) if known else nan
@@ -175,4 +182,21 @@ def test_the_fittest_model_is_recommended_although_its_free_run_diverges():
     equal = [Candidate(9, NOISE, trained=0.4), Candidate(3, NOISE, trained=0.4)]
     found = recommend_fittest([entry.assessment() for entry in equal], "one_step_ahead", False)
     assert found.rank == 1
-    assert found.reasons[1].startswith("bounded at inputs held at up to 0.8 times")
+    assert found.reasons[1].startswith("bounded at inputs held at up to 1.2 times")
+
+
+@pytest.mark.parametrize(
+    ("ranges", "drift", "words"),
+    [
+        (0.9, 0.001, "bounded at inputs held at up to 1.2 times their recorded amplitude about"),
+        (150.0, 0.0, "no divergence at inputs held at up to 1 times .* recorded range by up to 75 ranges"),
+        (0.0, 0.1, r"no divergence at .* \(where the output is still moving at the end\), at 0.5 times"),
+        (8.82, 2.1, r"\(where the output leaves .* by up to 8.82 ranges and is still moving at the end\)"),
+    ],
+)
+def test_an_output_that_moves_on_at_held_inputs_is_not_said_to_be_bounded(ranges, drift, words):
+    """The level of a tank left its recorded range by 8.8 ranges, and was bounded."""
+    entry = Candidate(2, NOISE, ranges=ranges, drift=drift)
+    reason = recommend([2], [entry.assessment()], hysteresis=False).reasons[1]
+    assert re.match(f".*{words}", reason)
+    assert ("bounded" in reason) == words.startswith("bounded")
