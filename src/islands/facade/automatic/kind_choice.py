@@ -63,8 +63,9 @@ class Choice:
     reasons : tuple of str
         What was chosen and why, in two sentences.
     errors : mapping
-        Free-run error on the validation data of the recommended model of each kind that was compared there,
-        as a fraction of the output range. A kind is missing if it has no model with a finite error.
+        Free-run RMSE on the validation data of the recommended model of each kind that was compared there,
+        as a fraction of the output range of the estimation data, at least `ROUNDING`. A kind is missing if it
+        has no model with a finite error.
     trials : mapping
         The same of small models on held-out parts of the estimation data.
     """
@@ -223,7 +224,7 @@ def _is_bounded(model: Assessment) -> bool:
 
 
 def _measure(model: Assessment, record: Dataset) -> float:
-    """Return the free-run error of a model on the validation data as a fraction of the output range."""
+    """Return the free-run RMSE on the validation data as a fraction of the output range of a record."""
     return max(model.metrics["validation"]["free_run"].rmse / record.output_range, ROUNDING)
 
 
@@ -240,16 +241,18 @@ def _select_kind(
         if not isfinite(trials.errors[first]):
             return first, "because the record is too short for a comparison"
         return first, (
-            f"because its free-run error on held-out parts of the estimation data is "
-            f"{percent(trials.errors[first])} of the output range{_list_others(trials.errors, first)}"
+            "because its free-run RMSE on held-out parts of the estimation data is "
+            f"{percent(trials.errors[first])} of the output range of these data"
+            f"{_list_others(trials.errors, first)}"
         )
     constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
     least = min(errors.values())
     close = [each for each in constrained if errors[each] <= _CLOSE * least]
     if close and check_rest(record).value:
         return close[0], (
-            f"because the output rests while the inputs rest, and the free-run error of its recommended "
-            f"model on the validation data is {percent(errors[close[0]])} of the output range"
+            f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
+            f"model on the validation data is {percent(errors[close[0]])} of the output range of the "
+            "estimation data"
             f"{_list_others(errors, close[0])}"
         )
     models = list(compared.values())
@@ -257,8 +260,8 @@ def _select_kind(
     kind = list(compared)[best.rank - 1]
     smallest = "" if errors[kind] == least else ", the smallest without a significantly larger error,"
     return kind, (
-        f"because the free-run error of its recommended model{smallest} on the validation data is "
-        f"{percent(errors[kind])} of the output range{_list_others(errors, kind)}"
+        f"because the free-run RMSE of its recommended model{smallest} on the validation data is "
+        f"{percent(errors[kind])} of the output range of the estimation data{_list_others(errors, kind)}"
     )
 
 

@@ -120,5 +120,7 @@ def _estimate_delays(record: Dataset) -> tuple[int, ...]:
 
 
 def percent(error: float) -> str:
-    """Return an error as a percentage, for a sentence."""
+    """Return an error as a percentage, for a sentence. Rounding errors are not distinguished."""
+    if error <= ROUNDING:
+        return f"less than {100.0 * ROUNDING:g} %"
     return f"{100.0 * error:.3g} %" if isfinite(error) else "no finite error"

@@ -11,6 +11,7 @@ from islands.data.split import split
 from islands.errors import SettingsError
 from islands.evolution.presets import KINDS, resolve_kind, resolve_kinds
 from islands.facade.automatic.kind_choice import choice_from_document
+from islands.facade.automatic.kind_trials import percent
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
 from islands.facade.library_fit import FitSettings
 from islands.facade.trials.held_out_error import hold_out, measure_library
@@ -75,6 +76,27 @@ def test_reasons_are_two_sentences(chosen):
     _, choice, _ = chosen
     assert len(choice.reasons) == 2
     assert choice.reasons[0].startswith("Preset auto chose smooth (library polynomial of degree 2")
+
+
+@pytest.mark.ci
+def test_the_reason_states_the_error_and_its_scale():
+    """Beside an error of 1e-13 % "of the output range" stood one of 0.0001 %."""
+    clean = choose(record("first order, clean", 300))[0]
+    assert "RMSE of its recommended model on the validation data is less than 0.0001 %" in clean.reasons[0]
+    assert " of the output range of the estimation data" in clean.reasons[0]
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (0.0, "less than 0.0001 %"),
+        (1e-6, "less than 0.0001 %"),
+        (2e-6, "0.0002 %"),
+        (np.inf, "no finite error"),
+    ],
+)
+def test_a_rounding_error_has_no_digits(error, text):
+    assert percent(error) == text
 
 
 @pytest.mark.nightly
