@@ -66,6 +66,13 @@ def test_every_option_of_reading_works_over_rest(service, reading):
         assert "column y_um: Failed is read as missing in line 10" in document["warnings"]
 
 
+def test_days_as_a_time_are_read_as_days_and_said_so(service):
+    rows = (f"{45987.5 + k / 1440:.9f}{line[line.index(',') :]}" for k, line in enumerate(lines()[1:]))
+    preview = service.upload("\n".join(["Date,u_V,y_um", *rows]).encode()).json()["preview"]
+    assert preview["dt"] == 60.0
+    assert any("column Date is read as days: 45987.5 is 2025-11-26" in each for each in preview["warnings"])
+
+
 @pytest.mark.parametrize("name", ["header", "missing", "inputz", "anything"])
 def test_an_unknown_query_parameter_or_form_field_of_an_upload_is_refused(service, name):
     content = "\n".join(lines()).encode()

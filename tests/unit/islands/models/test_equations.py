@@ -47,6 +47,41 @@ def test_equation_of_the_papers_model_12():
     )
 
 
+#: Functions that a printed equation needs: `div` as docs/reference/expressions.md defines it, and NumPy's.
+RUNTIME = {name: getattr(np, name) for name in ("sqrt", "log", "exp", "abs", "tanh", "sign")} | {
+    "min": np.minimum,
+    "max": np.maximum,
+    "div": lambda a, b: a / b if b else 0.0,
+}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("sqrt(u(k-1))", "log(u(k-1))", "exp(40*u(k-1))", "u(k-1)/y(k-1)", "sqrt(y(k-1) - u(k-1))*u(k-2)"),
+        *("1/(u(k-1) - u(k-1))", "log(u(k-1)/y(k-1))^2", "u(k-1)/u(k-2)/y(k-1)", "u(k-1)/(u(k-2)*y(k-1))"),
+        *("sqrt(log(u(k-1)))", "(u(k-1)/y(k-1))^2*sqrt(u(k-2))^3", "tanh(u(k-1)) - sqrt(-2)"),
+    ],
+)
+def test_a_printed_equation_runs_and_has_the_value_of_the_model(text):
+    """Copied from a summary, sqrt(u) and u/y gave NaN at negative and zero values."""
+    model = make_model([(parse(text), 0.5), (parse("y(k-1)"), 0.25)], ("i_A",), "v_V")
+    right = named_equation(model, digits=17).partition("=")[2].replace("^", "**")
+    for signals in np.random.default_rng(1).uniform(-3.0, 3.0, (50, 2, 3)):
+
+        def sample(name, lag, signals=signals):
+            return signals[("v_V", "i_A").index(name)][lag]
+
+        printed = re.sub(r"(v_V|i_A)\(k-(\d)\)", lambda found: f'sample("{found[1]}", {found[2]})', right)
+        terms = zip(model.parameters, model.regressors, strict=True)
+        expected = sum(
+            weight * value(item.expression, lambda channel, lag, signals=signals: signals[channel][lag])
+            for weight, item in terms
+        )
+        assert np.isfinite(expected)
+        assert eval(printed, {**RUNTIME, "sample": sample}) == pytest.approx(expected, rel=1e-12)
+
+
 def test_an_input_that_is_read_early_is_written_at_its_own_sample():
     early = make_model(
         [
