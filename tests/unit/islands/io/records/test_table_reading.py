@@ -68,11 +68,16 @@ def test_a_code_in_an_input_is_refused_without_gaps(tmp_path):
     assert read_record(tmp_path / "bad.csv", ["u"], "y", outliers="keep").u.min() == -9999
 
 
-def test_an_inspection_measures_facts_without_gross_errors_and_warns(tmp_path):
-    file = write(tmp_path / "r.csv", y=with_values((-50, -50, 60)))
+@pytest.mark.parametrize(
+    ("values", "errors"),
+    [((-50, -50, 60), "3 isolated spikes"), (-9999, "3 times -9999, a code of missing values")],
+)
+def test_an_inspection_measures_facts_without_gross_errors_and_warns(tmp_path, values, errors):
+    """The dead time of one sample became 60 to 120."""
+    file = write(tmp_path / "r.csv", y=with_values(values))
     found = islands.inspect_record(file, ["u"], "y")
     assert found.find("dead-time").value == 1
-    assert "3 isolated spikes (line 152, line 153, line 702) are left out" in found.warnings[0]
+    assert f"{errors} (line 152, line 153, line 702) are left out" in found.warnings[0]
     assert "option outliers: keep" in found.warnings[0]
     kept = islands.inspect_record(file, ["u"], "y", reading=ReadingOptions(outliers="keep"))
     assert "are used (option outliers: exclude leaves them out)" in kept.warnings[0]

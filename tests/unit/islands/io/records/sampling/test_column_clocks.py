@@ -116,6 +116,17 @@ def test_columns_of_different_clocks_give_the_law_at_the_rate_of_the_slowest(tmp
     assert f", every {record.dt:.4g} s" in record.reading[0].partition("read at those of ")[2]
 
 
+@pytest.mark.ci
+@pytest.mark.parametrize("case", ["empty cells", "held"])
+def test_the_defaults_find_the_law_of_columns_of_different_clocks(tmp_path, case):
+    """Held values gave a dead time of nine samples, terms of friction and twelve times the error."""
+    make, step = CASES[case]
+    best = islands.fit(read(tmp_path, make())).best
+    assert best.model.parameter_names == ("y(k-1)", "u1(k-1)")
+    assert best.model.parameters[0] == pytest.approx(np.exp(-step / TAU), abs=0.003)
+    assert best.metrics["validation"]["free_run"].rmse < 1.2 * NOISE
+
+
 @pytest.mark.parametrize("delay", [0.1, 0.25, 0.3])
 @pytest.mark.parametrize("first", [0.0, 0.003])
 def test_no_shift_in_time(tmp_path, first, delay):
