@@ -13,6 +13,7 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 
 from islands.data.preprocessing_steps import Preprocessing
 from islands.data.split import compare_input_ranges
+from islands.errors import name_option
 from islands.models.equations import name_columns
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
 from islands.validation.prediction_bands import LEVEL
@@ -909,8 +910,9 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
             and facts.document["settings"].get("estimator") != "free-run"
         ),
         lambda _: (
-            "try an estimate that minimises the error of the free run (--estimator free-run), or measure the "
-            "disturbance: one step ahead, no structure is left"
+            "try an estimate that minimises the error of the free run "
+            f"({name_option('estimator', 'free-run')}), or measure the disturbance: one step ahead, no "
+            "structure is left"
         ),
     ),
     Statement(
@@ -922,8 +924,9 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
         "output-noise",
         lambda facts: facts.has_output_noise,
         lambda _: (
-            "estimate with --estimator free-run: the free run is better than the prediction one step ahead, "
-            "so that the noise is that of the measured output, which biases least squares"
+            f"estimate with {name_option('estimator', 'free-run')}: the free run is better than the "
+            "prediction one step ahead, so that the noise is that of the measured output, which biases least "
+            "squares"
         ),
     ),
     Statement(

@@ -9,6 +9,7 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.data.split import Split
+from islands.errors import command_line_names
 from islands.expressions.parsing import parse
 from islands.io.result_folder import result_document
 from islands.io.result_text import statements
@@ -163,7 +164,7 @@ def test_the_verdict_is_that_of_the_free_run(findings):
     assert found["As a simulation"].endswith("one step ahead, 2 % is predictable).")
     assert "94 % of the free-run residual is predictable (RMS 5 % of the output range)" in found["Fails at"]
     assert "within the limits below" in found["Good for"]
-    assert "--estimator free-run" in found["Next"]
+    assert '(estimator="free-run")' in found["Next"]
     fine = ResidualStructure(0.02, 0.03, 0.1, "adequate")
     physics = findings.recommended.physics
     closed = replace(
@@ -210,13 +211,15 @@ def test_noise_of_the_output_is_a_reason_for_the_free_run_estimate(findings):
     data = Dataset(u, y + 0.02 * rng.standard_normal(1200), 0.1)
     settings = {"library": "polynomial", "degree": 2, "lags": 2, "certificate": 0, "average": 1}
     biased = islands.fit(data, **settings)
-    assert "Next: estimate with --estimator free-run:" in " ".join(str(biased).split())
+    assert 'Next: estimate with estimator="free-run":' in " ".join(str(biased).split())
+    with command_line_names():
+        assert "Next: estimate with --estimator free-run:" in " ".join(str(biased).split())
     unbiased = islands.fit(data, estimator="free-run", **settings)
     assert unbiased.best.model.parameter_names == ("y(k-1)", "u1(k-1)", "u1(k-1)^2")
-    assert "--estimator" not in str(unbiased)
+    assert "estimator=" not in str(unbiased)
     linear = islands.fit(replace(data, y=y_of_a_lag(u) + 0.02 * rng.standard_normal(1200)), **settings)
     assert linear.best.model.parameter_names == ("y(k-1)", "u1(k-1)")
-    assert "--estimator" not in str(linear)
+    assert "estimator=" not in str(linear)
     # With noise in the equation, the free run is not better than the prediction one step ahead.
     white = ResidualStructure(0.02, 0.02, 0.7, "adequate")
     free = Metrics(1.0, 0.99, 2.0, 90.0)
