@@ -358,7 +358,7 @@ def _evaluate_hold(kind: tuple[float, bool], y: NDArray[np.float64], output_rang
 def _evaluate_extreme(level: float, y: NDArray[np.float64], record: Dataset) -> ExtremeTest:
     if np.isnan(y).any():
         return ExtremeTest(level, False, np.inf, np.inf)
-    third, last = (np.mean(part) for part in np.array_split(y, 4)[2:])
+    third, last = (float(np.mean(part)) for part in np.array_split(y, 4)[2:])
     low, high = np.nanmin(record.y), np.nanmax(record.y)
     distance = max(0.0, low - y.min(), y.max() - high)
     ranges, drift = (percent_of_range(each, record.output_range) / 100 for each in (distance, last - third))
