@@ -80,7 +80,7 @@ def test_reasons_are_two_sentences(chosen):
 
 @pytest.mark.ci
 def test_the_reason_states_the_error_and_its_scale():
-    """Beside an error of 1e-13 % "of the output range" stood one of 0.0001 %."""
+    """A summary stated errors of 1e-13 % and of 0.0001 % of the output range for one model."""
     clean = choose(record("first order, clean", 300))[0]
     assert "RMSE of its recommended model on the validation data is less than 0.0001 %" in clean.reasons[0]
     assert " of the output range of the estimation data" in clean.reasons[0]
