@@ -23,6 +23,7 @@ EXCLUSIVE = (
     (r"As a simulation: good", r"(on|of) the estimation data (diverges|is [\d.e+]+ times)"),
     (r"every term has an inclusion probability", r"doubtful terms"),
     (r"every term has an inclusion probability", r"models without .* are about as good"),
+    (r"As a simulation: unsuitable", r"models without .* are about as good"),
     (r"diverges in \d+ of \d+ holds", r"Good for: [^.]*(bounded|divergence) at inputs"),
     (r"diverges at (minor-loops|amplitude x|rate x)", r"Good for: [^.]*(bounded|divergence) at inputs"),
     (r"no model passes the physics checks", r"Good for: .*(bounded|divergence) at inputs.* Fails at:"),

@@ -937,7 +937,8 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement("insignificant", lambda facts: facts.insignificant, _describe_longer_record),
     Statement(
         "unlikely",
-        lambda facts: not facts.insignificant and _find_unlikely(facts)[1] < _UNLIKELY,
+        # Few samples of a correlated residual count, so that much worse models have weight in the ensemble.
+        lambda facts: facts.simulates and not facts.insignificant and _find_unlikely(facts)[1] < _UNLIKELY,
         _describe_unlikely,
     ),
     TEST,

@@ -313,6 +313,9 @@ def test_the_uncertainty_has_the_half_width_of_the_band_and_the_doubtful_terms(f
     found = said(excluded)
     assert f"{named_term(entry.model, 0)} 0.00" in found["Uncertainty"]
     assert f"models without {named_term(entry.model, 0)} are about as good" in found["Next"]
+    # Without a disturbance that was not measured, models of an R2 of 0.61 and of -0.04 were "about as good".
+    poor = with_changes(entry, metrics=errors(findings, Metrics(9.0, 0.61, 9.0, 38.0)))
+    assert "models without" not in said(replace(excluded, models=(poor,)))["Next"]
     almost = replace(findings.ensemble.structures[0], model=entry.model, weight=0.8999)
     other = replace(almost, model=make_model([(parse("u(k-9)"), 1.0)]), weight=0.1001)
     doubtful = said(replace(findings, ensemble=Ensemble((almost, other))))["Uncertainty"]
