@@ -82,6 +82,16 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "expression": (lambda: islands.parse(None), "an expression is a text"),
     "warm-up": (lambda: islands.simulate(MODEL, RECORD, warm_up="5"), "warm_up is an integer"),
     "model-to-write": (lambda: islands.write_model(RECORD, "a.json"), "a Dataset is no model"),
+    "record-to-simulate": (
+        lambda: islands.simulate(RECORD, RECORD),
+        "a Dataset is no model: give result.best.model, or the name of a simulation",
+    ),
+    "text-to-linearise": (lambda: islands.linearise("y(k-1)", [0.0]), "a str is no model: give result.best"),
+    "record-as-formula": (lambda: islands.to_sympy(RECORD), "a Dataset is no model"),
+    "text-as-step-response": (
+        lambda: islands.step_response("y(k-1)", 0.0, 1.0),
+        "a str is no model",
+    ),
     "effects": (
         lambda: islands.diagnose(RECORD, "linear:1", effects=["friction"]),
         "effects takes a Effect, got a str",

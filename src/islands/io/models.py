@@ -22,7 +22,7 @@ from islands.io.result_models import read_preprocessing
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.narx import Model, require_narx
 from islands.models.parametric import ParametricModel
-from islands.models.protocol import DynamicModel
+from islands.models.protocol import DynamicModel, no_model_error
 
 #: Tag of NARX models.
 NARX = Model.kind
@@ -74,10 +74,7 @@ def write_model(model: AnyModel, path: str | Path) -> None:
         It is no model, a number of it is not finite, or the file cannot be written.
     """
     if not isinstance(model, Model | CoupledModel | ParametricModel):
-        raise ModelError(
-            f"a {type(model).__name__} is no model: give result.best.model, or save the result by "
-            "result.save(folder)"
-        )
+        raise no_model_error(model, ", or save the result by result.save(folder)")
     text = model_json(model)
     try:
         Path(path).write_text(text, encoding="utf-8")

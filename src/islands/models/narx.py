@@ -22,7 +22,7 @@ from islands.models.equations import (
     named_term,
     plain_text,
 )
-from islands.models.protocol import DynamicModel, ModelEquation
+from islands.models.protocol import DynamicModel, ModelEquation, no_model_error
 from islands.models.regressor import Regressor, regressor
 from islands.models.signal_statement import describe_values, symbols
 
@@ -235,8 +235,10 @@ def require_narx(model: DynamicModel) -> Model:
     Raises
     ------
     ModelError
-        It is of another class.
+        It is of another class, or no model.
     """
+    if not isinstance(model, DynamicModel):
+        raise no_model_error(model)
     if not isinstance(model, Model):
         raise ModelError(f"a NARX model is needed, this one is of the class {model.kind}")
     return model

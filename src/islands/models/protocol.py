@@ -8,7 +8,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 from islands.data.signal_map import SignalReference
+from islands.errors import ModelError
 from islands.models.block import Block
+
+
+def no_model_error(value: object, otherwise: str = "") -> ModelError:
+    """Return an error about a value that is given in place of a model, such as a result."""
+    return ModelError(f"a {type(value).__name__} is no model: give result.best.model{otherwise}")
 
 
 class ModelEquation(Protocol):

@@ -29,7 +29,7 @@ from islands.errors import (
 from islands.io.models import model_from_json
 from islands.models.narx import Model, measured_model
 from islands.models.parametric import ParametricModel
-from islands.models.protocol import DynamicModel
+from islands.models.protocol import DynamicModel, no_model_error
 from islands.models.signal_statement import describe_values
 from islands.simulators.fmu.simulator import make_fmu_simulator
 from islands.simulators.interface import Simulator
@@ -43,7 +43,7 @@ from islands.simulators.parametric import ParametricSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.saved_extension import SavedExtension
-from islands.simulators.specification.base import ParameterRange, SimulatorEntry
+from islands.simulators.specification.base import ParameterRange, SimulatorEntry, SpecModel
 from islands.simulators.specification.code import FmuSpec, ProgramSpec
 from islands.simulators.specification.description import read_scales
 from islands.simulators.specification.equations import OdeSpec, read_built_in
@@ -84,11 +84,13 @@ def make_simulator(
     Raises
     ------
     SettingsError, ModelError
-        The specification is invalid.
+        The specification is invalid, or none.
     RecordError
         The record is not suitable for the simulator.
     """
     spec = parse_spec(spec) if isinstance(spec, str) else spec
+    if not isinstance(spec, SpecModel):
+        raise no_model_error(spec, ", or the name of a simulation")
     check_magnitudes(estimation_part(record), record)
     # Estimates and initial values need a complete output; the calibration leaves missing samples out.
     record = replace(record, y=fill_gaps(record.y))
