@@ -119,6 +119,8 @@ def test_a_message_names_an_option_as_its_caller_gives_it(
     assert "sampling time by --dt, or name the column by --time" in " ".join(done.stderr.split())
 
 
-def test_no_message_of_a_reader_leads_with_a_flag() -> None:
-    sources = (Path(islands.__file__).parent / "io" / "records").rglob("*.py")
+def test_no_text_about_a_record_or_a_result_has_a_flag() -> None:
+    """Texts of files are for every caller; messages name options by `name_option`."""
+    package = Path(islands.__file__).parent
+    sources = [path for folder in ("io", "diagnosis", "reports") for path in (package / folder).rglob("*.py")]
     assert not [path.name for path in sources if re.search(r"--[a-z]{2,}", path.read_text())]

@@ -50,7 +50,7 @@ def _exchange_inputs(record: Dataset, first: int, second: int) -> Correction:
             input_units=tuple(record.input_units[each] for each in order),
         ),
         f"The input and a channel seem to be exchanged: the simulation is driven by {name}, not {drive}.",
-        f"Give --input {name}, and {drive} as a --channel.",
+        f"Give {name} as the input, and {drive} as a channel.",
     )
 
 
@@ -60,7 +60,7 @@ def _exchange_output(record: Dataset, place: int) -> Correction:
     u[:, place] = record.y
     names, units = list(record.input_names), list(record.input_units)
     names[place], units[place] = record.output_name, record.output_unit
-    others = "".join(f" --channel {each}" for each in names[1:])
+    channels = f", and {', '.join(names[1:])} as channels" if names[1:] else ""
     role = "input" if place == 0 else "channel"
     return Correction(
         "swapped-channels",
@@ -75,7 +75,7 @@ def _exchange_output(record: Dataset, place: int) -> Correction:
         ),
         f"The output and the {role} {name} seem to be exchanged: the simulated signal is {name}, not "
         f"{record.output_name}.",
-        f"Give --input {names[0]} --output {name}{others}.",
+        f"Give {names[0]} as the input and {name} as the output{channels}.",
         has_other_output=True,
     )
 

@@ -65,8 +65,8 @@ def find_closed_loop(fit: CalibrationResult, target: Target, input_name: str) ->
             f"{correlation:.2g}, {distance:.1f} standard deviations beyond chance. In a closed loop the "
             "input contains the noise: estimated parameters are biased unless the noise model is right, and "
             "effects that act through the input are less certain.",
-            "Give known parameters with --tolerance instead of estimating them, and change the setpoint "
-            "during the test, or use a record without the controller.",
+            "Give known parameters with their tolerances (option tolerance) instead of estimating them, and "
+            "change the setpoint during the test, or use a record without the controller.",
             {"correlation": (correlation, ""), "lag": (float(lag), "samples")},
         ),
     )

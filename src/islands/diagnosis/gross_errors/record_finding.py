@@ -72,7 +72,7 @@ def describe_gaps(record: Dataset) -> tuple[RecordFinding, ...]:
             "missing-output",
             f"{count} of {record.samples} outputs are missing ({100 * share:.2g} %), in {len(gaps)} gaps of "
             f"at most {longest * record.dt:.4g} s. They do not count.",
-            "No step is necessary; --gaps interpolate would add values that were not measured.",
+            "No step is necessary (option gaps: interpolate would add values that were not measured).",
             {"share": (share, ""), "longest": (longest * record.dt, "s")},
         ),
     )

@@ -35,7 +35,7 @@ def correct_sampling_time(record: Dataset) -> Iterator[Correction]:
                 "sampling-time",
                 replace(record, dt=dt),
                 f"The sampling time seems to be {dt:.6g} s, and not {record.dt:.6g} s.",
-                f"Give --dt {dt:.6g} (library: dt=), or correct the time column.",
+                f"Give {dt:.6g} s as the sampling time (option dt), or correct the time column.",
                 {"factor": (factor, ""), "sampling time": (dt, "s")},
             )
 

@@ -60,7 +60,7 @@ def _move_output(record: Dataset, offset: int) -> Correction:
     rows = f"{abs(offset)} row{'s' if abs(offset) > 1 else ''}"
     advice = f"Move column {output} {'up' if late else 'down'} by {rows} in the file."
     if offset == -1:
-        advice = f"Give --input {drive}+1, which reads the input one sample early."
+        advice = f"Give {drive}+1 as the input, which reads {drive} one sample early."
     return Correction(
         "time-offset",
         replace(record, y=shift_signal(record.y, offset, record.bounds)),

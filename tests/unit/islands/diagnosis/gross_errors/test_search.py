@@ -145,7 +145,7 @@ def test_sampling_time_at_which_the_simulation_diverges_is_advised() -> None:
         "steps": 1,
     }
     simulator = make_simulator(OdeSpec.model_validate({"kind": "ode", **document}), RECORD)
-    with pytest.raises(RecordError, match=r"diverges on this input.* Give --dt 0.01 "):
+    with pytest.raises(RecordError, match=r"diverges on this input.* Give 0.01 s as the sampling time"):
         diagnose(replace(RECORD, dt=1000 * DT), simulator, TOLERANCE, catalogue=())
 
 
