@@ -129,7 +129,7 @@ class JobView(ResponseModel):
                         "verdict": "named",
                         "effects": ["thermal-drift"],
                         "reduction_percent": 64.3,
-                        "words": "The simulation lacks known effects, which explain the discrepancy.\n"
+                        "words": "The simulation lacks a known effect, which explains the discrepancy.\n"
                         "  thermal-drift: ...",
                         "wall_s": 2.1,
                     },

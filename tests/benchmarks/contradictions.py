@@ -3,10 +3,11 @@
     python tests/benchmarks/contradictions.py [--jobs 2] [--only law] [--every 5]
 
 The results are fits of the records of the portfolio, of 24 laws with three levels of noise, of records with
-gross errors, of short, drifting and extrapolating ones, of several outputs and of the measured records, and
-diagnoses of the portfolio. Each text is checked against the table of exclusive pairs of
-``tests/support/statements.py``, and the text of the saved folder is compared with that of the run. The goal
-is 0. Results are printed; the exit code is 1 if there is a contradiction.
+gross errors, of short, drifting and extrapolating ones, of several outputs and of the measured records;
+diagnoses of the portfolio, and of simulations with a known difference to their records. Each text is checked
+against the tables of exclusive pairs of ``tests/support/statements.py``, and the text of the saved folder is
+compared with that of the run. The goal is 0. Results are printed; the exit code is 1 if there is a
+contradiction.
 """
 
 import argparse

@@ -13,7 +13,9 @@ from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.io.result_folder import finite, residual_structure_document, result_document
 from islands.io.result_text.coupled_statements import describe_coupled
-from islands.io.result_text.statements import describe
+from islands.io.result_text.diagnosis_statements import VERDICTS as VERDICTS_OF_DIAGNOSES
+from islands.io.result_text.diagnosis_statements import DiagnosisFacts, describe_diagnosis
+from islands.io.result_text.statements import describe, find_statements
 from islands.io.result_text.summary_text import summary
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
@@ -23,6 +25,7 @@ from islands.validation.metrics import Metrics
 from islands.validation.predictable_residual import VERDICTS, ResidualStructure
 from support.assessments import with_changes
 from support.coupled_systems import TWO_MASSES, make_coupled_record
+from support.diagnosis_documents import CAUSE, GAIN, make_document
 from support.searches import record
 from support.stated_results import list_texts, make_cases
 from support.statements import EXCLUSIVE, find_contradictions
@@ -196,6 +199,65 @@ def test_no_two_sentences_about_several_outputs_contradict_each_other(choices, l
     assert not find_contradictions(page.decode())
 
 
+#: Measured quantities of a diagnosis, on both sides of every limit of its sentences.
+DIAGNOSES = st.fixed_dictionaries(
+    {
+        "verdict": st.sampled_from(
+            ["nothing", "named", "named with remainder", "family", "discovered", "unknown"]
+        ),
+        "confidence": st.lists(st.sampled_from([0.2, 0.4949, 0.4951, 0.9949, 1.0]), min_size=1, max_size=3),
+        "claimed": st.booleans(),
+        "families": st.sampled_from(["timing", "scale"]),
+        "errors": st.tuples(*[st.sampled_from([1e-9, 0.0999, 0.12, 0.1201, 0.2999, 0.3001, 0.9, 3.0])] * 3),
+        "low": st.sampled_from([-5.0, 0.0, 0.04, 30.0]),
+        "floor": st.sampled_from([0.0, 0.1, 0.5]),
+        "measured": st.booleans(),
+        "remainder": st.sampled_from([{}, {"input": 4.6}]),
+        "score": st.sampled_from([-3.0, 12.0]),
+    }
+)
+
+
+def make_chosen_document(choices):
+    """Return a document whose verdict, gain and remainder are possible together."""
+    verdict, first = choices["verdict"], [True] + [choices["claimed"]] * 2
+    has_causes = verdict not in ("nothing", "unknown")
+    causes = [
+        {**CAUSE, "confidence": each, "claimed": claimed, "family": choices["families"]}
+        for each, claimed in zip(choices["confidence"], first, strict=False)
+    ]
+    if verdict in ("family", "discovered"):
+        causes[0] |= {"free_form": True} if verdict == "family" else {"family": "discovered"}
+    calibrated, before, after = choices["errors"]
+    reduction = 100.0 * (1.0 - after / before)
+    low = min(choices["low"], reduction)
+    gain = {
+        **GAIN,
+        "before": {"rmse": before, "mape": 1.0},
+        "after": {"rmse": after, "mape": 1.0},
+        "reduction_percent": reduction,
+        "ci95": [low, max(reduction, 40.0)],
+    }
+    return make_document(
+        verdict,
+        effects=causes if has_causes else [],
+        gain=gain if has_causes else None,
+        calibrated_rmse=calibrated,
+        as_given_rmse=before,
+        noise_floor_rmse=choices["floor"],
+        noise_floor_is="measured by repeated periods" if choices["measured"] else "an upper bound",
+        remainder={} if verdict in ("nothing", "named") else choices["remainder"],
+        candidates=[{"name": "jump", "score": choices["score"], "eta": 1.0}],
+    )
+
+
+@given(DIAGNOSES)
+def test_no_two_sentences_about_a_diagnosis_contradict_each_other(choices):
+    document = make_chosen_document(choices)
+    assert not find_contradictions(" ".join(describe_diagnosis(document)))
+    assert len(find_statements(VERDICTS_OF_DIAGNOSES, DiagnosisFacts(document))) == 1
+
+
 CASES = make_cases()
 
 #: Cases of every kind; `tests/benchmarks/contradictions.py` has all of them.
@@ -208,7 +270,8 @@ SAMPLE = (
         for fault in ("sentinels", "spikes", "short", "extrapolation", "integrator")
     ),
     *[name for name in CASES if name.startswith("several outputs")][::5],
-    *("diagnosis, first order", "diagnosis, tank"),
+    *("diagnosis, portfolio, first order", "diagnosis, portfolio, tank", "diagnosis, wrong parameter"),
+    *("diagnosis, stopped before free forms", "diagnosis, channels", "diagnosis, column, gain, seed 0"),
 )
 
 

@@ -3,6 +3,7 @@
 import tempfile
 from collections.abc import Callable, Mapping
 from functools import partial
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,11 @@ import numpy as np
 import islands
 from islands.data.dataset import Dataset
 from islands.facade.results.complete_diagnosis import DiagnosisResult
+from islands.facade.results.notebook_html import render_sentences
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
+from support.diagnosed_records import MEASURED_OUTPUTS, OTHERS, diagnose_difference
 from support.laws import LAWS
 from support.measured_portfolio import MEASURED
 from support.portfolio_records import KINDS
@@ -72,7 +75,12 @@ def make_cases() -> dict[str, Callable[[], AnyResult]]:
     cases: dict[str, Callable[[], AnyResult]] = {}
     for name, kind in KINDS.items():
         cases[f"portfolio, {name}"] = lambda kind=kind: islands.fit(kind.record(0)[0])
-        cases[f"diagnosis, {name}"] = lambda kind=kind: _diagnose(kind.record(0)[0])
+        cases[f"diagnosis, portfolio, {name}"] = lambda kind=kind: _diagnose(kind.record(0)[0])
+    for name in MEASURED_OUTPUTS:
+        for seed in range(2):
+            cases[f"diagnosis, column, {name}, seed {seed}"] = partial(diagnose_difference, name, seed)
+        cases[f"diagnosis, linear, {name}"] = partial(diagnose_difference, name, 2, "linear:2")
+    cases |= {f"diagnosis, {name}": make for name, make in OTHERS.items()}
     for name, law in LAWS.items():
         for level in LEVELS:
             make = partial(law.record, 800, level, 0)
@@ -107,7 +115,7 @@ def _diagnose(record: Dataset) -> DiagnosisResult:
 def list_texts(name: str, result: AnyResult) -> Mapping[str, str]:
     """Return every text about a result, by where a reader meets it."""
     if isinstance(result, DiagnosisResult):
-        return {"summary": result.summary, "report": result.write_report(name).decode()}
+        return _list_texts_of_diagnosis(name, result)
     if isinstance(result, islands.CoupledResult):
         document, sentences = result.document(), result.sentences()
         figures = [b"<svg/>"] * len(result.results)
@@ -123,3 +131,16 @@ def list_texts(name: str, result: AnyResult) -> Mapping[str, str]:
         raise AssertionError(f"{name}: the folder states something else than the run")
     report = identification_report(name, result.search_result, {}).decode()
     return {"summary": read, "notebook": notebook, "report": report}
+
+
+def _list_texts_of_diagnosis(name: str, result: DiagnosisResult) -> Mapping[str, str]:
+    with tempfile.TemporaryDirectory() as folder:
+        report = (result.save(folder, name) / "report.html").read_text()
+        stored = islands.load(folder)
+    if not isinstance(stored, islands.SavedDiagnosis) or stored.summary != result.summary:
+        raise AssertionError(f"{name}: the folder states something else than the run")
+    shown = unescape(report)
+    if missing := [line for line in result.summary.splitlines() if line.strip() not in shown]:
+        raise AssertionError(f"{name}: the report lacks {missing}")
+    notebook = render_sentences(stored.summary.splitlines(), None, "")
+    return {"summary": result.summary, "notebook": unescape(notebook), "report": shown}

@@ -36,21 +36,63 @@ EXCLUSIVE = (
     (r"As a simulation: (good|usable)", r"Fails at: .*simulation from the inputs alone: the free run"),
     (r"Fails at: none of the checks", r"try other terms or more lags"),
     (r"Fails at: none of the checks", r"% of the residual of \w+ is predictable \(RMS"),
-    (r"No significant discrepancy", r"simulation (lacks|is wrong)"),
-    (r"No significant discrepancy", r"the RMSE falls from"),
-    (r"No significant discrepancy", r"improves the fit, but is not claimed.*which explain the discrepancy"),
-    (r"which explain the discrepancy", r"no known effect explains"),
-    (r"stopped before a verdict", r"(No significant discrepancy|which explain)"),
-    (r"the RMSE falls from", r"%?, by -[\d.]+ %"),
     (r"(no smaller model is as good|: smallest of \d+ models)", r"try [^;.]*smaller model"),
     (r"Good for: no use that", r"no structure is left in the"),
     (r"drifts by [\d.e+]+ % of its range at constant input", r"Good for: .*Property 1 holds.* Fails at:"),
+)
+
+#: A claimed cause that others together exceed in probability.
+_UNLIKELY = (
+    r"confidence 0\.[0-4]\d, \d+ % of the misfit above the noise floor"
+    r"(?!; improves|; confounded with [^;]*; improves)"
+)
+
+#: An error far above the noise.
+_FAR = r"the RMSE is ([3-9](\.\d+)?|\d{2,}(\.\d+)?|\d[.\d]*e\+\d+) times the floor"
+
+#: Effects that explain all of a discrepancy.
+_WHOLE = r"explains? the discrepancy[.;]"
+
+#: The same for the text about a diagnosis.
+EXCLUSIVE_OF_DIAGNOSES = (
+    (
+        r"No significant discrepancy",
+        r"(There is a (significant )?discrepancy|The simulation lacks|is wrong, which)",
+    ),
+    (r"No significant discrepancy", r"the RMSE (falls|does not fall)"),
+    (r"No significant discrepancy", r"(The remaining residual depends|none of which is confirmed)"),
+    (
+        r"No significant discrepancy",
+        r"confidence (above )?\d\.\d\d, \d+ % of the (misfit|mean squared error)",
+    ),
+    (r"No significant discrepancy: ", _FAR),
+    (_WHOLE, _FAR),
+    (_WHOLE, r"(The remaining residual depends|significant structure remains|none of which is confirmed)"),
+    (r"explains? (most of |a part of )?the discrepancy[.;]", r"does not fall significantly"),
+    (r"explains? [^.]*of the samples used for estimation", r"the RMSE falls from"),
+    (r"the RMSE falls from", r"by -[\d.]+ %"),
+    (r"the RMSE falls from [^%]*%", r"\((-[\d.]+ to|[\d.]+ to -)[^()]* with 95 % confidence\)"),
+    (r"does not fall significantly", r"a reduction of [\d.]+ % \([\d.]*[1-9][\d.]* to"),
+    (r"The simulation lacks (a )?known effects?", _UNLIKELY),
+    (r"is wrong, which explains", _UNLIKELY),
+    (r"uncertain causes?: (?!.*confidence 0\.[0-4])", r""),
+    (r"no known effect is confirmed", r"(confidence (above )?\d\.\d\d, \d+ % of the misfit|the RMSE falls)"),
+    (r"stopped before a verdict", r"(No significant discrepancy|explains? |the RMSE falls from)"),
+    (r"significant structure remains(?!.*(The remaining residual depends|A flexible model of))", r""),
+    (r"Record and simulation do not match", r"(The simulation lacks|No significant|the RMSE (falls|is))"),
+    (r"Known effects alone explain less", r"(the score is worse by -|that explain the record as well)"),
+    (r"the RMSE is (below it|at the floor)", _FAR),
+    (r"(is|,) a rounding error", r"the RMSE is [\d.e+]+ times the floor"),
+    (r"measured from repeated periods", r"because the record has no repeated periods"),
+    (r"no effect alone improves the fit", r"none of which is confirmed"),
 )
 
 #: Statements of one quantity, whose numbers are equal wherever they occur.
 REPEATED = (
     r"(\d+) % of (?:the residual of the free run|the free-run residual) is predictable",
     r"RMSE (\S+) ?\S*, mean absolute error",
+    r"(?:calibrated, with the effects |the RMSE falls from [^()]*\([^()]*\) to )([\d.e+-]+\d)",
+    r"(?:The noise floor is |noise floor(?: \(upper bound\))? )([\d.]+(?:e[+-]\d+)?)",
 )
 
 
@@ -58,7 +100,9 @@ def find_contradictions(text: str) -> list[str]:
     """Return the contradictions of a text, whose lines and tags do not count."""
     joined = " ".join(re.sub(r"<[^<>]*>", " ", text).split())
     found = [
-        f"{one} / {other}" for one, other in EXCLUSIVE if re.search(one, joined) and re.search(other, joined)
+        f"{one} / {other}"
+        for one, other in (*EXCLUSIVE, *EXCLUSIVE_OF_DIAGNOSES)
+        if re.search(one, joined) and re.search(other, joined)
     ]
     found += [
         f"{name} has no structure, and a predictable residual"

@@ -97,6 +97,11 @@ class Diagnosis:
         return tuple(each for each in self.effects if each.explained_fraction is not None)
 
     @property
+    def claimed_names(self) -> tuple[str, ...]:
+        """Names of the causes that are claimed; several missing terms have one."""
+        return tuple(dict.fromkeys(each.name for each in self.causes if each.is_claimed))
+
+    @property
     def noise(self) -> tuple[Finding, ...]:
         """The properties of the noise. They are no discrepancy: alone they leave the verdict "nothing"."""
         return tuple(each for each in self.effects if each.explained_fraction is None)

@@ -3,17 +3,17 @@
 from functools import partial
 
 from islands.diagnosis.detectability import NOTHING, SelfTest
-from islands.diagnosis.documents.result_text import (
-    describe_finding,
-    describe_left_out,
-    describe_noise_floor,
-    describe_verdict,
-    summarise_self_test,
-)
+from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.finding import list_free_forms
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.surrogates import STRENGTHS
+from islands.io.result_text.diagnosis_statements import (
+    describe_causes,
+    describe_details,
+    describe_verdict,
+    name_reference,
+)
 from islands.parallel import ParallelMap
 from islands.reports.rendering import TEMPLATES, inline_figure
 
@@ -97,16 +97,15 @@ def diagnosis_report(
     names = _list_figures(found)
     drawn = parallel_map(partial(_draw, found), names)
     figures = [(_CAPTIONS[each], figure) for each, figure in zip(names, drawn, strict=True)]
+    document = diagnosis_document(found, None, tested, proposal)
     text = TEMPLATES.get_template("diagnosis.html").render(
         name=name,
-        found=found,
-        verdict=describe_verdict(found),
-        left_out=describe_left_out(found),
-        findings=[describe_finding(finding) for finding in found.effects],
-        proposal=proposal,
-        floor=describe_noise_floor(found),
+        document=document,
+        verdict=describe_verdict(document),
+        causes=describe_causes(document),
+        details=describe_details(document),
+        reference=name_reference(document),
         figures=figures,
-        tested=None if tested is None else summarise_self_test(tested),
         strengths=STRENGTHS,
         limits=[] if tested is None else _limits(tested),
         mistaken=[] if tested is None else _mistaken(tested),

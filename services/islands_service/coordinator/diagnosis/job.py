@@ -124,7 +124,7 @@ def _make_summary(found: DiagnosisResult, simulation: str, note: str) -> dict[st
     return {
         "simulation": simulation,
         "verdict": str(found.verdict),
-        "effects": [finding.name for finding in found.effects],
+        "effects": list(found.claimed_names),
         "reduction_percent": None if found.gain is None else found.gain.reduction_percent,
         "words": f"{words}\nNote: {note}." if note else words,
         "wall_s": found.wall_s,

@@ -30,7 +30,6 @@ from islands.data.dataset import Dataset
 from islands.data.split import hold_out
 from islands.diagnosis.calibration.fit_journal import FitJournal
 from islands.diagnosis.detectability import SelfTest, self_test
-from islands.diagnosis.documents.result_text import summarise_self_test
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import InterimFindings
@@ -140,8 +139,6 @@ def diagnose(
                 write_fits(out, fits)
     for paragraph in found.summary.splitlines():
         output.print("\n".join(wrap(paragraph, "    ")), markup=False)
-    if limits is not None:
-        output.print(summarise_self_test(limits), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
     stop.end(out, (*diagnosis.left_out, *steps.left_out), explain_continuation(out))
 

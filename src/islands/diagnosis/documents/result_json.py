@@ -4,11 +4,15 @@ import json
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from islands.diagnosis.detectability import SelfTest
 from islands.diagnosis.discovery.effect_shape import EffectShape
 from islands.diagnosis.findings import ResidualFormula
-from islands.diagnosis.inference.finding import Finding
+from islands.diagnosis.inference.finding import Finding, list_free_forms
+from islands.diagnosis.inference.holdout import compute_rmse
 from islands.diagnosis.result import Candidate, Diagnosis
+from islands.diagnosis.surrogates import STRENGTHS
 from islands.io.result_folder import record_document
 
 SCHEMA = "islands.discrepancy/1"
@@ -44,7 +48,10 @@ def diagnosis_document(
         "candidates": [_describe_candidate(each) for each in diagnosis.candidates],
         "remainder": dict(diagnosis.residual_structure),
         "proposal": None if proposal is None else asdict(proposal),
+        "held_out_part": diagnosis.held_out_part,
+        "output_std": _measure_output(diagnosis),
         "as_given_rmse": diagnosis.nominal_rmse,
+        "calibrated_rmse": _compute_calibrated_rmse(diagnosis),
         "noise_floor_rmse": diagnosis.noise_floor,
         "noise_floor_is": "measured by repeated periods"
         if diagnosis.is_noise_floor_measured
@@ -63,6 +70,17 @@ def as_json(document: dict[str, Any]) -> str:
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
+def _measure_output(diagnosis: Diagnosis) -> float:
+    """Return the standard deviation of the measured output over the hold-out part."""
+    return float(np.nanstd(diagnosis.record.y[diagnosis.estimation_samples :]))
+
+
+def _compute_calibrated_rmse(diagnosis: Diagnosis) -> float:
+    """Return the RMSE of the calibrated simulation without effects over the hold-out part."""
+    residual = diagnosis.record.y - diagnosis.base.output
+    return compute_rmse(residual[diagnosis.estimation_samples :])
+
+
 def _get_calibrated_values(diagnosis: Diagnosis) -> dict[str, float]:
     fit = diagnosis.best
     part = fit.simulation.simulator_slice
@@ -73,7 +91,8 @@ def _get_calibrated_values(diagnosis: Diagnosis) -> dict[str, float]:
 def _describe_self_test(tested: SelfTest | None) -> dict[str, Any]:
     """Return the entries of a self-test; without one, all of them are None."""
     if tested is None:
-        return dict.fromkeys(("detection_limits", "false_alarm_rate", "p_value", "confusion"))
+        names = ("detection_limits", "tested_misfits", "false_alarm_rate", "p_value", "confusion")
+        return dict.fromkeys(names)
     alarms = tested.false_alarm_rate
     return {
         "detection_limits": {
@@ -82,6 +101,7 @@ def _describe_self_test(tested: SelfTest | None) -> dict[str, Any]:
             else {"strength": limit.strength, "unit": limit.unit, "misfit_sigma": limit.misfit}
             for name, limit in tested.detection_limits.items()
         },
+        "tested_misfits": list(STRENGTHS),
         "false_alarm_rate": {"value": alarms.value, "ci95": list(alarms.ci95), "of": alarms.trials},
         "p_value": tested.p_value,
         "confusion": [
@@ -108,6 +128,7 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
         "score": finding.score,
         "eta": finding.explained_fraction,
         "claimed": finding.is_claimed,
+        "free_form": bool(list_free_forms([finding])),
     }
 
 

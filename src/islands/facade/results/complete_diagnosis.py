@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from islands.diagnosis.detectability import SelfTest
 from islands.diagnosis.documents.extension_json import extended_document, extended_json
 from islands.diagnosis.documents.result_json import as_json, diagnosis_document
-from islands.diagnosis.documents.result_text import summarise_diagnosis
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.result import Diagnosis
 from islands.errors import ModelError, lookup
 from islands.facade.results.notebook_html import render_sentences
 from islands.facade.results.saved_simulation import SavedSimulation
+from islands.io.result_text.diagnosis_statements import describe_diagnosis
 from islands.parallel import ParallelMap
 from islands.progress import Steps
 from islands.simulation.predictors import Simulation
@@ -65,7 +65,7 @@ class DiagnosisResult(Diagnosis):
     @property
     def summary(self) -> str:
         """Verdict, causes, gain and next experiment as sentences."""
-        return summarise_diagnosis(self, self.formula)
+        return "\n".join(describe_diagnosis(self.document))
 
     @property
     def document(self) -> dict[str, Any]:
@@ -162,8 +162,8 @@ class DiagnosisResult(Diagnosis):
         return self.summary
 
     def __repr__(self) -> str:
-        effects = ", ".join(each.name for each in self.effects) or "no effects"
-        return f"<DiagnosisResult {str(self.verdict)!r}: {effects}>"
+        causes = ", ".join(self.claimed_names) or "no causes"
+        return f"<DiagnosisResult {str(self.verdict)!r}: {causes}>"
 
     def _repr_html_(self) -> str:
         return render_sentences(self.summary.splitlines(), self.plot(), "measured and simulated output")

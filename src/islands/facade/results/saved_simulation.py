@@ -12,7 +12,9 @@ from islands.errors import ModelError
 from islands.export import FILE_EXPORTS, export_or_write
 from islands.export.closed_form import closed_form
 from islands.facade.results.model_simulation import simulate
+from islands.facade.results.notebook_html import render_sentences
 from islands.io.data_frames import as_record
+from islands.io.result_text.diagnosis_statements import describe_diagnosis
 from islands.simulation.predictors import Simulation
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.equations import OdeSpec
@@ -133,6 +135,17 @@ class SavedDiagnosis:
     def verdict(self) -> str:
         """Verdict of the diagnosis."""
         return str(self.document["verdict"])
+
+    @property
+    def summary(self) -> str:
+        """Verdict, causes, gain and next experiment as sentences, which are those of the run."""
+        return "\n".join(describe_diagnosis(self.document))
+
+    def __str__(self) -> str:
+        return self.summary
+
+    def _repr_html_(self) -> str:
+        return render_sentences(self.summary.splitlines(), None, "")
 
     def require_extension(self) -> SavedSimulation:
         """Return the extended simulation.

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from islands.diagnosis.documents.result_json import as_json, diagnosis_document
-from islands.diagnosis.documents.result_text import summarise_diagnosis
 from islands.diagnosis.inference import noise_floor
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import (
@@ -24,6 +23,7 @@ from islands.diagnosis.interim_findings import (
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
+from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.simulators.recorded_output import RecordedOutput
 from support.simulated_records import recorded, wave
 
@@ -100,6 +100,6 @@ def test_document_and_summary_state_what_was_left_out(stopped: list[Diagnosis]) 
     for each in stopped:
         assert as_json(diagnosis_document(each))
         assert diagnosis_document(each)["left_out"] == list(each.left_out)
-        words = summarise_diagnosis(each)
+        words = DiagnosisResult.from_diagnosis(each).summary
         assert all(step in words for step in each.left_out)
         assert ("was stopped, without" in words) == bool(each.left_out)

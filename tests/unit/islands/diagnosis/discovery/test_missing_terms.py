@@ -22,12 +22,12 @@ from islands.diagnosis.discovery.candidate_terms import (
 from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
 from islands.diagnosis.documents.extension_json import extended_json
 from islands.diagnosis.documents.result_json import diagnosis_document
-from islands.diagnosis.documents.result_text import summarise_diagnosis
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.export.fmu.compiler import find_compiler
+from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.reports.diagnosis import diagnosis_report
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
@@ -193,7 +193,7 @@ def test_discovered_equations_are_the_diagnosis_if_no_effect_explains_as_much() 
     assert value.ci95[0] < -0.5 < value.ci95[1]
     document = diagnosis_document(found)
     assert document["discovered"]["equations"].startswith("dv/dt = ")
-    assert found.discovery.equations in summarise_diagnosis(found)
+    assert found.discovery.equations in DiagnosisResult.from_diagnosis(found).summary
     assert b"x*F" in diagnosis_report("record", found)
 
 

@@ -12,12 +12,12 @@ import islands
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.documents.extension_json import extended_json
-from islands.diagnosis.documents.result_text import summarise_diagnosis
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Signal
 from islands.export.extension import export_extended
+from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
@@ -117,7 +117,7 @@ def test_document_and_text_contain_the_terms() -> None:
     assert "u**5" in export_extended(spec, "plain")
     assert json.loads(export_extended(spec, "json")) == document
     assert "pow(in->u, 5.0)" in export_extended(spec, "c")
-    assert "u**5" in summarise_diagnosis(found)
+    assert "u**5" in DiagnosisResult.from_diagnosis(found).summary
 
 
 def test_extended_simulation_is_right_in_a_second_diagnosis() -> None:

@@ -65,7 +65,7 @@ def test_the_extended_simulation_is_that_of_the_folder(found, tmp_path):
 
 def test_a_notebook_shows_the_sentences_and_a_figure(found):
     html = found._repr_html_()
-    assert "<p>The simulation lacks known effects, which explain the discrepancy.</p>" in html
+    assert "<p>The simulation lacks a known effect, which explains the discrepancy.</p>" in html
     assert 'alt="measured and simulated output"' in html
     assert found.plot("residual").axes
     with pytest.raises(islands.SettingsError, match="unknown figure 'loop'"):
@@ -82,6 +82,21 @@ def test_a_diagnosis_without_an_effect_has_no_simulation(found, tmp_path):
         "report.html",
     ]
     assert islands.load(tmp_path).verdict == "nothing"
+
+
+def test_a_folder_states_what_the_run_stated(found, tmp_path):
+    loaded = islands.load(found.save(tmp_path / "saved"))
+    assert str(loaded) == found.summary
+    assert "<p>The simulation lacks a known effect" in loaded._repr_html_()
+
+
+def test_properties_of_the_noise_are_no_claimed_causes(found):
+    noise = replace(found.effects[0], name="outliers", explained_fraction=None)
+    unclaimed = replace(found.effects[0], name="jump", is_claimed=False)
+    assert replace(found, effects=(*found.effects, unclaimed, noise)).claimed_names == ("delay",)
+    assert repr(replace(found, verdict=Verdict.NOTHING, effects=(noise,), gain=None)) == (
+        "<DiagnosisResult 'nothing': no causes>"
+    )
 
 
 def test_a_formula_and_steps_that_were_left_out_are_in_every_text(found):

@@ -1,0 +1,582 @@
+"""Statements about a diagnosis, from ``discrepancy.json`` alone.
+
+As those about a fit (`islands.io.result_text.statements`), each has a predicate on the document: a run, its
+folder, the REST service, the page, the report and a notebook state the same. Statements about the gain are
+those of the held-out data, which may disagree with the samples used for estimation.
+"""
+
+from collections.abc import Callable
+from functools import cached_property
+from math import ceil, floor, log10
+from typing import Final
+
+from islands.io.result_text.statements import Document, Statement, write_amount, write_statements
+
+#: Held-out share of the misfit above which the effects explain it, and above which they explain most of it.
+_WHOLE, _MOST = 0.9, 0.5
+
+#: Confidence below which other causes together are more probable.
+_CERTAIN = 0.5
+
+#: Ratio of an error and the noise floor up to which the error is that of the noise.
+_NOISE_RATIO = 1.2
+
+#: Ratio of an error and the noise floor above which noise does not explain the error.
+_FAR_RATIO = 3.0
+
+#: Error as a fraction of the standard deviation of the output above which little can be recognised.
+_LARGE_NOISE = 0.3
+
+#: Error as a fraction of the standard deviation of the output that is a rounding error.
+_ROUNDING = 1e-6
+
+#: Relative change of the error by the calibration that is stated.
+_CALIBRATED = 0.05
+
+#: Digits of the widest value. A narrower interval is that of exact data, or of a value without a response.
+_MOST_DIGITS = 9
+
+#: Confidence that is written as 1.00, although no cause is certain.
+_ALMOST_CERTAIN = 0.995
+
+#: Number of effects that are listed as the nearest ones.
+_NEAREST = 3
+
+#: Families of causes: wrong gains and parameters, terms that were found, gross errors of the record.
+_SCALE, _TERM, _GROSS = "scale", "discovered", "gross"
+
+#: Effect that stands for a wrong form of an identified model.
+_FORM = "core-shape"
+
+
+class DiagnosisFacts:
+    """Quantities of a ``discrepancy.json`` that the statements read. Earlier versions lack some of them.
+
+    Parameters
+    ----------
+    document : mapping
+        Content of ``discrepancy.json``.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.verdict: str = document["verdict"]
+        self.gain: Document | None = document["gain"]
+        self.discovered: Document | None = document.get("discovered")
+        self.floor: float = document["noise_floor_rmse"]
+        self.remainder: Document = document.get("remainder", {})
+
+    def write_error(self, value: float) -> str:
+        """Write an error with the unit of the output."""
+        return write_amount(value, self.document["record"]["units"]["output"])
+
+    @cached_property
+    def causes(self) -> list[Document]:
+        """The causes, those that are not claimed as well."""
+        return [each for each in self.document["effects"] if each["eta"] is not None]
+
+    @property
+    def noise(self) -> list[Document]:
+        """Properties of sampling and noise."""
+        return [each for each in self.document["effects"] if each["eta"] is None]
+
+    @cached_property
+    def claimed(self) -> list[Document]:
+        """The causes that are claimed."""
+        return [each for each in self.causes if each.get("claimed", True)]
+
+    @property
+    def has_others(self) -> bool:
+        """Whether effects that are not claimed extend the simulation as well."""
+        return len(self.claimed) < len(self.causes)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the error of the held-out data is a rounding error."""
+        return self.relative_error is not None and self.relative_error < _ROUNDING
+
+    @property
+    def free_forms(self) -> list[str]:
+        """Names of the causes without an assumed shape."""
+        return [each["name"] for each in self.claimed if each.get("free_form")]
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether every claimed cause is more probable than all others together, as it is written."""
+        return all(round(each["confidence"], 2) >= _CERTAIN for each in self.claimed)
+
+    @property
+    def has_gain(self) -> bool:
+        """Whether the effects reduce the error of the held-out data, with 95 % confidence."""
+        return self.gain is not None and self.gain["ci95"][0] > 0.0
+
+    @property
+    def share(self) -> float | None:
+        """Share of the misfit above the noise floor that disappears on the held-out data.
+
+        It is None if the error without the effects is not above the noise floor.
+        """
+        assert self.gain is not None
+        before, after, noise = (each**2 for each in (*self.errors, self.floor))
+        return (before - after) / (before - noise) if before > noise else None
+
+    @property
+    def errors(self) -> tuple[float, float]:
+        """Errors of the held-out data without and with the effects."""
+        assert self.gain is not None
+        return self.gain["before"]["rmse"], self.gain["after"]["rmse"]
+
+    @property
+    def calibrated_rmse(self) -> float | None:
+        """Error of the calibrated simulation without effects on the held-out data; None if it is unknown."""
+        found: float | None = self.document.get("calibrated_rmse")
+        return found
+
+    @property
+    def error(self) -> float | None:
+        """Error of the best simulation on the held-out data; None if it is unknown."""
+        return self.calibrated_rmse if self.gain is None else self.errors[1]
+
+    @property
+    def relative_error(self) -> float | None:
+        """That error as a fraction of the standard deviation of the output; None if it is unknown."""
+        deviation = self.document.get("output_std")
+        return self.error / deviation if self.error is not None and deviation else None
+
+    @property
+    def noise_ratio(self) -> float | None:
+        """That error divided by the noise floor; None if it is unknown, or a rounding error."""
+        return None if self.error is None or not self.floor or self.is_exact else self.error / self.floor
+
+    @property
+    def is_far(self) -> bool:
+        """Whether the error of the held-out data is far above the noise floor."""
+        return (self.noise_ratio or 0.0) > _FAR_RATIO
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether the noise floor is measured from repeated periods."""
+        return bool(self.document["noise_floor_is"] != "an upper bound")
+
+    @property
+    def is_gross(self) -> bool:
+        """Whether the record has a gross error, so that no effect was searched for."""
+        return self.verdict == "gross error"
+
+    @property
+    def removes_error(self) -> bool:
+        """Whether the correction of a gross error reduces the error, which a calibration may hide."""
+        findings = self.document.get("record_findings", ())
+        errors = findings[0]["errors"] if self.is_gross and findings else None
+        return errors is not None and errors["after"] < errors["before"]
+
+    @property
+    def held_out_part(self) -> str:
+        """Name of the held-out data."""
+        found: str = self.document.get("held_out_part", "the held-out data")
+        return found
+
+    @property
+    def nearest(self) -> list[Document]:
+        """The best screened effects that improve the fit."""
+        return [each for each in self.document["candidates"][:_NEAREST] if each["score"] > 0.0]
+
+
+def describe_diagnosis(document: Document) -> list[str]:
+    """Describe a diagnosis in sentences: verdict, causes, findings, errors and next steps.
+
+    The causes are indented.
+
+    Parameters
+    ----------
+    document : mapping
+        Content of ``discrepancy.json``.
+    """
+    causes = (f"  {cause}" for cause in describe_causes(document))
+    return [describe_verdict(document), *causes, *describe_details(document)]
+
+
+def describe_verdict(document: Document) -> str:
+    """State the verdict."""
+    return " ".join(write_statements(VERDICTS, DiagnosisFacts(document)))
+
+
+def describe_causes(document: Document) -> list[str]:
+    """Describe each cause: values, confidence, share of the misfit, and equivalent causes."""
+    facts = DiagnosisFacts(document)
+    return [_describe_cause(facts, cause) for cause in facts.causes]
+
+
+def describe_details(document: Document) -> list[str]:
+    """Describe noise, record, errors, and next steps."""
+    texts = write_statements(DETAILS, DiagnosisFacts(document))
+    return [line for text in texts for line in text.splitlines()]
+
+
+def _describe_extent(facts: DiagnosisFacts) -> str:
+    """State how much of the discrepancy disappears on the held-out data."""
+    if not facts.has_gain:
+        return "the discrepancy of the samples used for estimation alone"
+    share = facts.share
+    is_rest = bool(facts.remainder) or facts.is_far or facts.verdict == "named with remainder"
+    if not is_rest and (share is None or share >= _WHOLE):
+        return "the discrepancy"
+    return "most of the discrepancy" if share is None or share >= _MOST else "a part of the discrepancy"
+
+
+def _describe_named(facts: DiagnosisFacts) -> str:
+    extent = f"{_describe_extent(facts)}{_describe_rest(facts)}"
+    if all(each["name"] == _FORM for each in facts.claimed):
+        return f"The form of the model is wrong, which explains {extent}."
+    if all(each["family"] == _SCALE for each in facts.claimed):
+        return f"A gain or a parameter of the simulation is wrong, which explains {extent}."
+    if len(facts.claimed) == 1:
+        others = ", with those that are not claimed," if facts.has_others else ""
+        return f"The simulation lacks a known effect, which{others} explains {extent}."
+    return f"The simulation lacks {'' if facts.free_forms else 'known '}effects, which explain {extent}."
+
+
+def _describe_rest(facts: DiagnosisFacts) -> str:
+    return "; significant structure remains" if facts.verdict == "named with remainder" else ""
+
+
+def _describe_uncertain(facts: DiagnosisFacts) -> str:
+    extent = f"{_describe_extent(facts)}{_describe_rest(facts)}"
+    if len(facts.claimed) > 1:
+        return f"There is a discrepancy with uncertain causes: the most probable ones explain {extent}."
+    form = " is a free form, and" if facts.free_forms else ""
+    return f"There is a discrepancy with an uncertain cause: the most probable one{form} explains {extent}."
+
+
+def _describe_family(facts: DiagnosisFacts) -> str:
+    forms = " and ".join(facts.free_forms)
+    named = f" ({forms})" if forms else ""
+    return (
+        f"The discrepancy has the place and the family of a free form{named}, and the shape of no known "
+        f"effect. The causes explain {_describe_extent(facts)}."
+    )
+
+
+def _describe_discovered(facts: DiagnosisFacts) -> str:
+    is_better = facts.discovered is not None and facts.discovered["worse_by"] > 0.0
+    alone = " Known effects alone explain less." if is_better else ""
+    known = " and the known effects" if any(each["family"] != _TERM for each in facts.causes) else ""
+    extent = _describe_extent(facts)
+    return f"The simulation lacks terms; those that were found{known} explain {extent}.{alone}"
+
+
+def _describe_cause(facts: DiagnosisFacts, cause: Document) -> str:
+    parts = [f"{_describe_confidence(cause)}{_describe_share(facts, cause)}"]
+    if cause["equivalents"]:
+        parts.append(f"confounded with {', '.join(cause['equivalents'])}")
+    if not cause.get("claimed", True):
+        parts.append("improves the fit, but is not claimed as a cause")
+    return f"{_name_values(facts, cause)}; {'; '.join(parts)}"
+
+
+def _describe_confidence(effect: Document) -> str:
+    confidence = effect["confidence"]
+    return "confidence above 0.99" if confidence >= _ALMOST_CERTAIN else f"confidence {confidence:.2f}"
+
+
+def _describe_share(facts: DiagnosisFacts, cause: Document) -> str:
+    share = f", {floor(100 * cause['eta'])} %"
+    if cause["family"] == _GROSS:
+        return f"{share} of the mean squared error" if facts.removes_error else ""
+    together = " by all terms and effects" if cause["family"] == _TERM else ""
+    return f"{share} of the misfit above the noise floor{together}"
+
+
+def _name_values(facts: DiagnosisFacts, effect: Document) -> str:
+    values = ", ".join(
+        f"{name} = {write_value(each, facts.is_exact)}" for name, each in effect["parameters"].items()
+    )
+    return f"{effect['name']}: {values}" if values else str(effect["name"])
+
+
+def write_value(given: Document, is_exact: bool = False) -> str:
+    """Write a value with its unit and interval, with as many digits as the width of the interval needs.
+
+    Parameters
+    ----------
+    given : mapping
+        ``value``, ``unit`` and ``ci95``.
+    is_exact : bool
+        Whether the data have no noise. Otherwise a value with an interval of rounding has no response.
+    """
+    value, interval = given["value"], given["ci95"]
+    unit = f" {given['unit']}" if given["unit"] not in ("", "1") else ""
+    if interval is None:
+        return f"{value:.4g}{unit}"
+    low, high = interval
+    digits = 4
+    if value and low < high:
+        digits = max(4, ceil(log10(abs(value) / (high - low))) + 3)
+    if digits > _MOST_DIGITS:
+        width = f"+/- {(high - low) / 2:.1g}" if is_exact else "not determined by the record"
+        return f"{value:.4g}{unit} ({width})"
+    return f"{value:.{digits}g}{unit} ({low:.{digits}g} to {high:.{digits}g})"
+
+
+def _describe_noise(facts: DiagnosisFacts) -> str:
+    listed = (f"{_name_values(facts, each)}, {_describe_confidence(each)}" for each in facts.noise)
+    return f"Sampling and noise: {'; '.join(listed)}."
+
+
+def _describe_record(facts: DiagnosisFacts) -> str:
+    findings = facts.document["record_findings"]
+    return "\n".join(f"Record: {each['description']} {each['advice']}" for each in findings)
+
+
+def _describe_equations(facts: DiagnosisFacts) -> str:
+    assert facts.discovered is not None
+    equations = facts.discovered["equations"]
+    if facts.verdict == "discovered":
+        return f"Equations: {equations}"
+    names = " and ".join(facts.discovered["effects"])
+    return f"Equations that explain the record as well{f', with {names}' if names else ''}: {equations}"
+
+
+def _describe_nearest_to_terms(facts: DiagnosisFacts) -> str:
+    assert facts.discovered is not None
+    others = " and ".join(facts.discovered["nearest"])
+    return f"With {others} instead of the terms, the score is worse by {facts.discovered['worse_by']:.0f}."
+
+
+def _describe_nearest(facts: DiagnosisFacts) -> str:
+    listed = ", ".join(f"{each['name']} (score {each['score']:.1f})" for each in facts.nearest)
+    return f"Nearest effects, none of which is confirmed: {listed}."
+
+
+def _describe_remainder(facts: DiagnosisFacts) -> str:
+    listed = "; ".join(f"{name} ({distance:.1f})" for name, distance in facts.remainder.items())
+    return f"The remaining residual depends on (standard deviations beyond chance): {listed}."
+
+
+def _describe_gain(facts: DiagnosisFacts) -> str:
+    assert facts.gain is not None
+    before, after = map(facts.write_error, facts.errors)
+    low, high = facts.gain["ci95"]
+    percent = f"{facts.gain['reduction_percent']:.1f} % ({low:.1f} to {high:.1f} with 95 % confidence)"
+    without = f"{before} ({name_reference(facts.document)})"
+    beginning = f"On {facts.held_out_part}, excluded from fitting, the RMSE"
+    text = f"{beginning} falls from {without} to {after}, by {percent}"
+    if not facts.has_gain:
+        text = (
+            f"{beginning} does not fall significantly: {without}, {after} with them, a reduction of {percent}"
+        )
+    if (compared := _compare_with_output(facts)) is not None:
+        text += f"; what remains is {compared}"
+    return f"{text}."
+
+
+def name_reference(document: Document) -> str:
+    """Name the simulation with which the extended one is compared.
+
+    A calibration absorbs wrong gains and parameters, so that they are compared with the simulation as given.
+    """
+    facts = DiagnosisFacts(document)
+    is_calibrated = facts.gain is None or facts.calibrated_rmse in (None, facts.errors[0])
+    return "calibrated, without the effects" if is_calibrated else "as given, without the effects"
+
+
+def _describe_error(facts: DiagnosisFacts) -> str:
+    assert facts.error is not None
+    given, calibrated = facts.document["as_given_rmse"], facts.error
+    text = f"On {facts.held_out_part}, excluded from fitting, the RMSE is {facts.write_error(calibrated)}"
+    if (compared := _compare_with_output(facts)) is not None:
+        text += f", {compared}"
+    if abs(given - calibrated) > _CALIBRATED * calibrated:
+        text += f"; before the calibration it is {facts.write_error(given)}"
+    return f"{text}."
+
+
+def _compare_with_output(facts: DiagnosisFacts) -> str | None:
+    """Write the error as a part of the output; None if it is unknown."""
+    if facts.relative_error is None:
+        return None
+    if facts.is_exact:
+        return "a rounding error"
+    percent = 100 * facts.relative_error
+    written = f"{percent:.0f}" if percent >= 10.0 else f"{percent:.2g}"
+    return f"{written} % of the standard deviation of the output"
+
+
+def _describe_noise_floor(facts: DiagnosisFacts) -> str:
+    origin = (
+        "measured from repeated periods"
+        if facts.is_measured
+        else "an upper bound, because the record has no repeated periods"
+    )
+    return f"The noise floor is {facts.write_error(facts.floor)}, {origin}{_compare_with_floor(facts)}."
+
+
+def _compare_with_floor(facts: DiagnosisFacts) -> str:
+    ratio = facts.noise_ratio
+    if ratio is None:
+        return ""
+    if ratio < 1.0 / _NOISE_RATIO:
+        return "; the RMSE is below it"
+    times = "at" if ratio <= _NOISE_RATIO else f"{ratio:.3g} times"
+    return f"; the RMSE is {times} the floor"
+
+
+def _describe_large_noise(facts: DiagnosisFacts) -> str:
+    is_coloured = any(each["name"] == "coloured-noise" for each in facts.noise)
+    if is_coloured:
+        return (
+            "What is left of the output counts as coloured noise: an input that is not in the record, or a "
+            "discrepancy that is as slow, is not excluded."
+        )
+    return "The noise is large: a discrepancy that is much smaller is not excluded."
+
+
+def _describe_left_out(facts: DiagnosisFacts) -> str:
+    steps = ", ".join(facts.document["left_out"])
+    return f"The diagnosis was stopped, without: {steps}. The complete diagnosis may have another verdict."
+
+
+def _describe_alarms(facts: DiagnosisFacts) -> str:
+    alarms, p_value = facts.document["false_alarm_rate"], facts.document["p_value"]
+    low, high = (100 * each for each in alarms["ci95"])
+    # The number of records bounds the p-value from below.
+    least = "at most " if p_value * (alarms["of"] + 1) < 1.5 else ""
+    return (
+        f"Of {alarms['of']} surrogate records without an effect, a cause was named in "
+        f"{alarms['value'] * alarms['of']:.0f}: {100 * alarms['value']:.1f} % false alarms ({low:.1f} to "
+        f"{high:.1f}). A correct simulation yields a candidate as good as the best one of this record with a "
+        f"probability of {least}{p_value:.2g}."
+    )
+
+
+def _describe_limits(facts: DiagnosisFacts) -> str:
+    limits = facts.document["detection_limits"]
+    shown = sum(limit is not None for limit in limits.values())
+    text = f"Of {len(limits)} effects, {shown} can be detected on this record"
+    strengths = facts.document.get("tested_misfits")
+    return f"{text}, up to a misfit of {strengths[-1]:g} times the noise." if strengths else f"{text}."
+
+
+def _has(*verdicts: str) -> Callable[[DiagnosisFacts], bool]:
+    """Return a predicate: whether the verdict is one of these."""
+    return lambda facts: facts.verdict in verdicts
+
+
+#: The verdict; one of them holds.
+VERDICTS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
+    Statement(
+        "nothing",
+        lambda facts: facts.verdict == "nothing" and not facts.is_far,
+        lambda _: "No significant discrepancy: the simulation agrees with the record within the noise.",
+    ),
+    Statement(
+        "nothing-in-estimation-data",
+        lambda facts: facts.verdict == "nothing" and facts.is_far,
+        lambda facts: (
+            "No significant discrepancy in the samples used for estimation, but the error of "
+            f"{facts.held_out_part} is far above the noise floor."
+        ),
+    ),
+    Statement(
+        "named",
+        lambda facts: _has("named", "named with remainder")(facts) and facts.is_certain,
+        _describe_named,
+    ),
+    Statement(
+        "uncertain",
+        lambda facts: _has("named", "named with remainder", "family")(facts) and not facts.is_certain,
+        _describe_uncertain,
+    ),
+    Statement("family", lambda facts: facts.verdict == "family" and facts.is_certain, _describe_family),
+    Statement("discovered", _has("discovered"), _describe_discovered),
+    Statement(
+        "unknown",
+        _has("unknown"),
+        lambda _: "There is a significant discrepancy, and no known effect is confirmed as its cause.",
+    ),
+    Statement(
+        "stopped",
+        _has("stopped"),
+        lambda _: "The diagnosis was stopped before a verdict: the causes are unknown.",
+    ),
+    Statement(
+        "gross-error",
+        _has("gross error"),
+        lambda _: "Record and simulation do not match as they are: correct the record first.",
+    ),
+)
+
+#: Noise, record, errors, and next steps.
+DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
+    Statement(
+        "shares",
+        lambda facts: sum(each["family"] not in (_TERM, _GROSS) for each in facts.causes) > 1,
+        lambda _: (
+            "Each share is that of the misfit that is left without the effect, so that shares do not add up."
+        ),
+    ),
+    Statement("noise", lambda facts: facts.noise, _describe_noise),
+    Statement("record", lambda facts: facts.document.get("record_findings"), _describe_record),
+    Statement(
+        "reading",
+        lambda facts: facts.document["record"].get("reading"),
+        lambda facts: "\n".join(f"Reading: {step}." for step in facts.document["record"]["reading"]),
+    ),
+    Statement(
+        "correction",
+        lambda facts: facts.is_gross,
+        lambda _: "No effect was searched for: diagnose the corrected record.",
+    ),
+    Statement("equations", lambda facts: facts.discovered is not None, _describe_equations),
+    Statement(
+        "nearest-to-terms",
+        lambda facts: (
+            facts.verdict == "discovered" and facts.discovered is not None and facts.discovered["nearest"]
+        ),
+        _describe_nearest_to_terms,
+    ),
+    Statement(
+        "nearest", lambda facts: _has("unknown", "stopped")(facts) and facts.nearest, _describe_nearest
+    ),
+    Statement(
+        "no-nearest",
+        lambda facts: facts.verdict == "unknown" and facts.document["candidates"] and not facts.nearest,
+        lambda _: "No effect alone improves the fit by more than the penalty on its parameters.",
+    ),
+    Statement("remainder", lambda facts: facts.remainder, _describe_remainder),
+    Statement(
+        "predictable-residual",
+        lambda facts: facts.verdict == "named with remainder" and not facts.remainder,
+        lambda _: "A flexible model of the past of input and output predicts a part of the residual.",
+    ),
+    Statement("gain", lambda facts: facts.gain is not None, _describe_gain),
+    Statement(
+        "error",
+        lambda facts: facts.gain is None and facts.error is not None and not facts.is_gross,
+        _describe_error,
+    ),
+    Statement("noise-floor", lambda facts: not facts.is_gross, _describe_noise_floor),
+    Statement(
+        "large-noise",
+        lambda facts: facts.verdict in ("nothing", "named") and (facts.relative_error or 0.0) > _LARGE_NOISE,
+        _describe_large_noise,
+    ),
+    Statement(
+        "experiment",
+        lambda facts: facts.document["decisive_experiment"],
+        lambda facts: (
+            f"Suggested experiment to separate confounded effects: {facts.document['decisive_experiment']}."
+        ),
+    ),
+    Statement(
+        "formula",
+        lambda facts: facts.document.get("proposal"),
+        lambda facts: (
+            f"A formula explains {floor(100 * facts.document['proposal']['explains'])} % of the residual of "
+            f"the held-out data: {facts.document['proposal']['formula']}"
+        ),
+    ),
+    Statement("left-out", lambda facts: facts.document.get("left_out"), _describe_left_out),
+    Statement("false-alarms", lambda facts: facts.document.get("false_alarm_rate"), _describe_alarms),
+    Statement("detection-limits", lambda facts: facts.document.get("detection_limits"), _describe_limits),
+)

@@ -1,0 +1,187 @@
+"""Statements about a diagnosis: each follows from the numbers of its document."""
+
+from itertools import product
+
+import pytest
+
+from islands.diagnosis.inference.verdict import Verdict
+from islands.io.result_text.diagnosis_statements import (
+    VERDICTS,
+    DiagnosisFacts,
+    describe_diagnosis,
+    describe_verdict,
+    name_reference,
+    write_value,
+)
+from islands.io.result_text.statements import find_statements
+from support.diagnosis_documents import CAUSE, GAIN, make_document
+from support.statements import find_contradictions
+
+
+def text(verdict, **changes):
+    return "\n".join(describe_diagnosis(make_document(verdict, **changes)))
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+@pytest.mark.parametrize(("confidence", "error"), list(product((0.3, 0.9), (0.01, 0.4))))
+def test_one_statement_gives_the_verdict(verdict, confidence, error):
+    causes = [{**CAUSE, "confidence": confidence}] if verdict not in ("nothing", "unknown", "stopped") else []
+    document = make_document(str(verdict), effects=causes, calibrated_rmse=error)
+    assert len(find_statements(VERDICTS, DiagnosisFacts(document))) == 1
+
+
+@pytest.mark.parametrize(
+    ("after", "low", "extent"),
+    [
+        (0.012, 95.0, "which explains the discrepancy."),
+        (0.1, 40.0, "which explains most of the discrepancy."),
+        (0.19, 2.0, "which explains a part of the discrepancy."),
+        (0.19, -1.0, "which explains the discrepancy of the samples used for estimation alone."),
+    ],
+)
+def test_the_extent_is_that_of_the_held_out_data(after, low, extent):
+    gain = {**GAIN, "after": {"rmse": after, "mape": 1.0}, "ci95": [low, 99.0]}
+    assert describe_verdict(make_document("named", effects=[CAUSE], gain=gain)).endswith(extent)
+
+
+def test_a_gain_whose_interval_includes_zero_is_no_gain():
+    gain = {**GAIN, "after": {"rmse": 0.202, "mape": 1.0}, "reduction_percent": -1.0, "ci95": [-3.0, 1.0]}
+    said = text("family", effects=[{**CAUSE, "free_form": True}], gain=gain)
+    assert "the RMSE does not fall significantly: 0.2 um" in said
+    assert "the RMSE falls" not in said
+
+
+def test_a_cause_that_others_exceed_is_uncertain():
+    unlikely = {**CAUSE, "confidence": 0.36, "equivalents": ["sensor-lag"]}
+    said = text("named", effects=[unlikely], gain=GAIN)
+    assert said.startswith("There is a discrepancy with an uncertain cause: the most probable one explains")
+    assert "The simulation lacks" not in said
+    assert "0.36, 99 % of the misfit above the noise floor; confounded with sensor-lag" in said
+
+
+def test_agreement_is_stated_with_its_error_and_contradicted_by_a_large_one():
+    assert "the RMSE is 0.011 um" in (near := text("nothing", calibrated_rmse=0.011))
+    assert near.startswith("No significant discrepancy: the simulation agrees")
+    assert "; the RMSE is at the floor" in near
+    far = text("nothing", calibrated_rmse=0.2)
+    assert far.startswith("No significant discrepancy in the samples used for estimation, but the error of")
+
+
+def test_noise_that_is_a_third_of_the_output_may_hide_a_discrepancy():
+    noise = {**CAUSE, "name": "coloured-noise", "eta": None}
+    assert "an input that is not in the record" in text(
+        "nothing", effects=[noise], calibrated_rmse=0.5, noise_floor_rmse=0.5
+    )
+    assert "not excluded" not in text("nothing", effects=[noise], calibrated_rmse=0.01)
+
+
+def test_properties_of_the_noise_are_no_causes():
+    noise = {**CAUSE, "name": "outliers", "eta": None, "parameters": {"size": _value(0.1, "1")}}
+    verdict, cause, *details = describe_diagnosis(make_document("named", effects=[CAUSE, noise], gain=GAIN))
+    assert cause.startswith("  delay: ")
+    assert "Sampling and noise: outliers: size = 0.1, confidence 0.98." in details
+    assert "a known effect," in verdict
+
+
+def test_wrong_values_and_forms_are_no_effects_that_a_simulation_lacks():
+    gain, form = {**CAUSE, "name": "sensor-gain", "family": "scale"}, {**CAUSE, "name": "core-shape"}
+    assert text("named", effects=[gain], gain=GAIN).startswith("A gain or a parameter of the simulation is")
+    assert text("named", effects=[form], gain=GAIN).startswith("The form of the model is wrong, which")
+
+
+def test_the_reference_of_a_gain_is_named():
+    assert name_reference(make_document("named", gain=GAIN)) == "calibrated, without the effects"
+    other = make_document("named", gain=GAIN, calibrated_rmse=0.012)
+    assert name_reference(other) == "as given, without the effects"
+
+
+def test_the_nearest_effects_of_an_unknown_cause_improve_the_fit():
+    near, far = (
+        {"name": name, "score": score, "eta": 1.0} for name, score in (("delay", 3.0), ("jump", -1.0))
+    )
+    said = text("unknown", candidates=[near, far], remainder={"output": 5.3})
+    assert "Nearest effects, none of which is confirmed: delay (score 3.0)." in said
+    assert "The remaining residual depends on (standard deviations beyond chance): output (5.3)." in said
+    assert "No effect alone improves the fit" in text("unknown", candidates=[far])
+
+
+def test_a_correction_that_a_calibration_hides_removes_no_error():
+    gross = {**CAUSE, "name": "sign", "family": "gross", "eta": 1.0}
+    finding = {"name": "sign", "description": "The sign seems to be flipped.", "advice": "Multiply by -1."}
+    for after, stated in ((0.01, True), (0.3, False)):
+        errors = {"before": 0.3, "after": after}
+        said = text("gross error", effects=[gross], record_findings=[{**finding, "errors": errors}])
+        assert ("100 % of the mean squared error" in said) == stated
+        assert "Record: The sign seems to be flipped. Multiply by -1." in said
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "interval", "written"),
+    [
+        (0.123456, "V", (0.1, 0.15), "0.1235 V (0.1 to 0.15)"),
+        (2.0, "1/mm", (1.99998, 2.00001), "2 1/mm (1.99998 to 2.00001)"),
+        (-51234.5, "", (-51234.7, -51234.3), "-51234.5 (-51234.7 to -51234.3)"),
+        (-11.967228, "", (-11.967228 - 1e-12, -11.967228 + 1e-12), "-11.97 (not determined by the record)"),
+        (0.0, "V", (0.0, 0.0), "0 V (0 to 0)"),
+        (0.25, "1", None, "0.25"),
+    ],
+)
+def test_a_value_has_the_digits_that_its_interval_needs(value, unit, interval, written):
+    assert write_value({"value": value, "unit": unit, "ci95": interval}) == written
+
+
+def test_an_interval_of_exact_data_is_written_as_its_half_width():
+    assert (
+        write_value({"value": 2.0, "unit": "s", "ci95": [2.0 - 1e-12, 2.0 + 1e-12]}, True)
+        == "2 s (+/- 1e-12)"
+    )
+
+
+def test_no_cause_is_certain():
+    assert "confidence above 0.99, " in text("named", effects=[{**CAUSE, "confidence": 1.0}], gain=GAIN)
+
+
+def test_an_effect_that_is_not_claimed_shares_the_gain():
+    causes = [CAUSE, {**CAUSE, "name": "jump", "claimed": False}]
+    said = text("named with remainder", effects=causes, gain=GAIN, remainder={"input": 5.0})
+    assert said.startswith(
+        "The simulation lacks a known effect, which, with those that are not claimed, explains most of the "
+        "discrepancy; significant structure remains."
+    )
+
+
+@pytest.mark.parametrize(("better", "said"), [(0, "of at most 0.024."), (1, "of 0.049."), (40, "of 1.")])
+def test_p_value_is_bounded_by_the_number_of_records(better, said):
+    alarms = {"value": 0.0, "ci95": [0.0, 0.088], "of": 40}
+    limits = {"delay": {"strength": 0.1, "unit": "s", "misfit_sigma": 0.2}, "jump": None}
+    tested = {"false_alarm_rate": alarms, "p_value": (1 + better) / 41, "detection_limits": limits}
+    found = text("nothing", **tested, tested_misfits=[0.05, 6.4])
+    assert said in found
+    assert "Of 2 effects, 1 can be detected on this record, up to a misfit of 6.4 times the noise." in found
+
+
+def test_documents_of_earlier_versions_are_described():
+    document = make_document("named", effects=[CAUSE], gain=GAIN)
+    for name in ("held_out_part", "output_std", "calibrated_rmse", "tested_misfits"):
+        document.pop(name, None)
+    assert "On the held-out data, excluded from fitting, the RMSE falls from 0.2 um" in "\n".join(
+        describe_diagnosis(document)
+    )
+
+
+def test_contradictions_are_found():
+    said = text("nothing")
+    assert not find_contradictions(said)
+    assert find_contradictions(f"{said} The simulation lacks known effects, which explain the discrepancy.")
+    assert find_contradictions(f"{said} The remaining residual depends on: input.")
+    assert find_contradictions(
+        "the RMSE falls from 2 (as given) to 1, by 50.0 % (-2.0 to 70.0 with 95 % confidence)"
+    )
+    assert find_contradictions(
+        "The simulation lacks a known effect, confidence 0.31, 99 % of the misfit above the noise floor"
+    )
+    assert find_contradictions("The noise floor is 0.2 um, noise floor (upper bound) 0.3")
+
+
+def _value(value, unit):
+    return {"value": value, "unit": unit, "ci95": None}
