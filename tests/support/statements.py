@@ -51,7 +51,7 @@ _UNLIKELY = (
 _FAR = r"the RMSE is ([3-9](\.\d+)?|\d{2,}(\.\d+)?|\d[.\d]*e\+\d+) times the floor"
 
 #: Effects that explain all of a discrepancy.
-_WHOLE = r"explains? the discrepancy[.;]"
+_WHOLE = r"explains? (the discrepancy|it)[.;]"
 
 #: The same for the text about a diagnosis.
 EXCLUSIVE_OF_DIAGNOSES = (
@@ -68,14 +68,14 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (r"No significant discrepancy: ", _FAR),
     (_WHOLE, _FAR),
     (_WHOLE, r"(The remaining residual depends|significant structure remains|none of which is confirmed)"),
-    (r"explains? (most of |a part of )?the discrepancy[.;]", r"does not fall significantly"),
-    (r"explains? [^.]*of the samples used for estimation", r"the RMSE falls from"),
+    (r"explains? (most of |a part of )?(the discrepancy|it)[.;]", r"does not fall significantly"),
+    (r"explains? [^.]*in the samples used for estimation", r"the RMSE falls from"),
     (r"the RMSE falls from", r"by -[\d.]+ %"),
     (r"the RMSE falls from [^%]*%", r"\((-[\d.]+ to|[\d.]+ to -)[^()]* with 95 % confidence\)"),
     (r"does not fall significantly", r"a reduction of [\d.]+ % \([\d.]*[1-9][\d.]* to"),
     (r"The simulation lacks (a )?known effects?", _UNLIKELY),
     (r"is wrong, which explains", _UNLIKELY),
-    (r"uncertain causes?: (?!.*confidence 0\.[0-4])", r""),
+    (r"(causes are|cause is) uncertain: (?!.*confidence 0\.[0-4])", r""),
     (r"no known effect is confirmed", r"(confidence (above )?\d\.\d\d, \d+ % of the misfit|the RMSE falls)"),
     (r"stopped before a verdict", r"(No significant discrepancy|explains? |the RMSE falls from)"),
     (r"significant structure remains(?!.*(The remaining residual depends|A flexible model of))", r""),

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def suggest_experiment(best: CalibrationResult, alternatives: Sequence[ScreenedE
         advice = (
             f"play the same input {speed} times as fast, sampled as often per period"
             if speed is not None
-            else f"a record {length:.0f} times as long is enough"
+            else f"a record {ceil(length)} times as long is enough"
             if length < 1000
             else "no faster input of this form distinguishes them; measure a signal between the places where "
             "they act instead"

@@ -24,8 +24,8 @@ _NOISE_RATIO = 1.2
 #: Ratio of an error and the noise floor above which noise does not explain the error.
 _FAR_RATIO = 3.0
 
-#: Error as a fraction of the standard deviation of the output above which little can be recognised.
-_LARGE_NOISE = 0.3
+#: Error as a fraction of the standard deviation of the output above which white and coloured noise are large.
+_LARGE_NOISE, _LARGE_COLOURED_NOISE = 0.3, 0.1
 
 #: Error as a fraction of the standard deviation of the output that is a rounding error.
 _ROUNDING = 1e-6
@@ -38,6 +38,9 @@ _MOST_DIGITS = 9
 
 #: Confidence that is written as 1.00, although no cause is certain.
 _ALMOST_CERTAIN = 0.995
+
+#: Score of an effect that is written as more than zero.
+_LEAST_SCORE = 0.05
 
 #: Number of effects that are listed as the nearest ones.
 _NEAREST = 3
@@ -154,6 +157,23 @@ class DiagnosisFacts:
         return (self.noise_ratio or 0.0) > _FAR_RATIO
 
     @property
+    def is_noise(self) -> bool:
+        """Whether the error of the held-out data is at most that of the noise."""
+        return self.noise_ratio is not None and self.noise_ratio <= _NOISE_RATIO
+
+    @property
+    def is_coloured(self) -> bool:
+        """Whether the noise is coloured."""
+        return any(each["name"] == "coloured-noise" for each in self.noise)
+
+    @property
+    def has_large_noise(self) -> bool:
+        """Whether the error that counts as noise is a large part of the output."""
+        largest = _LARGE_COLOURED_NOISE if self.is_coloured else _LARGE_NOISE
+        verdicts = ("nothing", "named", "family", "discovered")
+        return self.verdict in verdicts and (self.relative_error or 0.0) > largest
+
+    @property
     def is_measured(self) -> bool:
         """Whether the noise floor is measured from repeated periods."""
         return bool(self.document["noise_floor_is"] != "an upper bound")
@@ -179,7 +199,7 @@ class DiagnosisFacts:
     @property
     def nearest(self) -> list[Document]:
         """The best screened effects that improve the fit."""
-        return [each for each in self.document["candidates"][:_NEAREST] if each["score"] > 0.0]
+        return [each for each in self.document["candidates"][:_NEAREST] if each["score"] > _LEAST_SCORE]
 
 
 def describe_diagnosis(document: Document) -> list[str]:
@@ -213,15 +233,15 @@ def describe_details(document: Document) -> list[str]:
     return [line for text in texts for line in text.splitlines()]
 
 
-def _describe_extent(facts: DiagnosisFacts) -> str:
+def _describe_extent(facts: DiagnosisFacts, whole: str = "the discrepancy") -> str:
     """State how much of the discrepancy disappears on the held-out data."""
     if not facts.has_gain:
-        return "the discrepancy of the samples used for estimation alone"
+        return f"{whole} in the samples used for estimation alone"
     share = facts.share
     is_rest = bool(facts.remainder) or facts.is_far or facts.verdict == "named with remainder"
-    if not is_rest and (share is None or share >= _WHOLE):
-        return "the discrepancy"
-    return "most of the discrepancy" if share is None or share >= _MOST else "a part of the discrepancy"
+    if not is_rest and (share is None or share >= _WHOLE or facts.is_noise):
+        return whole
+    return f"most of {whole}" if share is None or share >= _MOST else f"a part of {whole}"
 
 
 def _describe_named(facts: DiagnosisFacts) -> str:
@@ -241,11 +261,11 @@ def _describe_rest(facts: DiagnosisFacts) -> str:
 
 
 def _describe_uncertain(facts: DiagnosisFacts) -> str:
-    extent = f"{_describe_extent(facts)}{_describe_rest(facts)}"
+    extent = f"{_describe_extent(facts, 'it')}{_describe_rest(facts)}"
     if len(facts.claimed) > 1:
-        return f"There is a discrepancy with uncertain causes: the most probable ones explain {extent}."
+        return f"There is a discrepancy, whose causes are uncertain: the most probable ones explain {extent}."
     form = " is a free form, and" if facts.free_forms else ""
-    return f"There is a discrepancy with an uncertain cause: the most probable one{form} explains {extent}."
+    return f"There is a discrepancy, whose cause is uncertain: the most probable one{form} explains {extent}."
 
 
 def _describe_family(facts: DiagnosisFacts) -> str:
@@ -304,7 +324,7 @@ def write_value(given: Document, is_exact: bool = False) -> str:
     is_exact : bool
         Whether the data have no noise. Otherwise a value with an interval of rounding has no response.
     """
-    value, interval = given["value"], given["ci95"]
+    value, interval = given["value"] + 0.0, given["ci95"]  # -0.0 is 0.0
     unit = f" {given['unit']}" if given["unit"] not in ("", "1") else ""
     if interval is None:
         return f"{value:.4g}{unit}"
@@ -376,7 +396,8 @@ def name_reference(document: Document) -> str:
     A calibration absorbs wrong gains and parameters, so that they are compared with the simulation as given.
     """
     facts = DiagnosisFacts(document)
-    is_calibrated = facts.gain is None or facts.calibrated_rmse in (None, facts.errors[0])
+    is_same = facts.gain is None or facts.calibrated_rmse in (None, facts.errors[0])
+    is_calibrated = is_same and document.get("calibrated") != {}
     return "calibrated, without the effects" if is_calibrated else "as given, without the effects"
 
 
@@ -422,11 +443,10 @@ def _compare_with_floor(facts: DiagnosisFacts) -> str:
 
 
 def _describe_large_noise(facts: DiagnosisFacts) -> str:
-    is_coloured = any(each["name"] == "coloured-noise" for each in facts.noise)
-    if is_coloured:
+    if facts.is_coloured:
         return (
-            "What is left of the output counts as coloured noise: an input that is not in the record, or a "
-            "discrepancy that is as slow, is not excluded."
+            "What remains counts as coloured noise: a cause that is not in the record, such as a missing "
+            "input, is not excluded."
         )
     return "The noise is large: a discrepancy that is much smaller is not excluded."
 
@@ -467,7 +487,10 @@ VERDICTS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement(
         "nothing",
         lambda facts: facts.verdict == "nothing" and not facts.is_far,
-        lambda _: "No significant discrepancy: the simulation agrees with the record within the noise.",
+        lambda facts: (
+            "No significant discrepancy: the simulation agrees with the record within "
+            f"{'coloured' if facts.is_coloured else 'the'} noise."
+        ),
     ),
     Statement(
         "nothing-in-estimation-data",
@@ -556,11 +579,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         _describe_error,
     ),
     Statement("noise-floor", lambda facts: not facts.is_gross, _describe_noise_floor),
-    Statement(
-        "large-noise",
-        lambda facts: facts.verdict in ("nothing", "named") and (facts.relative_error or 0.0) > _LARGE_NOISE,
-        _describe_large_noise,
-    ),
+    Statement("large-noise", lambda facts: facts.has_large_noise, _describe_large_noise),
     Statement(
         "experiment",
         lambda facts: facts.document["decisive_experiment"],

@@ -36,7 +36,7 @@ def test_one_statement_gives_the_verdict(verdict, confidence, error):
         (0.012, 95.0, "which explains the discrepancy."),
         (0.1, 40.0, "which explains most of the discrepancy."),
         (0.19, 2.0, "which explains a part of the discrepancy."),
-        (0.19, -1.0, "which explains the discrepancy of the samples used for estimation alone."),
+        (0.19, -1.0, "which explains the discrepancy in the samples used for estimation alone."),
     ],
 )
 def test_the_extent_is_that_of_the_held_out_data(after, low, extent):
@@ -54,7 +54,9 @@ def test_a_gain_whose_interval_includes_zero_is_no_gain():
 def test_a_cause_that_others_exceed_is_uncertain():
     unlikely = {**CAUSE, "confidence": 0.36, "equivalents": ["sensor-lag"]}
     said = text("named", effects=[unlikely], gain=GAIN)
-    assert said.startswith("There is a discrepancy with an uncertain cause: the most probable one explains")
+    assert said.startswith(
+        "There is a discrepancy, whose cause is uncertain: the most probable one explains it."
+    )
     assert "The simulation lacks" not in said
     assert "0.36, 99 % of the misfit above the noise floor; confounded with sensor-lag" in said
 
@@ -67,9 +69,9 @@ def test_agreement_is_stated_with_its_error_and_contradicted_by_a_large_one():
     assert far.startswith("No significant discrepancy in the samples used for estimation, but the error of")
 
 
-def test_noise_that_is_a_third_of_the_output_may_hide_a_discrepancy():
+def test_large_noise_may_hide_a_discrepancy():
     noise = {**CAUSE, "name": "coloured-noise", "eta": None}
-    assert "an input that is not in the record" in text(
+    assert "such as a missing input" in text(
         "nothing", effects=[noise], calibrated_rmse=0.5, noise_floor_rmse=0.5
     )
     assert "not excluded" not in text("nothing", effects=[noise], calibrated_rmse=0.01)
@@ -93,6 +95,8 @@ def test_the_reference_of_a_gain_is_named():
     assert name_reference(make_document("named", gain=GAIN)) == "calibrated, without the effects"
     other = make_document("named", gain=GAIN, calibrated_rmse=0.012)
     assert name_reference(other) == "as given, without the effects"
+    column = make_document("named", gain=GAIN, calibrated={})
+    assert name_reference(column) == "as given, without the effects"
 
 
 def test_the_nearest_effects_of_an_unknown_cause_improve_the_fit():
