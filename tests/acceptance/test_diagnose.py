@@ -61,7 +61,7 @@ def test_diagnose_names_the_missing_effect(folder: Path) -> None:
 def test_report_is_a_single_file_with_a_summary(folder: Path) -> None:
     text = (folder / "out/report.html").read_text()
     assert "thermal-drift: k = " in text
-    assert "on the last quarter of the record, excluded from fitting" in text
+    assert "On the last quarter of the record, excluded from fitting" in text
     assert text.count("<img ") == 4
     assert not re.findall(r'(?:src|href)="(?!data:)', text)
 
@@ -136,7 +136,7 @@ def test_file_for_validation_is_held_out_as_a_whole(offset_record: Path) -> None
         )
     document = json.loads((offset_record / "held/discrepancy.json").read_text())
     assert document["record"]["segments"] == [300, 100]
-    assert "on the last recording, excluded from fitting" in (offset_record / "held/report.html").read_text()
+    assert "On the last recording, excluded from fitting" in (offset_record / "held/report.html").read_text()
     planned = fail("diagnose", other, *options, "--plan", "--validation", other, "--out", offset_record / "p")
     assert "--validation is for a diagnosis" in planned
 

@@ -15,6 +15,7 @@ import islands
 from islands.data.dataset import Dataset
 from islands.diagnosis.interim_findings import InterimFindings
 from islands.diagnosis.procedure import diagnose
+from islands.facade.explain_residual import FORMULA
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
@@ -165,11 +166,11 @@ def _diagnose_until(phase: str) -> DiagnosisResult:
         diagnose(record, simulator, progress=stop, interim=interim)
     found = interim.make_diagnosis()
     assert found is not None
-    return DiagnosisResult.from_diagnosis(found, left_out=("report.html",))
+    return DiagnosisResult.from_diagnosis(found, left_out=(FORMULA,))
 
 
 def _diagnose_with_formula() -> DiagnosisResult:
-    found = diagnose_difference("another system", 0, "linear:1")
+    found = diagnose_difference("another system", 0)
     return DiagnosisResult.from_diagnosis(found, islands.explain_residual(found))
 
 

@@ -83,6 +83,7 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (r"Known effects alone explain less", r"(the score is worse by -|that explain the record as well)"),
     (r"the RMSE is (below it|at the floor)", _FAR),
     (r"(is|,) a rounding error", r"the RMSE is [\d.e+]+ times the floor"),
+    (_FAR, r"(What remains counts as coloured noise|The noise is large)"),
     (r"measured from repeated periods", r"because the record has no repeated periods"),
     (r"no effect alone improves the fit", r"none of which is confirmed"),
 )

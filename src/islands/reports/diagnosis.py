@@ -19,11 +19,11 @@ from islands.reports.rendering import TEMPLATES, inline_figure
 
 #: Captions of the figures, in the order of the report.
 _CAPTIONS = {
-    "over-time": "Measured, simulated and extended output, and the residuals",
+    "over-time": "Measured and simulated output, and the residual",
     "shape": "Shape of the effect, and of a free curve in its place",
-    "free-forms": "Shape of the missing effect",
+    "free-forms": "Values of the free forms",
     "loops": "Output over input, and the residual over the input",
-    "residual": "Structure of the residual before and after",
+    "residual": "Structure of the residual",
     "ladder": "Gain of each effect alone",
 }
 

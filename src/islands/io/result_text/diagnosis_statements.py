@@ -48,7 +48,7 @@ _NEAREST = 3
 #: Families of causes: wrong gains and parameters, terms that were found, gross errors of the record.
 _SCALE, _TERM, _GROSS = "scale", "discovered", "gross"
 
-#: Effect that stands for a wrong form of an identified model.
+#: Effect of a wrong form of an identified model.
 _FORM = "core-shape"
 
 
@@ -168,10 +168,10 @@ class DiagnosisFacts:
 
     @property
     def has_large_noise(self) -> bool:
-        """Whether the error that counts as noise is a large part of the output."""
-        largest = _LARGE_COLOURED_NOISE if self.is_coloured else _LARGE_NOISE
-        verdicts = ("nothing", "named", "family", "discovered")
-        return self.verdict in verdicts and (self.relative_error or 0.0) > largest
+        """Whether an error that counts as noise is a large part of the output."""
+        if self.verdict not in ("nothing", "named", "family", "discovered") or self.is_far:
+            return False
+        return (self.relative_error or 0.0) > (_LARGE_COLOURED_NOISE if self.is_coloured else _LARGE_NOISE)
 
     @property
     def is_measured(self) -> bool:

@@ -75,6 +75,8 @@ def test_large_noise_may_hide_a_discrepancy():
         "nothing", effects=[noise], calibrated_rmse=0.5, noise_floor_rmse=0.5
     )
     assert "not excluded" not in text("nothing", effects=[noise], calibrated_rmse=0.01)
+    assert "The noise is large" in text("nothing", calibrated_rmse=0.5, noise_floor_rmse=0.5)
+    assert "not excluded" not in text("nothing", calibrated_rmse=0.5)  # the noise is small
 
 
 def test_properties_of_the_noise_are_no_causes():

@@ -12,6 +12,7 @@ import structlog
 from islands.diagnosis.inference import noise_floor
 from islands.errors import RecordError, SettingsError
 from islands.facade.explain_residual import FORMULA
+from islands.io.result_text.diagnosis_statements import describe_diagnosis
 from islands_service.coordinator.diagnosis import job as diagnosis_job
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_failures import make_problem_document
@@ -64,7 +65,10 @@ def phases(store: Store, job: Job) -> list[str]:
 @pytest.mark.ci
 def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs, submit: Submit) -> None:
     job = submit()
-    document = run_job(claim(store), store, blobs).document or {}
+    outcome = run_job(claim(store), store, blobs)
+    document, summary = outcome.document or {}, outcome.summary or {}
+    assert summary["words"].splitlines() == describe_diagnosis(document)
+    assert summary["effects"] == ["offset"]
     assert document["simulation"] == "column theirs_um"
     assert document["record"]["names"]["inputs"] == ["u_V", "T_K"]
     assert document["verdict"] == "named"
