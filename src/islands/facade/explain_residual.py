@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
+from warnings import catch_warnings
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from islands.data.dataset import Dataset
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
+from islands.errors import ExtrapolationWarning
 from islands.progress import ProgressCallback, Stop, ignore_progress, never_stop
 from islands.simulation.predictors import free_run
 
@@ -101,17 +103,19 @@ def explain_residual(
         segments=record.segments,
         recordings=record.recordings,
     )
-    result = identify(
-        dataset[: found.estimation_samples],
-        preset="narx",
-        seed=seed,
-        engine=engine,
-        progress=progress,
-        on_epoch=on_epoch,
-        stop=stop,
-        start=start,
-        **SEARCH,
-    )
+    # The caller knows neither the residual nor the parts into which it is split.
+    with catch_warnings(action="ignore", category=ExtrapolationWarning):
+        result = identify(
+            dataset[: found.estimation_samples],
+            preset="narx",
+            seed=seed,
+            engine=engine,
+            progress=progress,
+            on_epoch=on_epoch,
+            stop=stop,
+            start=start,
+            **SEARCH,
+        )
     best, explained = None, MIN_EXPLAINED_FRACTION
     for each in result.models:
         run = free_run(each.model, dataset)

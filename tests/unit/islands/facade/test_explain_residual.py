@@ -1,12 +1,14 @@
 """Formula of a residual: names of the record, and no formula of rounding errors."""
 
 from types import SimpleNamespace
+from warnings import warn
 
 import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
 from islands.diagnosis.inference.verdict import Verdict
+from islands.errors import ExtrapolationWarning
 from islands.expressions.parsing import parse
 from islands.facade import explain_residual as module
 from islands.models.narx import make_model
@@ -29,6 +31,7 @@ def searched(monkeypatch):
     """Replace the search by a regression on the past sample of the two inputs, which are equal."""
 
     def search(dataset, *_args, **_settings):
+        warn("the residual extrapolates", ExtrapolationWarning, stacklevel=2)  # of no use to the caller
         gain = np.linalg.lstsq(dataset.u[:-1, :1], dataset.y[1:], rcond=None)[0].item()
         terms = [(parse("u1(k-1)"), gain / 3.0), (parse("u2(k-1)"), 2.0 * gain / 3.0)]
         model = make_model(terms, dataset.input_names, dataset.output_name)
