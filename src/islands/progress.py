@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from math import exp
 from typing import Protocol, TypeVar
 
 from islands.errors import IslandsError, check_callables
@@ -18,6 +19,9 @@ _FIRST_SECONDS = 1.0
 
 #: Part of the time left after which an estimate without a further report is not shown.
 _VALID_PART = 0.75
+
+#: Part of a phase up to which its steps count equally.
+_REGULAR_PART = 0.75
 
 #: Returns true if the computation must end.
 Stop = Callable[[], bool]
@@ -59,11 +63,14 @@ class Phase:
         Its time relative to that of the other phases, as it was measured.
     steps : int
         Number of its messages with this beginning and of its parallel maps, as it was measured.
+    unless : str
+        Beginning of an earlier phase after which this one does not occur; empty if there is none.
     """
 
     beginning: str
     share: float
     steps: int = 1
+    unless: str = ""
 
 
 class PhasedProgress:
@@ -85,12 +92,17 @@ class PhasedProgress:
         self._message, self._fraction = "", 0.0
         self._present, self._before = 0, 0.0
         self._within, self._steps, self._has_begun = 0.0, 0, False
+        self._begun: set[str] = set()
 
     @property
     def rest(self) -> float:
         """Time of the phases after the present one, relative to that of the present one."""
-        present, *after = self._phases[self._present :]
-        return sum(phase.share for phase in after) / present.share
+        return self._sum_following() / self._phases[self._present].share
+
+    def _sum_following(self) -> float:
+        """Return the shares of the phases after the present one."""
+        following = self._phases[self._present + 1 :]
+        return sum(phase.share for phase in following if phase.unless not in self._begun)
 
     def __call__(self, message: str, fraction: float | None = None, /) -> None:
         """Report a message, with the completed part of its phase if it is known."""
@@ -104,6 +116,7 @@ class PhasedProgress:
         if found is not None:
             self._within = max(self._within, min(fraction or 0.0, 1.0))
             self._has_begun = True
+            self._begun.add(self._phases[found].beginning)
         self._message = message
         self._report()
 
@@ -123,17 +136,22 @@ class PhasedProgress:
     def _find(self, message: str) -> int | None:
         """Return the phase of a message; None if it belongs to none from the present one on."""
         for index in range(self._present, len(self._phases)):
-            if message.startswith(self._phases[index].beginning):
+            phase = self._phases[index]
+            if message.startswith(phase.beginning) and phase.unless not in self._begun:
                 return index
         return None
 
     def _advance(self, ended: float) -> None:
         within = (self._steps + ended) / self._phases[self._present].steps
-        self._within = max(self._within, min(within, 1.0))
+        if within > _REGULAR_PART:
+            # A phase with more steps than usual is never complete: each of them still counts.
+            rest = 1.0 - _REGULAR_PART
+            within = 1.0 - rest * exp(-(within - _REGULAR_PART) / rest)
+        self._within = max(self._within, within)
 
     def _report(self) -> None:
-        present, *after = (phase.share for phase in self._phases[self._present :])
-        whole = self._before + present + sum(after)
+        present = self._phases[self._present].share
+        whole = self._before + present + self._sum_following()
         self._fraction = max(self._fraction, (self._before + self._within * present) / whole)
         self._progress(self._message, self._fraction)
 

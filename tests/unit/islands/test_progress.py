@@ -1,5 +1,7 @@
 """Steps of a computation: a stop request ends it before a needed step and leaves out the optional ones."""
 
+from itertools import pairwise
+
 import pytest
 
 from islands.errors import IslandsError
@@ -40,10 +42,10 @@ def test_without_a_stop_function_no_step_is_left_out() -> None:
 PHASES = (Phase("read", 1.0), Phase("trial of", 2.0, 4), Phase("search", 4.0), Phase("assess", 1.0))
 
 
-def phased() -> tuple[PhasedProgress, list[tuple[str, float]]]:
+def phased(phases: tuple[Phase, ...] = PHASES) -> tuple[PhasedProgress, list[tuple[str, float]]]:
     reported: list[tuple[str, float]] = []
     return PhasedProgress(
-        lambda message, fraction=None: reported.append((message, fraction)), PHASES
+        lambda message, fraction=None: reported.append((message, fraction)), phases
     ), reported
 
 
@@ -62,6 +64,34 @@ def test_the_share_of_a_skipped_phase_is_no_part_of_the_whole() -> None:
     first, seen = phased()
     first("search", 0.0)
     assert seen[-1] == ("search", 0.0)
+
+
+def test_a_phase_that_an_earlier_one_replaces_is_no_part_of_the_whole() -> None:
+    phases = (
+        *(Phase("read", 1.0), Phase("refine", 2.0)),
+        *(Phase("search", 4.0, unless="refine"), Phase("search", 1.0)),
+    )
+    progress, reported = phased(phases)
+    for message in ("read", "refine"):
+        progress(message)
+    assert reported[-1][1] == pytest.approx(1 / 4)
+    assert progress.rest == pytest.approx(0.5)
+    progress("search")
+    assert reported[-1][1] == pytest.approx(3 / 4)
+    without, seen = phased(phases)
+    for message in ("read", "search"):
+        without(message)
+    assert seen[-1][1] == pytest.approx(1 / 6)
+
+
+def test_a_phase_with_more_steps_than_usual_still_advances() -> None:
+    progress, reported = phased()
+    progress("trial of a")
+    for _ in range(7):  # of four
+        list(progress.count(map)(abs, [1]))
+    fractions = [fraction for _, fraction in reported]
+    assert all(one < other for one, other in pairwise(fractions))
+    assert fractions[-1] < 2 / 7
 
 
 def test_messages_and_calls_of_a_phase_increase_the_fraction() -> None:

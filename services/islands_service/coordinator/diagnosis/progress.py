@@ -5,7 +5,7 @@ from time import monotonic
 from islands.diagnosis.procedure import LEAST_FRACTION
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT
+from islands.facade.explain_residual import BEFORE_FORMULA, FormulaProgress
 from islands.progress import TimeLeft
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.diagnosis.checkpoints import DiagnosisCheckpoints, DiagnosisState
@@ -36,6 +36,7 @@ class DiagnosisProgress:
         self._started_at = self._reported_at - state.spent
         self._stored = state.reached
         self._left = TimeLeft(self._started_at, BEFORE_FORMULA * LEAST_FRACTION)
+        self._formula = FormulaProgress()
         self._phase, self._fraction = "", 0.0
         self._report_outage = OutageLog("report failed", "reports stored again")
         self._checkpoint_outage = OutageLog("no checkpoint", "checkpoints stored again")
@@ -57,8 +58,12 @@ class DiagnosisProgress:
     def count_epochs(self, state: SearchState, settings: Settings) -> None:
         """Store the state of the search for a formula; called every epoch."""
         self._state.search = state
-        done = state.archipelago.generation / settings.generations
-        self(self._phase, BEFORE_FORMULA + (BEFORE_REPORT - BEFORE_FORMULA) * done)
+        now = monotonic()
+        fraction, left = self._formula.measure(state, settings, now)
+        if left is not None:
+            self._left.update(fraction, now)
+            self._left.expect(left, now)
+        self(self._phase, fraction)
 
     def _report(self) -> None:
         began = self._reported_at = monotonic()

@@ -6,14 +6,14 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from islands.cli import options, simulation_options
 from islands.cli.console import output
 from islands.cli.output_folder import check_folder
-from islands.cli.progress_display import compile_kernels, progress
+from islands.cli.progress_display import Display, compile_kernels, progress
 from islands.cli.record_options import with_reading_options
 from islands.cli.recordings import Recordings
 from islands.cli.runs.diagnosis_fits import explain_continuation, keep_fits, say_to_continue, write_fits
@@ -38,7 +38,13 @@ from islands.diagnosis.procedure import LEAST_FRACTION
 from islands.diagnosis.procedure import diagnose as run_diagnosis
 from islands.diagnosis.result import Diagnosis
 from islands.errors import SettingsError
-from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT, FORMULA, explain_residual
+from islands.facade.explain_residual import (
+    BEFORE_FORMULA,
+    BEFORE_REPORT,
+    FORMULA,
+    FormulaProgress,
+    explain_residual,
+)
 from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, REPORT_FILE, DiagnosisResult
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.result_text.text_layout import wrap
@@ -48,6 +54,10 @@ from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import ColumnSpec, innermost, parse_spec
+
+if TYPE_CHECKING:
+    from islands.evolution.search_state import SearchState
+    from islands.evolution.settings import Settings
 
 #: Name of a step without which a diagnosis is complete.
 SELF_TEST = "self-test"
@@ -125,7 +135,7 @@ def diagnose(
         with stop_requests(before) as stop:
             steps = Steps(show, stop)
             show(FORMULA, BEFORE_FORMULA)
-            formula = _find_formula(diagnosis, seed, steps)
+            formula = _find_formula(diagnosis, seed, steps, show)
             wall = perf_counter() - began
             limits = None
             if tested and diagnosis.verdict != Verdict.GROSS_ERROR:
@@ -190,13 +200,20 @@ def _diagnose_until_stopped(
         return found, fits, stop
 
 
-def _find_formula(diagnosis: Diagnosis, seed: int, steps: Steps) -> ResidualFormula | None:
+def _find_formula(diagnosis: Diagnosis, seed: int, steps: Steps, show: Display) -> ResidualFormula | None:
     """Search for a formula of the residual, as an optional step."""
     if diagnosis.left_out:
         steps.skip(FORMULA)
         return None
+    progress = FormulaProgress()
+
+    def count_epochs(state: "SearchState", settings: "Settings") -> None:
+        fraction, left = progress.measure(state, settings, perf_counter())
+        show(FORMULA, fraction, seconds_left=left)
+
     with suppress(StoppedError):
-        return explain_residual(diagnosis, seed, stop=partial(steps.skip, FORMULA))
+        stop = partial(steps.skip, FORMULA)
+        return explain_residual(diagnosis, seed, on_epoch=count_epochs, stop=stop)
     return None
 
 

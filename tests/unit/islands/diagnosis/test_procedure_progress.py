@@ -7,10 +7,11 @@ from support.recorded_runs import find_quarters, find_standstills, late, replay
 
 #: Recorded runs with the largest error of the time left beyond half of it, in seconds, as measured.
 EXCESS = {
-    "diagnosis-linear": 4.0,
-    "diagnosis-second-order": 7.0,
-    "diagnosis-short": 9.0,
-    "diagnosis-explained": 2.0,
+    "diagnosis-linear": 3.0,
+    "diagnosis-second-order": 11.0,
+    "diagnosis-short": 8.0,
+    "diagnosis-explained": 6.0,
+    "diagnosis-known": 3.0,
 }
 
 
@@ -19,6 +20,12 @@ def test_time_left_is_within_half_of_the_truth_and_some_seconds(name):
     shown = [each for each in late(replay(name)) if each.left is not None]
     assert len(shown) > 30
     assert all(abs(each.left - each.truth) <= 0.5 * each.truth + EXCESS[name] for each in shown)
+
+
+@pytest.mark.parametrize("name", EXCESS)
+def test_time_left_is_never_a_small_part_of_a_long_one(name):
+    shown = [each for each in late(replay(name)) if each.left is not None and each.truth > 15.0]
+    assert all(each.left >= 0.4 * each.truth for each in shown)
 
 
 @pytest.mark.parametrize("name", EXCESS)
@@ -36,4 +43,4 @@ def test_time_left_is_never_constant_while_time_passes(name):
 
 
 def test_shares_of_the_phases_are_those_of_the_whole():
-    assert sum(phase.share for phase in PHASES) == pytest.approx(1.0, abs=0.01)
+    assert sum(phase.share for phase in PHASES if not phase.unless) == pytest.approx(1.0, abs=0.02)

@@ -48,3 +48,15 @@ def test_a_formula_has_the_names_of_the_record():
 
 def test_rounding_errors_have_no_formula():
     assert module.explain_residual(diagnosis(1e-12 * np.r_[0.0, INPUT[:-1]])) is None
+
+
+def test_time_left_of_the_search_is_that_of_its_own_pace():
+    progress = module.FormulaProgress()
+    found = []
+    for now, generation in ((100.0, 10), (104.0, 20), (112.0, 30)):
+        state = SimpleNamespace(archipelago=SimpleNamespace(generation=generation))
+        found.append(progress.measure(state, SimpleNamespace(generations=40), now))
+    assert [left for _, left in found] == [None, 8.0, 6.0]
+    fractions = [fraction for fraction, _ in found]
+    assert fractions == sorted(fractions)
+    assert all(module.BEFORE_FORMULA < each < module.BEFORE_REPORT for each in fractions)
