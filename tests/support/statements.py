@@ -43,7 +43,7 @@ EXCLUSIVE = (
 
 #: A claimed cause that others together exceed in probability.
 _UNLIKELY = (
-    r"confidence 0\.[0-4]\d, \d+ % of the misfit above the noise floor"
+    r"confidence (below )?0\.[0-4]\d, \d+ % of the misfit above the noise floor"
     r"(?!; improves|; confounded with [^;]*; improves)"
 )
 
@@ -63,7 +63,7 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (r"No significant discrepancy", r"(The remaining residual depends|none of which is confirmed)"),
     (
         r"No significant discrepancy",
-        r"confidence (above )?\d\.\d\d, \d+ % of the (misfit|mean squared error)",
+        r"confidence (above |below )?\d\.\d\d, \d+ % of the (misfit|mean squared error)",
     ),
     (r"No significant discrepancy: ", _FAR),
     (_WHOLE, _FAR),
@@ -75,8 +75,11 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (r"does not fall significantly", r"a reduction of [\d.]+ % \([\d.]*[1-9][\d.]* to"),
     (r"The simulation lacks (a )?known effects?", _UNLIKELY),
     (r"is wrong, which explains", _UNLIKELY),
-    (r"(causes are|cause is) uncertain: (?!.*confidence 0\.[0-4])", r""),
-    (r"no known effect is confirmed", r"(confidence (above )?\d\.\d\d, \d+ % of the misfit|the RMSE falls)"),
+    (r"(causes are|cause is) uncertain: (?!.*confidence (below )?0\.[0-4])", r""),
+    (
+        r"no known effect is confirmed",
+        r"(confidence (above |below )?\d\.\d\d, \d+ % of the misfit|the RMSE falls)",
+    ),
     (r"stopped before a verdict", r"(No significant discrepancy|explains? |the RMSE falls from)"),
     (r"significant structure remains(?!.*(The remaining residual depends|A flexible model of))", r""),
     (r"Record and simulation do not match", r"(The simulation lacks|No significant|the RMSE (falls|is))"),

@@ -36,7 +36,7 @@ _CALIBRATED = 0.05
 #: Digits of the widest value. A narrower interval is that of exact data, or of a value without a response.
 _MOST_DIGITS = 9
 
-#: Confidence that is written as 1.00, although no cause is certain.
+#: Confidence whose two digits are 1.00, although no cause is certain.
 _ALMOST_CERTAIN = 0.995
 
 #: Score of an effect that is written as more than zero.
@@ -296,7 +296,9 @@ def _describe_cause(facts: DiagnosisFacts, cause: Document) -> str:
 
 def _describe_confidence(effect: Document) -> str:
     confidence = effect["confidence"]
-    return "confidence above 0.99" if confidence >= _ALMOST_CERTAIN else f"confidence {confidence:.2f}"
+    if confidence >= _ALMOST_CERTAIN:
+        return "confidence above 0.99"
+    return "confidence below 0.01" if confidence < 1.0 - _ALMOST_CERTAIN else f"confidence {confidence:.2f}"
 
 
 def _describe_share(facts: DiagnosisFacts, cause: Document) -> str:

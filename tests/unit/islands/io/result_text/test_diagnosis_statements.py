@@ -143,7 +143,8 @@ def test_an_interval_of_exact_data_is_written_as_its_half_width():
     )
 
 
-def test_no_cause_is_certain():
+def test_no_cause_is_certain_or_impossible():
+    assert "confidence below 0.01, " in text("named", effects=[{**CAUSE, "confidence": 0.001}], gain=GAIN)
     assert "confidence above 0.99, " in text("named", effects=[{**CAUSE, "confidence": 1.0}], gain=GAIN)
 
 
