@@ -1,4 +1,4 @@
-"""Contradictions in the texts about 200 results, of all kinds: summary, notebook, report, REST and page.
+"""Contradictions in the texts about 270 results, of all kinds: summary, notebook, report, REST and page.
 
     python tests/benchmarks/contradictions.py [--jobs 2] [--only law] [--every 5]
 

@@ -77,7 +77,8 @@ def describe_kept_models(job: JobView) -> str:
 def show_findings(job: JobView) -> None:
     """Show the verdict of a discrepancy job, or the states of a record, as text; the phase if it runs."""
     if job.summary is not None:
-        output.print(job.summary["words"], markup=False)
+        for line in job.summary["words"].splitlines():
+            output.print("\n".join(wrap(line, "    ")), markup=False)
     elif job.progress is not None and job.state == JobState.RUNNING:
         output.print(job.progress["phase"], markup=False)
 
