@@ -50,7 +50,7 @@ def test_rounding_errors_have_no_formula():
     assert module.explain_residual(diagnosis(1e-12 * np.r_[0.0, INPUT[:-1]])) is None
 
 
-def test_time_left_of_the_search_is_that_of_its_own_pace():
+def test_time_left_follows_from_the_pace_of_the_search():
     progress = module.FormulaProgress()
     found = []
     for now, generation in ((100.0, 10), (104.0, 20), (112.0, 30)):
