@@ -105,10 +105,13 @@ def measure_structure(
 def predictable_share(residual: NDArray[np.float64], u: NDArray[np.float64], y: NDArray[np.float64]) -> float:
     """Return the predictable share of the mean square of a residual.
 
-    The predictor is linear in past residuals, present and past inputs and their squares, and products of past
-    residuals and inputs, as in the tests of `residual_tests`, and in three powers of the last output. Each
-    half of the residual is predicted with the coefficients of the other half, so that chance does not count;
-    a negative share is 0.
+    It is the larger share of two linear predictors. One reads past residuals alone, the other one also
+    present and past inputs and their squares, products of past residuals and inputs, as in the tests of
+    `residual_tests`, and three powers of the last output. Each half of the residual is predicted with the
+    coefficients of the other half, so that chance does not count; a negative share is 0.
+
+    If the inputs or the output of one half leave the range of the other half, or the residual is short, the
+    second predictor extrapolates and predicts nothing, however coloured the residual is.
 
     Parameters
     ----------
@@ -122,6 +125,16 @@ def predictable_share(residual: NDArray[np.float64], u: NDArray[np.float64], y: 
     # The residual keeps its mean, which is a predictable part of it.
     rows = _make_columns(residual / peak, np.column_stack([_scale(column) for column in u.T]), _scale(y))
     target, columns = rows[0], rows[1:]
+    total = float(np.add.reduce(target**2))
+    if total == 0.0:
+        return 0.0
+    past_residuals = columns[: 1 + len(residual) - len(target)]
+    unexplained = min(_sum_errors(target, past_residuals), _sum_errors(target, columns))
+    return max(0.0, 1.0 - unexplained / total)
+
+
+def _sum_errors(target: NDArray[np.float64], columns: NDArray[np.float64]) -> float:
+    """Return the squared error of both halves, each predicted with the coefficients of the other one."""
     half = len(target) // 2
     unexplained = 0.0
     for fitted, predicted in ((slice(half), slice(half, None)), (slice(half, None), slice(half))):
@@ -129,8 +142,7 @@ def predictable_share(residual: NDArray[np.float64], u: NDArray[np.float64], y: 
         # Not a matrix product: the rounding of a BLAS call depends on the number of threads.
         error = target[predicted] - np.add.reduce(theta[:, None] * columns[:, predicted], axis=0)
         unexplained += float(np.add.reduce(error**2))
-    total = float(np.add.reduce(target**2))
-    return max(0.0, 1.0 - unexplained / total) if total > 0.0 else 0.0
+    return unexplained
 
 
 def _scale(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -144,7 +156,10 @@ def _scale(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _make_columns(
     xi: NDArray[np.float64], u: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the residual and, in further rows, the constant and the regressors of its prediction."""
+    """Return the residual and, in further rows, the constant and the regressors of its prediction.
+
+    Past residuals follow the constant, one row for each sample that the lags take from the residual.
+    """
     signals = [xi, *(_scale(xi * column) for column in u.T)]
     direct = [*u.T, *(_scale(column**2) for column in u.T)]
     lags = min(_MAX_LAGS, max(1, (_MAX_COLUMNS - 1) // (len(signals) + len(direct))), max(1, len(xi) // 20))

@@ -48,6 +48,21 @@ def test_the_share_of_a_moving_average_is_that_of_its_whitening():
     assert predictable_share(moving_average(WHITE, -0.5), U, Y) == pytest.approx(0.2, abs=0.06)
 
 
+def test_a_coloured_residual_is_predictable_where_input_and_output_leave_the_range_of_the_other_half():
+    level = np.where(np.arange(2000) < 1000, 0.0, 10.0)
+    y, u = level + 0.1 * Y, level[:, None] + 0.1 * U
+    coloured = WHITE.copy()
+    for k in range(1, len(coloured)):
+        coloured[k] += 0.9 * coloured[k - 1]
+    assert predictable_share(coloured, u, y) == pytest.approx(0.81, abs=0.05)
+    assert predictable_share(WHITE, u, y) < 0.02
+
+
+def test_a_short_coloured_residual_is_predictable_with_many_inputs():
+    walk = np.cumsum(WHITE[:150])
+    assert predictable_share(walk, RNG.uniform(-1, 1, (150, 4)), Y[:150]) > 0.5
+
+
 def test_the_share_does_not_depend_on_units_or_on_the_number_of_threads():
     residual = moving_average(WHITE) + U[:, 0]
     share = predictable_share(residual, U, Y)
