@@ -1,8 +1,8 @@
 """Whether output over input is a loop at low frequency, as that of a hysteresis is.
 
-Delays and time constants make loops, too, but these close as the input becomes slower. Two regressions
-predict the output of other parts of the record: one from the input, its low-pass filtered copies and their
-powers; one also from play operators of the input, whose loops do not depend on time. If the latter predicts
+Delays, time constants and integrators make loops, too, but those of the first two close as the input becomes
+slower. Three regressions predict the output of other parts of the record: one from the input, its low-pass
+filtered copies and their powers; one also from the integral of the input; one also from play operators of the input, whose loops do not depend on time. If the latter predicts
 clearly better, the loop remains at low frequency. A record of one repeated loop does not separate them in
 this way: there, the output of a hysteresis turns together with the input, and that behind a delay turns as
 late as its loop is wide.
@@ -32,8 +32,11 @@ _WIDTHS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
 #: Folds that are predicted in turn, and assumed accuracy of a column.
 _FOLDS, _ACCURACY = 4, 1e-4
 
-#: Part of the squared error that the play operators remove, at least.
+#: Part of the squared error that the play operators, or the integral, remove, at least.
 _LEAST_GAIN = 0.4
+
+#: Levels of an input with which a hysteresis does not differ from a time constant.
+_LEVELS = 2
 
 #: Squared error, relative to the variance of the output, below which delays and time constants explain it.
 _EXPLAINED = 5e-3
@@ -65,16 +68,24 @@ def check_loop(record: Dataset, place: int) -> Fact:
     Returns
     -------
     Fact
-        A yes or no; None if the input does not rise and fall slowly enough for a loop. The confidence is the
-        share of resampled records with the same answer.
+        A yes or no; None if the input does not rise and fall slowly enough for a loop, or has two levels, in
+        which a hysteresis does not differ from a time constant. The confidence is the share of resampled
+        records with the same answer.
     """
     name, output = record.input_names[place], record.output_name
     single = _take_input(record, place)
     if single is None or np.ptp(single.u) == 0.0 or not np.isfinite(single.y).all():
         return Fact("loop", name, None, "", None, None, f"{output} over {name} cannot be judged as a loop.")
+    if np.unique(single.u).size == _LEVELS:
+        text = (
+            f"{name} has {_LEVELS} levels: {output} over {name} does not show whether a hysteresis makes a loop."
+        )
+        return Fact("loop", name, None, "", None, None, text)
     slow = average_samples(single, _choose_count(single))
     if len(loop_starts(slow)) < 2:
-        text = f"{name} does not rise and fall, so {output} over {name} is no loop."
+        longest = f" in the longest part of the record, {single.samples} samples"
+        where = "" if len(record.bounds) == 1 else longest
+        text = f"{name} does not rise through its mean twice{where}, so {output} over {name} is no loop."
         return Fact("loop", name, None, "", None, None, text)
     if not has_loops(slow):
         text = f"{output} over {name} encloses no loop that {name} runs through slowly."
@@ -87,16 +98,17 @@ def check_loop(record: Dataset, place: int) -> Fact:
     elif loop:
         text = f"{output} over {name} is a loop that remains at low frequency, as that of a hysteresis."
     else:
-        text = f"{output} over {name} is a loop that a delay or time constants explain."
+        text = f"{output} over {name} is a loop that a delay, time constants or an integrator explain."
     return Fact("loop", name, loop, "", None, share, text)
 
 
 def _judge(record: Dataset) -> tuple[bool | None, float | None]:
     """Return whether a hysteresis makes the loops of a slow record, with a confidence."""
-    without, with_plays = _predict(record)
-    gains = 1.0 - resample(with_plays) / np.maximum(resample(without), np.finfo(np.float64).tiny)
-    better = float(np.mean(gains >= _LEAST_GAIN))
+    filtered, without, with_plays = _predict(record)
+    better, integrates = _count_gains(without, with_plays), _count_gains(filtered, without)
     if not _is_regular(record):
+        if integrates > 0.5 >= better:
+            return False, min(integrates, 1.0 - better)
         explained = _EXPLAINED * record.samples < without.sum() and with_plays.sum() < _FAR * record.samples
         if better > 0.5 or explained:
             return better >= 0.5, max(better, 1.0 - better)
@@ -107,6 +119,14 @@ def _judge(record: Dataset) -> tuple[bool | None, float | None]:
     if max(together, delayed) <= 0.5:
         return None, None
     return together > delayed, max(together, delayed)
+
+
+def _count_gains(
+    without: NDArray[np.float64], with_columns: NDArray[np.float64]
+) -> float:
+    """Return the share of resampled records in which further columns remove the error for the most part."""
+    gains = 1.0 - resample(with_columns) / np.maximum(resample(without), np.finfo(np.float64).tiny)
+    return float(np.mean(gains >= _LEAST_GAIN))
 
 
 def _is_regular(record: Dataset) -> bool:
@@ -160,8 +180,8 @@ def _choose_count(record: Dataset) -> int:
     return max(1, int(length) // _LOOP_SAMPLES, -(-record.samples // _SAMPLES) if length >= 50 else 1)
 
 
-def _predict(record: Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the squared errors of all blocks without and with the play operators."""
+def _predict(record: Dataset) -> list[NDArray[np.float64]]:
+    """Return the squared errors of all blocks without the integral, without the plays, and with both."""
     u = record.u[:, 0] - record.u[0, 0]
     u = u / np.ptp(u)
     filtered = [u, *(_filter(u, constant) for constant in _TIME_CONSTANTS)]
@@ -169,11 +189,12 @@ def _predict(record: Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     smooth = [signal**power for signal in filtered + lagged for power in range(1, 1 + _POWERS)]
     plays = [_apply_play(u, width) for width in _WIDTHS]
     trend = np.linspace(-1.0, 1.0, u.size)
-    columns = np.array([np.ones(u.size), trend, *smooth, *plays])
+    columns = np.array([np.ones(u.size), trend, *smooth, np.cumsum(u - u.mean()), *plays])
     scale = np.sqrt(np.mean(columns**2, axis=1))
     columns /= np.where(scale > 0.0, scale, 1.0)[:, None]
     y = (record.y - record.y.mean()) / record.y.std()
-    return _measure_errors(columns[: -len(plays)], y), _measure_errors(columns, y)
+    counts = (len(columns) - len(plays) - 1, len(columns) - len(plays), len(columns))
+    return [_measure_errors(columns[:count], y) for count in counts]
 
 
 def _apply_play(u: NDArray[np.float64], width: float) -> NDArray[np.float64]:

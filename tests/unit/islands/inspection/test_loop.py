@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,3 +46,23 @@ def test_input_that_turns_within_a_few_samples_makes_no_loop():
 def test_monotone_input_leaves_it_open():
     u = np.linspace(0.0, 1.0, 500)
     assert check_loop(measure(u, u**2), 0).value is None
+
+
+def test_loop_of_an_integrator_is_none_of_a_hysteresis():
+    for seed in range(3):
+        u = slow(3000, seed)
+        y = np.cumsum(lag(u - u.mean(), 10.0))
+        assert check_loop(measure(u, y, 0.02, seed), 0).value is not True
+
+
+def test_two_levels_do_not_tell_a_hysteresis_from_a_time_constant():
+    u = (slow(3000, 1) > 0.0).astype(np.float64)
+    fact = check_loop(measure(u, lag(lag(u, 60.0), 400.0)), 0)
+    assert fact.value is None
+    assert "2 levels" in fact.sentence
+
+
+def test_the_sentence_about_an_input_without_loops_names_the_part_that_is_judged():
+    u = np.linspace(0.0, 1.0, 500)
+    record = replace(measure(u, u**2), segments=(300, 200), recordings=("", ""))
+    assert "the longest part of the record, 300 samples" in check_loop(record, 0).sentence
