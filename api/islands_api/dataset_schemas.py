@@ -19,6 +19,10 @@ class Column(ResponseModel):
     maximum: float | None = None
     mean: float | None = None
     deviation: float | None = Field(default=None, description="Standard deviation.")
+    missing: int = Field(
+        default=0,
+        description="Samples without a value. Those of an output are skipped; an input needs the option `gaps`.",
+    )
     problem: str = Field(
         default="", description="Why the column can be neither input nor output. Empty if it can."
     )
@@ -40,7 +44,7 @@ class ChosenColumns(ResponseModel):
     """Inputs and output that the facts describe."""
 
     inputs: tuple[str, ...]
-    output: str
+    output: str = Field(description="Empty, like the inputs, if none are chosen. `reason` says why.")
     confidence: float | None = Field(
         default=None, description="Probability that the choice is right. None if it was given."
     )
@@ -67,7 +71,7 @@ class Preview(ResponseModel):
     warnings: tuple[str, ...] = ()
     reading: dict[str, Any] = Field(default_factory=dict, description="Options of reading.")
     inspection: Inspection | None = Field(
-        default=None, description="Facts about the record. None if no two columns form one."
+        default=None, description="Facts about the record. None if the file has problems that `warnings` state."
     )
 
 

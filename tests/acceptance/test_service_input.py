@@ -280,8 +280,8 @@ def test_upload_with_columns_is_rejected_like_a_job(service, case):
 
 @pytest.mark.ci
 def test_upload_with_an_output_only_is_checked(service):
-    detail = problem_of(service.upload(csv(y_um={7: "NaN"}), "a.csv", output="y_um"), 422, "invalid-record")
-    assert "a.csv, line 7, column y_um is empty or NaN" in detail
+    detail = problem_of(service.upload(csv(y_um={7: "inf"}), "a.csv", output="y_um"), 422, "invalid-record")
+    assert "a.csv, line 7, column y_um is infinite" in detail
     detail = problem_of(service.upload(csv(), "a.csv", output="force"), 422, "invalid-record")
     assert detail == "the record has no column force; it has t_s, u_V, y_um"
     assert nothing_stored(service)

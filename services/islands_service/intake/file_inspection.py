@@ -178,10 +178,11 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
         )
         assumed = record.reading
     elif options.gaps is None:
-        _check_usable({column.name: column.problem for column in found.columns}, request)
-    measured, inspected = _measure(table, found, path, request, options)
-    assumed = assumed or inspected
-    found = replace(found, warnings=merge_notes(found.warnings, assumed))
+        _check_usable(table, {column.name: column.problem for column in found.columns}, request)
+    measured, inspected, noted = _measure(table, found, path, request, options)
+    warnings = merge_notes(found.warnings, assumed or inspected)
+    # The inspection ends some notes with the option that changes them.
+    found = replace(found, warnings=(*warnings, *(each for each in noted if not each.startswith(warnings))))
     if options.resample is not None:
         found = replace(found, dt=options.resample)
     return {**asdict(found), "inspection": measured, "reading": options.changes()}
@@ -189,10 +190,11 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
 
 def _measure(
     table: "Table", found: "Preview", path: Path, request: InspectionRequest, options: "ReadingOptions"
-) -> tuple[dict[str, Any] | None, tuple[str, ...]]:
-    """Return the choice of columns with the facts about the record, and how it was read.
+) -> tuple[dict[str, Any] | None, tuple[str, ...], tuple[str, ...]]:
+    """Return the choice of columns with the facts about the record, how it was read, and notes about it.
 
-    Both are empty if there is no record.
+    There are no facts without a choice or a sampling; the reason of the choice then says why. All are empty if
+    the file has no record.
     """
     from islands.facade.inspect_record import inspect_table  # noqa: PLC0415
     from islands.inspection.record_facts import MOST_SAMPLES  # noqa: PLC0415
@@ -208,12 +210,11 @@ def _measure(
         )
     except RecordError:
         # The preview states the problems of the file.
-        return None, ()
-    if not inspected.facts.facts:
-        return None, ()
+        return None, (), ()
     document = inspected.as_document()
     assumed = () if inspected.record is None else inspected.record.reading
-    return {"rows": rows, "choice": document["choice"], "facts": document["facts"]}, assumed
+    measured = {"rows": rows, "choice": document["choice"], "facts": document["facts"]}
+    return measured, assumed, inspected.warnings
 
 
 def _check_columns(names: Sequence[str], file: str) -> None:
@@ -237,9 +238,10 @@ def _check_readable(found: "Preview", file: str) -> None:
         raise RecordError(problems[0] if problems else f"{file} has no columns: export it again")
 
 
-def _check_usable(problems: Mapping[str, str], request: InspectionRequest) -> None:
+def _check_usable(table: "Table", problems: Mapping[str, str], request: InspectionRequest) -> None:
     """Reject columns with a problem in the preview, if the job that would read them is not known yet."""
     from islands.io.records.column_names import find_column  # noqa: PLC0415
+    from islands.io.records.validation import check_values  # noqa: PLC0415
 
     for name in (*request.inputs, *([] if request.output is None else [request.output])):
         source = find_column(name, problems)
@@ -249,3 +251,5 @@ def _check_usable(problems: Mapping[str, str], request: InspectionRequest) -> No
             )
         if problems[source]:
             raise RecordError(problems[source])
+        if name in request.inputs:
+            check_values(table.read((source,), None), source)

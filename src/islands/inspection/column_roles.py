@@ -15,6 +15,7 @@ from islands.inspection.column_influence import (
     ColumnInfluence,
     average_middle,
 )
+from islands.inspection.column_shape import is_total
 from islands.inspection.gross_errors import find_gross_errors
 
 #: Names that say that a column is an input or an output, by the first word of the name.
@@ -116,8 +117,13 @@ def choose_columns(
             if np.isfinite(values).mean() >= _LEAST_KNOWN * (name not in given)
             and (name in given or not is_counter(name, values))
         }
+        signals = {
+            name: values
+            for name, values in signals.items()
+            if name in given or not any(_adds_up(values, other) for other in signals.values())
+        }
         if len(signals) < 2:
-            return ColumnChoice((), "", None, "Fewer than two columns are signals: name inputs and output.")
+            return ColumnChoice((), "", None, _describe_too_few(tuple(signals)))
         names = [*given & signals.keys(), *(name for name in signals if name not in given)][:_MOST_COLUMNS]
         names = [name for name in signals if name in names]
         choice = _compare(names, [signals[name] for name in names]).choose(tuple(inputs), output)
@@ -125,6 +131,21 @@ def choose_columns(
         return choice
     left = f"; of {len(signals)} columns {len(names)} are compared."
     return replace(choice, reason=choice.reason.removesuffix(".") + left)
+
+
+def _adds_up(values: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Return whether a column counts the values of another one of one sign, such as a charge."""
+    known = np.isfinite(values) & np.isfinite(other) if len(values) == len(other) else np.zeros(0, bool)
+    return known.size > 0 and is_total(values[known], other[known])
+
+
+def _describe_too_few(signals: Sequence[str]) -> str:
+    """Return why no columns can be chosen among less than two signals."""
+    found = f"Only {signals[0]} is a signal" if signals else "No column is a signal"
+    return (
+        f"{found}, which is a column of numbers that vary and do not only count: a record has an input and an "
+        "output, each in its column."
+    )
 
 
 def _first_word(name: str) -> str:
@@ -243,7 +264,11 @@ class _Comparison:
             return False
         if any(self.manipulated[place, each] < 0.0 for each in chosen):
             return False
-        is_response = any(self.gains[each, place] > 0.0 and self.odds[each, place] > 0.0 for each in chosen)
+        # The derivative of a response is one, too, although it is rougher than the input.
+        is_response = any(
+            self.gains[each, place] > 0.0 and (self.odds[each, place] > 0.0 or self.derived[place].any())
+            for each in chosen
+        )
         if is_response and self.manipulated[place, target] <= 0.0:
             return False
         return self._measure_gain(target, chosen, place) > 0.0
@@ -295,6 +320,17 @@ class _Comparison:
         ]
         if also:
             reason += f"; {', '.join(also)} {'respond' if len(also) > 1 else 'responds'} to {listed} too"
+        # The direction is open if both columns predict each other, as with a response within the sample.
+        together = [
+            name
+            for place, name in enumerate(self.names)
+            if place not in (*chosen, target)
+            and name not in also
+            and any(min(self.gains[each, place], self.gains[place, each]) > 0.0 for each in chosen)
+        ]
+        if together:
+            change = "change" if len(together) > 1 else "changes"
+            reason += f"; {', '.join(together)} {change} together with {listed}: the output may be there"
         return ColumnChoice(inputs, output, confidence, reason + ".")
 
 
@@ -325,7 +361,8 @@ def _compare(names: list[str], columns: Sequence[NDArray[np.float64]]) -> _Compa
     visible = gains > 0.0
     # The integral of a column that responds to no other one is a counter, such as a charge, and no output. If
     # nothing else is visible, one of two columns is the integral of the other as its response.
-    responds = np.any(visible & ~derived & ~derived.T & (unlimited > 0.0), axis=0, keepdims=True)
+    is_response = (unlimited > 0.0) | ~visible.T
+    responds = np.any(visible & ~derived & ~derived.T & is_response, axis=0, keepdims=True)
     counters = np.any(derived & ~responds.T, axis=0)
     candidates = (visible & ~derived & ~counters, visible & ~derived, visible)
     allowed = next((each for each in candidates if each.any()), visible)

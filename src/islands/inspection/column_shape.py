@@ -21,6 +21,10 @@ _MOST_LAGS = 200
 #: weights relative to their size, up to which it is a derivative.
 _DERIVED, _BALANCED = 0.05, 0.01
 
+#: Correlation of the increments of a total with a column of which it adds one sign, at least, and part of the
+#: samples with each sign, at least.
+_TOTAL, _EACH_SIGN = 0.95, 0.05
+
 #: Error of the increments of a column as a sum of others, relative to their size, up to which it is computed.
 _COMPUTED = 1e-3
 
@@ -88,6 +92,28 @@ def is_derived(x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
     error = float(np.median(np.abs(target - matrix @ weights)))
     balance = abs(float(weights[:-1].sum())) <= _BALANCED * float(np.abs(weights[:-1]).sum())
     return bool(error <= _DERIVED * size and balance)
+
+
+def is_total(x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
+    """Return whether x adds up the values of y of one sign, as a counter of the charge that flows in.
+
+    The other sign does not change x; a column that begins again once, in another step of a test, is a total,
+    too.
+    """
+    steps = np.diff(x)
+    for part in (y, -y):
+        added = np.maximum(part, 0.0)
+        if not _EACH_SIGN <= np.mean(added > 0.0) <= 1.0 - _EACH_SIGN:
+            continue
+        rising = steps[steps >= 0.0]
+        if rising.size < 0.99 * steps.size or np.ptp(rising) == 0.0:
+            continue
+        # The sample of y at either end of the step may be the one that is added.
+        for values in (added[:-1], added[1:]):
+            kept = values[steps >= 0.0]
+            if np.ptp(kept) > 0.0 and np.corrcoef(rising, kept)[0, 1] >= _TOTAL:
+                return True
+    return False
 
 
 def is_feedback(

@@ -63,7 +63,8 @@ class Onset:
 
 
 def _deny_response(record: Dataset, place: int) -> str:
-    return f"No response of {record.output_name} to {record.input_names[place]} is visible."
+    name, output = record.input_names[place], record.output_name
+    return f"No lag of {name} is visible at which {output} begins to respond."
 
 
 def compare_lags(record: Dataset, place: int, delay: int) -> Onset | str:

@@ -52,12 +52,12 @@ def check_rest(record: Dataset) -> Fact:
     if np.count_nonzero(resting & recently) < _LEAST_SAMPLES and usual > 0.0:
         most = float(np.quantile(moved[usable], _CALMEST))
         if most > _TURNING * usual:
-            return _answer(record, None, None)
+            return _leave_open(record, 2 * interval)
         resting, recently = usable & (moved <= most), np.ones(len(moved), dtype=bool)
     resting &= recently
     moving = usable & (moved > max(most, usual))
     if min(np.count_nonzero(resting), np.count_nonzero(moving)) < _LEAST_SAMPLES:
-        return _answer(record, None, None)
+        return _leave_open(record, 2 * interval)
     level = estimate_noise(record.y, record)
     noise = 2.0 * level * level
     output = _compare_means(motion - noise, resting, moving)
@@ -68,22 +68,28 @@ def check_rest(record: Dataset) -> Fact:
     return _answer(record, rests, share, tuple(100.0 * float(np.median(part)) for part in (output, inputs)))
 
 
-def _answer(
-    record: Dataset, rests: bool | None, confidence: float | None, percent: tuple[float, ...] = ()
-) -> Fact:
-    output = record.output_name
-    inputs = "the inputs" if record.inputs > 1 else record.input_names[0]
+def _leave_open(record: Dataset, samples: int) -> Fact:
+    """Return a fact without a value: the inputs do not rest for the samples in which the output moves."""
+    inputs, never = _list_inputs(record), "never rest" if record.inputs > 1 else "never rests"
+    sentence = (
+        f"The record does not show whether {record.output_name} rests: {inputs} {never} for {samples} samples."
+    )
+    return Fact("rest", record.output_name, None, "", None, None, sentence)
+
+
+def _list_inputs(record: Dataset) -> str:
+    return "the inputs" if record.inputs > 1 else record.input_names[0]
+
+
+def _answer(record: Dataset, rests: bool, confidence: float, percent: tuple[float, ...]) -> Fact:
+    output, inputs = record.output_name, _list_inputs(record)
     plural = record.inputs > 1
-    if rests is None:
-        never = "never rest" if plural else "never rests"
-        sentence = f"The record does not show whether {output} rests: {inputs} {never}."
-    else:
-        verb = f"rests with {inputs}" if rests else f"moves on while {inputs} {'rest' if plural else 'rests'}"
-        have = "have" if plural else "has"
-        sentence = (
-            f"{output} {verb}: it has {percent[0]:.0f} % of its usual motion where {inputs} {have} "
-            f"{percent[1]:.0f} %."
-        )
+    verb = f"rests with {inputs}" if rests else f"moves on while {inputs} {'rest' if plural else 'rests'}"
+    have = "have" if plural else "has"
+    sentence = (
+        f"{output} {verb}: it has {percent[0]:.0f} % of its usual motion where {inputs} {have} "
+        f"{percent[1]:.0f} %."
+    )
     return Fact("rest", output, rests, "", None, confidence, sentence)
 
 

@@ -20,8 +20,14 @@ function findUnit(columns, spec) {
   return units.size === 1 ? [...units][0] : "";
 }
 
+/** Return why a column cannot be used, or how many values it lacks; empty if neither applies. */
+function describeDefect({ problem, missing }) {
+  // Data sets of earlier versions do not count missing values.
+  return problem || (missing ? `${formatCount(missing)} missing` : "");
+}
+
 function makeColumnTable({ preview }, spec) {
-  const hasRemarks = preview.columns.some((column) => column.problem);
+  const hasRemarks = preview.columns.some(describeDefect);
   const role = (name) => {
     if (name === preview.time) return "time";
     if (getOutputs(spec).includes(name)) return "output";
@@ -47,7 +53,7 @@ function makeColumnTable({ preview }, spec) {
       formatNumber(column.maximum),
       formatNumber(column.mean),
       formatNumber(column.deviation),
-      ...(hasRemarks ? [column.problem] : []),
+      ...(hasRemarks ? [describeDefect(column)] : []),
     ]),
   );
 }
@@ -58,6 +64,7 @@ const ONLY_PROBLEMS = ["quantisation", "saturation", "levels"];
 /** List the facts about the record; data sets of earlier versions have none. */
 function describeInspection(inspection) {
   if (!inspection) return [];
+  if (!inspection.choice.output) return [el("p", { class: "soft" }, inspection.choice.reason)];
   const shown = inspection.facts.filter(({ name, value }) => value || !ONLY_PROBLEMS.includes(name));
   const title = `Facts about ${inspection.choice.inputs.join(", ")} and ${inspection.choice.output}`;
   return [

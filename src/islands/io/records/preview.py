@@ -37,11 +37,15 @@ class ColumnPreview:
     samples : int or None
         Number of samples; None if the column cannot be read.
     minimum, maximum, mean, deviation : float or None
-        Statistics over all samples; ``deviation`` is the standard deviation. None if a sample is missing or
-        infinite.
+        Statistics over the samples with a value; ``deviation`` is the standard deviation. None if no sample
+        has one, or if a sample is infinite.
+    missing : int
+        Number of samples without a value. Those of an output are skipped; `read_record` refuses those of an
+        input without ``gaps``.
     problem : str
-        The message with which `read_record` refuses this column; empty if it accepts the column. A
-        non-uniform time column is reported as a warning of the file.
+        The message with which `read_record` refuses this column as an output, and as an input without
+        missing values; empty if it accepts the column. A non-uniform time column is reported as a warning of
+        the file.
     """
 
     name: str
@@ -51,6 +55,7 @@ class ColumnPreview:
     maximum: float | None
     mean: float | None
     deviation: float | None
+    missing: int
     problem: str
 
 
@@ -107,7 +112,7 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
         # The column of the dates is read with that of the time of day.
         problems[table.clocks[time]] = ""
     for name, column in columns.items():
-        problems.setdefault(name, _find_problem(column, name, name == time, name in own))
+        problems.setdefault(name, _find_problem(column, name, name == time))
     warnings = (
         _error_message(check_unique, table.names, file),
         *unequal,
@@ -255,15 +260,16 @@ def _find_clocks(
     return (names, clocks, seconds) if clocks else none
 
 
-def _find_problem(column: Columns, name: str, is_time: bool, has_clock: bool) -> str:
+def _find_problem(column: Columns, name: str, is_time: bool) -> str:
     """Return the message of `read_record` about a column's values.
 
-    `_preview_sampling` checks whether the time column is uniform. A column with a clock of fewer samples than
-    the rows has no values between them.
+    `_preview_sampling` checks whether the time column is uniform. Any other column may be an output, or have
+    a clock of fewer samples than the rows, so that some of its cells may be empty.
     """
     if not len(column.rows):
         return _error_message(check_length, column)
-    return _error_message(check_values, column, name, has_clock) or (
+    may_miss = not is_time and not np.isnan(column.numbers[name]).all()
+    return _error_message(check_values, column, name, may_miss) or (
         "" if is_time else _error_message(check_varies, column, name)
     )
 
@@ -276,12 +282,14 @@ def _preview_column(
     name: str, unit: str, column: Columns | None, problem: str, has_clock: bool
 ) -> ColumnPreview:
     values = np.empty(0) if column is None else column.numbers[name]
-    values = values[~np.isnan(values)] if has_clock else values
-    samples = None if column is None else len(values)
-    if not len(values):
-        return ColumnPreview(name, unit, samples, None, None, None, None, problem)
+    known = values[~np.isnan(values)]
+    # The cells between the samples of a column with its own clock are no missing values.
+    missing = 0 if has_clock else len(values) - len(known)
+    samples = None if column is None else len(known) if has_clock else len(values)
+    if not len(known):
+        return ColumnPreview(name, unit, samples, None, None, None, None, missing, problem)
     with np.errstate(over="ignore", invalid="ignore"):
-        numbers = float(values.min()), float(values.max()), float(values.mean()), float(values.std())
+        numbers = float(known.min()), float(known.max()), float(known.mean()), float(known.std())
     if not np.isfinite(numbers).all():
-        return ColumnPreview(name, unit, samples, None, None, None, None, problem)
-    return ColumnPreview(name, unit, samples, *numbers, problem)
+        return ColumnPreview(name, unit, samples, None, None, None, None, missing, problem)
+    return ColumnPreview(name, unit, samples, *numbers, missing, problem)

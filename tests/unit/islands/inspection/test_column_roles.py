@@ -197,3 +197,30 @@ def test_the_charge_that_flows_is_no_output():
     choice = choose_columns({"a": charge, "b": voltage, "c": current})
     assert choice.inputs == ("c",)
     assert choice.output == "b"
+    counted = [np.cumsum(np.maximum(each, 0.0)) for each in (current, -current, current * voltage)]
+    columns = dict(zip("ade", counted, strict=True)) | {"b": voltage, "c": current}
+    choice = choose_columns(columns)
+    assert (choice.inputs, choice.output) == (("c",), "b")
+    assert "respond" not in choice.reason
+
+
+def test_a_column_with_its_derivative_is_an_output():
+    """A battery cycler writes dV/dt, which is rougher than the current."""
+    rng = np.random.default_rng(5)
+    current = np.repeat(0.5 * rng.integers(-5, 6, 60), 40)
+    slow = scipy.signal.lfilter([0.0, 0.03 * 0.022], [1.0, -0.97], current)
+    voltage = 3.8 + 0.035 * current + slow + 0.0002 * rng.standard_normal(current.size)
+    change = np.diff(voltage, prepend=voltage[0])
+    choice = choose_columns({"a": change, "b": voltage, "c": current})
+    assert (choice.inputs, choice.output) == (("c",), "b")
+
+
+def test_a_column_that_changes_together_with_an_input_is_named():
+    rng = np.random.default_rng(5)
+    current = np.repeat(0.5 * rng.integers(-5, 6, 60), 40) + 1e-5 * rng.standard_normal(2400)
+    slow = scipy.signal.lfilter([0.0, 0.03 * 0.022], [1.0, -0.97], current)
+    voltage = 3.8 + 0.035 * current + slow + 0.0002 * rng.standard_normal(current.size)
+    heat = scipy.signal.lfilter([0.0, 0.003], [1.0, -0.99], current**2) + 0.02 * rng.standard_normal(2400)
+    choice = choose_columns({"current_A": current, "voltage_V": voltage, "temperature": heat})
+    assert choice.output == "temperature"
+    assert "voltage_V changes together with current_A" in choice.reason or "voltage_V responds" in choice.reason

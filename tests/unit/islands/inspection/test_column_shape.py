@@ -4,6 +4,7 @@ import pytest
 from islands.inspection.column_shape import (
     find_computed,
     is_derived,
+    is_total,
     is_feedback,
     measure_command,
     measure_noise_level,
@@ -48,6 +49,18 @@ def test_a_derivative_is_recognised(differentiate):
     assert is_derived(differentiate(y), y)
     assert not is_derived(steps(1000, 0), y)
     assert not is_derived(2.0 * y + 1.0, y)
+
+
+def test_a_total_of_one_sign_is_recognised():
+    current = steps(1000, 0) + 0.01 * white(1000, 1)
+    voltage = 3.5 + 0.1 * current
+    for sign in (1.0, -1.0):
+        charge = np.cumsum(np.maximum(sign * current, 0.0))
+        assert is_total(charge, current)
+        assert is_total(np.cumsum(np.maximum(sign * current * voltage, 0.0)), current)
+        assert not is_total(current, charge)
+    assert not is_total(np.cumsum(current), current)
+    assert not is_total(np.cumsum(np.maximum(white(1000, 2), 0.0)), current)
 
 
 def test_columns_of_a_controller_determine_each_other():

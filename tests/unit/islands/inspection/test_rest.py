@@ -35,7 +35,7 @@ def test_input_that_never_rests_leaves_it_open():
     u = white(1000, 0)
     fact = check_rest(measure(u, lag(u, 5.0)))
     assert fact.value is None
-    assert "never rests" in fact.sentence
+    assert "u never rests for 4 samples" in fact.sentence
 
 
 def test_all_inputs_have_to_rest():

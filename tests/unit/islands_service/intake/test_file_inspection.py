@@ -109,6 +109,29 @@ def test_assumptions_about_the_time_are_warnings(tmp_path, asked):
     assert "y every 300 s (held between them)" in clocks
 
 
+def test_a_record_without_a_choice_of_columns_has_the_reason(tmp_path):
+    (tmp_path / "a.csv").write_text("\n".join(["t_s,name,y", *(f"{k},a,{k % 7}" for k in range(100))]))
+    found = describe_file(tmp_path / "a.csv", InspectionRequest())["inspection"]
+    assert (found["choice"]["output"], found["facts"]) == ("", [])
+    assert found["choice"]["reason"].startswith("Only y is a signal")
+
+
+def test_facts_of_a_record_without_a_sampling_time_say_so(tmp_path):
+    lines = (line.partition(",")[2] for line in csv().decode().splitlines())
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    found = describe_file(tmp_path / "a.csv", InspectionRequest())
+    assert found["dt"] is None
+    assert any("sampling time is unknown: the facts count" in each for each in found["warnings"])
+
+
+def test_missing_cells_are_refused_in_an_input_and_skipped_in_an_output(tmp_path):
+    (tmp_path / "a.csv").write_bytes(csv(u_V={7: ""}, y_um={9: ""}))
+    with pytest.raises(RecordError, match="line 7, column u_V is empty or NaN: give gaps="):
+        describe_file(tmp_path / "a.csv", InspectionRequest(("u_V",)))
+    found = describe_file(tmp_path / "a.csv", InspectionRequest((), "y_um"))
+    assert [(each["missing"], each["problem"]) for each in found["columns"]] == [(0, ""), (1, ""), (1, "")]
+
+
 @pytest.mark.parametrize("asked", [InspectionRequest(), InspectionRequest(("u_V",), "y_um", rows="0:100")])
 def test_a_file_is_parsed_once(record, monkeypatch, asked):
     parsed = list_parsed(monkeypatch)
@@ -276,4 +299,6 @@ def test_the_facts_of_a_long_record_are_those_of_its_middle(tmp_path):
 @pytest.mark.ci
 def test_a_file_without_a_record_has_no_facts(tmp_path):
     np.savez(tmp_path / "one.npz", y=np.random.default_rng(0).random(100), dt=0.01)
-    assert inspect(tmp_path / "one.npz")["inspection"] is None
+    found = inspect(tmp_path / "one.npz")["inspection"]
+    assert found["facts"] == []
+    assert found["choice"]["reason"].startswith("Only y is a signal")

@@ -149,13 +149,12 @@ def test_a_preview_is_plain_data(tmp_path):
     "column",
     [
         cells(U, c5="off"),
-        cells(U, c5=""),
+        [""] * SAMPLES,
         cells(U, c5="inf"),
-        cells(U, **{f"c{k}": "" for k in range(40, SAMPLES)}),
         [2.5] * SAMPLES,
         cells(U, c5="1,5", c6="0.5"),
     ],
-    ids=["text", "missing", "infinite", "short", "constant", "both marks"],
+    ids=["text", "empty", "infinite", "constant", "both marks"],
 )
 def test_a_problem_is_the_message_of_read_record(tmp_path, column):
     file = table(tmp_path, separator=";", x=column)
@@ -164,12 +163,22 @@ def test_a_problem_is_the_message_of_read_record(tmp_path, column):
     assert preview(file).warnings == ()
 
 
+@pytest.mark.parametrize("empty", [[5], range(40, SAMPLES)], ids=["single", "at the end"])
+def test_missing_values_are_counted_and_no_problem_since_those_of_an_output_are_skipped(tmp_path, empty):
+    file = table(tmp_path, x=cells(U, **{f"c{k}": "" for k in empty}))
+    column, known = preview(file).columns[3], np.delete(U, empty)
+    assert (column.problem, column.missing, column.samples) == ("", len(empty), SAMPLES)
+    assert (column.minimum, column.maximum) == (known.min(), known.max())
+    assert read_record(file, ["u_V"], "x").samples == SAMPLES
+    assert "empty or NaN" in refusal(file, ["x"], "y_um")
+
+
 def test_a_column_with_an_invalid_sample_has_no_statistics(tmp_path):
-    file = table(tmp_path, a=cells(U, c5="nan"), b=cells(U, c5="inf"), c=[2.5] * SAMPLES, d=["x"] * SAMPLES)
-    *_, missing, infinite, constant, text = preview(file).columns
-    for column in (missing, infinite, text):
+    file = table(tmp_path, b=cells(U, c5="inf"), c=[2.5] * SAMPLES, d=["x"] * SAMPLES)
+    *_, infinite, constant, text = preview(file).columns
+    for column in (infinite, text):
         assert (column.minimum, column.maximum, column.mean, column.deviation) == (None, None, None, None)
-    assert (missing.samples, text.samples) == (SAMPLES, None)
+    assert text.samples is None
     assert (constant.minimum, constant.maximum, constant.mean, constant.deviation) == (2.5, 2.5, 2.5, 0.0)
 
 
