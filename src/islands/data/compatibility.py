@@ -15,7 +15,7 @@ from islands.data.channel_names import (
 from islands.data.dataset import Dataset, same_dt
 from islands.data.input_lead import advance_inputs
 from islands.data.preprocessing_steps import Preprocessing
-from islands.errors import RecordError
+from islands.errors import RecordError, name_option
 
 
 class Reference(Protocol):
@@ -139,7 +139,7 @@ def check_dt(expected: float | None, dt: float, reference_title: str, title: str
     if expected is not None and not same_dt(expected, dt):
         raise RecordError(
             f"{reference_title} has a sampling time of {expected:.10g} s, {title} of {dt:.10g} s: "
-            f"resample {title}"
+            f"resample {title}, as by {name_option('resample', expected)}"
         )
 
 

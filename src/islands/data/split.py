@@ -155,9 +155,10 @@ def compare_input_ranges(
     names: Sequence[str],
     units: Sequence[str],
     estimated: Sequence[Sequence[float]],
-    validated: Sequence[Sequence[float]],
+    others: Sequence[Sequence[float]],
+    title: str = "the validation data",
 ) -> list[str]:
-    """State every input whose range in the validation data leaves that in the estimation data.
+    """State every input whose range in other data leaves that in the estimation data.
 
     An excess of at most 5 % of the range does not count.
 
@@ -165,16 +166,18 @@ def compare_input_ranges(
     ----------
     names, units : sequence of str
         Of the inputs.
-    estimated, validated : sequence of (float, float)
-        Least and largest value of every input in the estimation data and in the validation data.
+    estimated, others : sequence of (float, float)
+        Least and largest value of every input in the estimation data and in the other data.
+    title : str
+        Name of the other data.
     """
     found = []
-    for name, unit, (low, high), (lowest, highest) in zip(names, units, estimated, validated, strict=True):
+    for name, unit, (low, high), (lowest, highest) in zip(names, units, estimated, others, strict=True):
         allowed = _NEGLIGIBLE_EXCESS * (high - low)
         if lowest < low - allowed or highest > high + allowed:
             found.append(
                 f"{parse_channel_name(name).base} is {lowest:.4g} to {highest:.4g} {unit}".rstrip()
-                + f" in the validation data and {low:.4g} to {high:.4g} {unit}".rstrip()
+                + f" in {title} and {low:.4g} to {high:.4g} {unit}".rstrip()
                 + " in the estimation data"
             )
     return found

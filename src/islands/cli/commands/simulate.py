@@ -1,8 +1,9 @@
 """``islands simulate``: prediction of a record by whatever `islands.load` opens."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated
 
 import numpy as np
@@ -14,18 +15,20 @@ from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels
 from islands.cli.record_options import with_reading_options
 from islands.data.coupled_record import CoupledRecord, match_coupled
-from islands.data.dataset import Dataset
+from islands.data.dataset import Dataset, same_dt
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import DETREND
-from islands.data.signal_map import match_rate
-from islands.errors import SettingsError
+from islands.data.signal_map import map_signals, match_rate
+from islands.data.split import compare_input_ranges, measure_input_ranges
+from islands.errors import RecordError, SettingsError
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.load import load
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
 from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
-from islands.io.records import read_dataset, write_simulation
+from islands.io.records import read_columns, read_dataset, write_simulation
+from islands.io.records.column_names import find_column
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
@@ -33,9 +36,17 @@ from islands.io.records.table_reading import read_table
 from islands.io.records.writer import write_coupled_simulation
 from islands.models.coupled_narx import coupled_signals
 from islands.models.equations import named_signals
+from islands.models.protocol import DynamicModel
+from islands.models.signal_statement import describe_values
 from islands.simulation.initial_outputs import ESTIMATED_START, has_estimated_start
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
+
+#: Measured samples of a simulated output, at least, of which an error is stated.
+_LEAST_KNOWN = 10
+
+#: Ranges of the inputs of a model without its result.
+_NO_RANGES: Mapping[str, Sequence[Sequence[float]]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +77,21 @@ class _Request:
         if len(self.outputs) > 1:
             raise SettingsError(f"the model has one output, got {', '.join(self.outputs)}: give one --output")
         name = self.outputs[0] if self.outputs else output_name
-        return read_dataset(
-            *(self.record, inputs, name, self.dt, self.rows),
-            missing_output=missing_output,
-            options=self.reading,
-            signals=signals,
-        )
+        try:
+            return read_dataset(
+                *(self.record, inputs, name, self.dt, self.rows),
+                missing_output=missing_output,
+                options=self.reading,
+                signals=signals,
+            )
+        except RecordError as error:
+            columns = read_columns(self.record, self.reading)
+            if find_column(name, columns) in columns:
+                raise
+            raise RecordError(
+                f"{error}. A free run starts from the first values of {name}: add this column with them and "
+                "leave its other cells empty, or name the output by --output"
+            ) from error
 
     def refuse_detrend(self, model: str) -> None:
         """Refuse ``--detrend`` for a model that states its signals."""
@@ -137,7 +157,7 @@ def simulate(
     )
     match load(model):
         case Result() as result:
-            _simulate_model(result.best, request)
+            _simulate_model(result.best, request, result.document.get("data", {}).get("inputs", {}))
         case FittedModel() as single:
             _simulate_model(single, request)
         case FittedCoupledModel() as coupled:
@@ -148,7 +168,10 @@ def simulate(
             _simulate_system(simulation, request)
 
 
-def _simulate_model(found: FittedModel, request: _Request) -> None:
+def _simulate_model(
+    found: FittedModel, request: _Request, ranges: Mapping[str, Sequence[Sequence[float]]] = _NO_RANGES
+) -> None:
+    """Simulate a model of one output; ``ranges`` are those of its inputs by the part of its data."""
     model, mode = found.model, request.mode
     if request.bands is not None and mode != "free-run":
         raise SettingsError("--bands are for free runs of models of a result folder")
@@ -157,9 +180,12 @@ def _simulate_model(found: FittedModel, request: _Request) -> None:
         output.print(step, markup=False)
     if model.preprocessing is not None:
         request.refuse_detrend("a model that states its preprocessing")
-    data = match_rate(model, preprocess(recorded, detrend=request.detrend))
+    prepared = preprocess(recorded, detrend=request.detrend)
+    data = match_rate(model, prepared)
     if statement := named_signals(model):
-        output.print(f"as in the model, {statement}", markup=False)
+        output.print(_describe_preparation(model, data, data is prepared, statement), markup=False)
+    if "estimation" in ranges:
+        _print_extrapolation(model, data, ranges["estimation"])
     compile_kernels()
     first = found.warm_up if request.warm_up is None else request.warm_up
     band = None if request.bands is None else found.bands(data, request.bands, first)
@@ -167,7 +193,28 @@ def _simulate_model(found: FittedModel, request: _Request) -> None:
     if mode == "free-run" and has_estimated_start(model, data, first):
         output.print(ESTIMATED_START, markup=False)
     line = f"{mode} after a warm-up of {first} samples: {simulation.outcome}"
-    _print_metrics(data, simulation.y, line, request.out, band)
+    _print_metrics(data, simulation.y, line, request.out, band, bool(simulation.outcome))
+
+
+def _describe_preparation(model: DynamicModel, data: Dataset, is_prepared: bool, statement: str) -> str:
+    """Return which signals of the record the model reads."""
+    values = describe_values(model)
+    if values and is_prepared and model.dt is not None and same_dt(model.dt, data.dt):
+        return (
+            f"the record has the sampling time of the model, {model.dt:g} s, and its samples are read as they "
+            f"are; in the data of the model, {values}"
+        )
+    return f"as in the model, {statement}"
+
+
+def _print_extrapolation(model: DynamicModel, data: Dataset, estimated: Sequence[Sequence[float]]) -> None:
+    """State the inputs that leave the range of the estimation data."""
+    signals, _ = map_signals(model, data)
+    found = measure_input_ranges(signals)
+    for statement in compare_input_ranges(
+        *(signals.input_names, signals.input_units, estimated, found), title="the record"
+    ):
+        output.print(f"extrapolation: {statement}", markup=False)
 
 
 def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
@@ -236,19 +283,34 @@ def _print_metrics(
     line: str,
     out: Path | None,
     band: PredictionBand | None = None,
+    is_complete: bool = True,
 ) -> None:
+    """Write a simulation and print its errors; one that diverged has none."""
     if out is not None:
         write_simulation(data, y, out, None if band is None else (band.lower, band.upper))
         output.print(f"{out}: {data.samples} rows", markup=False)
-    errors = metrics(data.y, y)
     output.print(line, markup=False)
+    known = int(np.count_nonzero(np.isfinite(data.y) & np.isfinite(y)))
+    if not is_complete:
+        return
+    if known < _LEAST_KNOWN:
+        output.print(
+            f"{data.output_name} is measured in {known} of the simulated samples: too few for an error",
+            markup=False,
+        )
+    else:
+        _print_errors(data, y)
+    if band is not None:
+        _print_band(data, band)
+
+
+def _print_errors(data: Dataset, y: NDArray[np.float64]) -> None:
+    errors = metrics(data.y, y)
     output.print(
         f"MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} {data.output_unit}  "
         f"fit {errors.fit_percent:.3f} %",
         markup=False,
     )
-    if band is not None:
-        _print_band(data, band)
 
 
 def _print_band(data: Dataset, band: PredictionBand, title: str = "") -> None:
@@ -256,7 +318,7 @@ def _print_band(data: Dataset, band: PredictionBand, title: str = "") -> None:
     half = 0.5 * float(np.median((band.upper - band.lower)[predicted]))
     text = f"{title}{100 * band.level:g} % band: median half-width {half:.6g} {data.output_unit}".rstrip()
     known = predicted & ~np.isnan(data.y)
-    if known.any():
+    if np.count_nonzero(known) >= _LEAST_KNOWN:
         inside = (band.lower <= data.y) & (data.y <= band.upper)
         text += f",\n  contains {100 * inside[known].mean():.1f} % of the measured samples"
     output.print(text, markup=False)

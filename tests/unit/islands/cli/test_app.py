@@ -230,11 +230,47 @@ def test_simulate_averages_a_record_for_a_model_of_means(run, name):
     assert time == pytest.approx(0.015 + 0.04 * np.arange(1, 30))
 
 
+def test_simulate_states_that_a_record_at_the_rate_of_the_model_is_not_averaged(run):
+    model = make_model([(parse("u(k-1)"), 2.0)], ("u_V",), "y_um", 0.04)
+    write_model(replace(model, average=4), "model.json")
+    write_record(replace(record(), dt=0.04), "r.csv")
+    code, out, _ = run("simulate", "model.json", "r.csv")
+    assert code == 0
+    assert "the record has the sampling time of the model, 0.04 s, and its samples are read as they" in out
+    assert "as in the model" not in out
+
+
+def test_simulate_takes_a_record_whose_output_has_its_first_values_only(run, fitted):
+    """A record to predict has no output: the message says how a free run gets its first values."""
+    lines = Path("r.csv").read_text().splitlines()
+    Path("inputs.csv").write_text("\n".join(line.rpartition(",")[0] for line in lines))
+    code, _, error = run("simulate", "out", "inputs.csv", "--out", "s.csv")
+    assert code == 2
+    assert "add this column with them and leave its other cells empty" in " ".join(error.split())
+    started = (line if place < 8 else line.rpartition(",")[0] + "," for place, line in enumerate(lines))
+    Path("inputs.csv").write_text("\n".join(started))
+    code, out, _ = run("simulate", "out", "inputs.csv", "--bands", "0.9", "--out", "s.csv")
+    assert (code, "nan" in out) == (0, False)
+    assert "y_um is measured in 4 of the simulated samples: too few for an error" in out
+    assert np.isfinite(np.loadtxt("s.csv", delimiter=",", skiprows=4)).all()
+
+
+def test_simulate_states_inputs_beyond_the_estimation_data(run, fitted):
+    assert "extrapolation" not in run("simulate", "out", "r.csv", "--rows", "0:90")[1]
+    write_record(replace(record(), u=100.0 * record().u), "large.csv")
+    code, out, _ = run("simulate", "out", "large.csv")
+    assert code == 0
+    assert "extrapolation: u_V is" in out
+    assert "in the record and" in out
+    assert ("diverged" in out) == ("MAPE" not in out)
+
+
 def test_simulate_rejects_another_sampling_time(run):
     write_record(Dataset(record().u, record().y, 0.0011, ("u_V",), "y_um"), "slow.csv")
     code, _, err = run("simulate", "published:12", "slow.csv")
     assert code == 2
     assert "the model has a sampling time of 0.001 s, the record of 0.0011 s: resample the record" in err
+    assert "--resample 0.001" in err
 
 
 def test_systems_make_writes_into_a_folder_with_brackets(run):
