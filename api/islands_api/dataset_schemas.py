@@ -71,7 +71,8 @@ class Preview(ResponseModel):
     warnings: tuple[str, ...] = ()
     reading: dict[str, Any] = Field(default_factory=dict, description="Options of reading.")
     inspection: Inspection | None = Field(
-        default=None, description="Facts about the record. None if the file has problems that `warnings` state."
+        default=None,
+        description="Facts about the record. None if the file has problems that `warnings` state.",
     )
 
 

@@ -77,9 +77,7 @@ def check_loop(record: Dataset, place: int) -> Fact:
     if single is None or np.ptp(single.u) == 0.0 or not np.isfinite(single.y).all():
         return Fact("loop", name, None, "", None, None, f"{output} over {name} cannot be judged as a loop.")
     if np.unique(single.u).size == _LEVELS:
-        text = (
-            f"{name} has {_LEVELS} levels: {output} over {name} does not show whether a hysteresis makes a loop."
-        )
+        text = f"{name} has {_LEVELS} levels: {output} over {name} does not show whether a hysteresis makes a loop."
         return Fact("loop", name, None, "", None, None, text)
     slow = average_samples(single, _choose_count(single))
     if len(loop_starts(slow)) < 2:
@@ -121,9 +119,7 @@ def _judge(record: Dataset) -> tuple[bool | None, float | None]:
     return together > delayed, max(together, delayed)
 
 
-def _count_gains(
-    without: NDArray[np.float64], with_columns: NDArray[np.float64]
-) -> float:
+def _count_gains(without: NDArray[np.float64], with_columns: NDArray[np.float64]) -> float:
     """Return the share of resampled records in which further columns remove the error for the most part."""
     gains = 1.0 - resample(with_columns) / np.maximum(resample(without), np.finfo(np.float64).tiny)
     return float(np.mean(gains >= _LEAST_GAIN))

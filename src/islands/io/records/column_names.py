@@ -157,6 +157,12 @@ def seconds_per_unit(name: str) -> float | None:
     return TIME_UNITS.get(_unit_word(name))
 
 
+def has_unit_of_time(name: str) -> bool:
+    """Return whether a name ends in a unit of time in brackets, whatever its words are: ``Source [s]``."""
+    match = _BRACKETED_UNIT.search(name)
+    return match is not None and match.end() == len(name) and parse_unit(name) in set(TIME_UNITS) - {""}
+
+
 def states_unit(name: str) -> bool:
     """Return whether a name ends in a unit of time, as a symbol or in words: ``t_ms``, ``Time (days)``.
 

@@ -9,12 +9,17 @@ import numpy as np
 
 from islands.data.channel_names import parse_unit
 from islands.errors import RecordError
-from islands.io.records.column_names import find_column, split_structures, time_column
+from islands.io.records.column_names import find_column, split_structures
 from islands.io.records.reader import open_record
 from islands.io.records.reading_options import DEFAULT_READING, ROWS, ReadingOptions
 from islands.io.records.sampling.column_clocks import ColumnClock, find_clocks, may_differ
 from islands.io.records.sampling.common_clock import common_step, describe_clocks
-from islands.io.records.sampling.time_step import TimeSource, find_sampling, find_time_scale
+from islands.io.records.sampling.time_step import (
+    TimeSource,
+    find_sampling,
+    find_time_column,
+    find_time_scale,
+)
 from islands.io.records.table import Columns, RowRange, Table
 from islands.io.records.validation import (
     MIN_SAMPLES,
@@ -201,7 +206,7 @@ def _preview_sampling(
     structure = split_structures(table.names)[main] if main else ""
     try:
         named = None if options.time is None else find_column(options.time, table.names)
-        time = named or time_column(table.names, file, structure=structure, clocks=table.clocks)
+        time = named or find_time_column(table, file, structure=structure)
         source = time or main
         if source is not None and source in problems:
             return time, None, problems[source]

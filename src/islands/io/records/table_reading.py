@@ -19,7 +19,6 @@ from islands.io.records.column_names import (
     list_inputs,
     split_structures,
     take_output,
-    time_column,
 )
 from islands.io.records.reading_options import DEFAULT_READING, KEEP, MEAN, ROWS, ReadingOptions
 from islands.io.records.sampling.column_clocks import ColumnClock, find_clocks, may_differ
@@ -34,6 +33,7 @@ from islands.io.records.sampling.repair import join_recordings, make_uniform
 from islands.io.records.sampling.time_step import (
     TimeSource,
     find_sampling,
+    find_time_column,
     find_time_scale,
     make_recording,
 )
@@ -95,7 +95,7 @@ def read_table(
     check_choice(table.names, sources, output, file, time, table.others)
     structures = split_structures(table.names)
     structure = structures[chosen[-1]]
-    clock = time or time_column(table.names, file, chosen, structure, table.clocks)
+    clock = time or find_time_column(table, file, chosen, structure)
     columns = table.read(tuple(dict.fromkeys((*chosen, *([clock] if clock else [])))), rows)
     # A simulation needs no more samples than the lags of its model, which it checks.
     check_length(columns, *([2] if missing_output else []))

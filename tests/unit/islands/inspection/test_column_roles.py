@@ -223,4 +223,6 @@ def test_a_column_that_changes_together_with_an_input_is_named():
     heat = scipy.signal.lfilter([0.0, 0.003], [1.0, -0.99], current**2) + 0.02 * rng.standard_normal(2400)
     choice = choose_columns({"current_A": current, "voltage_V": voltage, "temperature": heat})
     assert choice.output == "temperature"
-    assert "voltage_V changes together with current_A" in choice.reason or "voltage_V responds" in choice.reason
+    assert (
+        "voltage_V changes together with current_A" in choice.reason or "voltage_V responds" in choice.reason
+    )

@@ -202,7 +202,9 @@ def _resample_parts(parts: list[Recording], usual: float, dt: float, steps: list
     seconds = parts[0].seconds
     _check_count(int(sum(float(part.stamps[-1] - part.stamps[0]) for part in parts) * seconds / dt), parts[0])
     resampled = [resample(part.stamps, part.values, dt / seconds, usual) for part in parts]
-    steps.append(f"resampled from {usual * seconds:.6g} s to {dt:.6g} s by {resampled[0][1]}")
+    is_same = abs(usual * seconds - dt) <= AGREEMENT * dt
+    change = f"to uniform steps of {dt:.6g} s" if is_same else f"from {usual * seconds:.6g} s to {dt:.6g} s"
+    steps.append(f"resampled {change} by {resampled[0][1]}")
     lengths = tuple(len(values) for values, _ in resampled)
     return UniformRecording(
         np.concatenate([values for values, _ in resampled]), dt, _start(parts), lengths, tuple(steps)

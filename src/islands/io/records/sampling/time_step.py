@@ -1,13 +1,19 @@
 """Sampling time of a record, from a time column that is checked against a uniform grid or as stated."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError, check_seconds, name_option
-from islands.io.records.column_names import TIME_UNITS, looks_like_time, seconds_per_unit
+from islands.io.records.column_names import (
+    TIME_UNITS,
+    has_unit_of_time,
+    looks_like_time,
+    seconds_per_unit,
+    time_column,
+)
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.sampling.recording import Recording
 from islands.io.records.sampling.time_unit import TimeScale, find_time_unit
@@ -39,6 +45,36 @@ class TimeSource:
     dt: float | None = None
     structure: str = ""
     options: ReadingOptions = DEFAULT_READING
+
+
+def find_time_column(table: Table, file: str, taken: Collection[str] = (), structure: str = "") -> str | None:
+    """Return the name of the time column of a table, None if it has none.
+
+    Without a column that is named as the time or has time stamps (`time_column`), it is the first column if
+    it has a unit of time and increases: oscilloscopes name it after the source of the channels.
+
+    Parameters
+    ----------
+    table : Table
+    file, taken, structure
+        As for `time_column`.
+
+    Raises
+    ------
+    RecordError
+        Several columns may be the time.
+    """
+    found = time_column(table.names, file, taken, structure, table.clocks)
+    if found is not None or not table.names:
+        return found
+    first = table.names[0]
+    if first in taken or not has_unit_of_time(first):
+        return None
+    try:
+        steps = np.diff(table.read((first,), None).numbers[first])
+    except RecordError:
+        return None  # it is not numbers
+    return first if steps.size and bool((steps > 0.0).all()) else None
 
 
 def find_sampling(source: TimeSource, columns: Columns) -> tuple[float, float | None]:

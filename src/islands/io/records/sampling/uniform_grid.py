@@ -19,6 +19,9 @@ ROUNDING = 0.25
 #: Steps longer than this many usual steps are gaps.
 GAP = 1.5
 
+#: Relative difference of two deviations of steps that is a rounding error.
+_EQUAL = 1e-6
+
 #: Seconds by which clocks change for summer time.
 _SUMMER = 3600.0
 
@@ -141,7 +144,7 @@ def _raise_not_uniform(
 ) -> NoReturn:
     steps = np.diff(stamps)
     usual = float(np.median(steps))
-    gaps = steps > GAP * usual
+    gaps, others = steps > GAP * usual, ""
     if 0 < gaps.mean() < 0.1:
         sample = int(np.argmax(gaps)) + 1
         problem = "follows a gap: the time changes"
@@ -153,7 +156,12 @@ def _raise_not_uniform(
             zone = name_option("timezone", "Europe/Berlin")
             advice += f"; if it is the beginning of summer time, give the time zone, as {zone}"
     else:
-        sample = max(sample, 1)
+        # The stamp that is farthest from the grid may be far behind the steps that moved it.
+        rounding = rounding_error(stamps)
+        off = np.abs(steps - usual) - rounding[1:] - rounding[:-1]
+        count = int(np.count_nonzero(off > AGREEMENT * usual))
+        sample = int(np.argmax(off >= (1.0 - _EQUAL) * off.max())) + 1 if count else max(sample, 1)
+        others = f" ({count} of {len(steps)} steps differ)" if count > 1 else ""
         problem = "is off the uniform grid: the time changes"
         advice = (
             f"give {name_option('resample', usual * seconds)} to interpolate onto a uniform grid, or, "
@@ -162,5 +170,5 @@ def _raise_not_uniform(
         )
     raise RecordError(
         f"{rows.place(sample, name)} {problem} from {stamps[sample - 1]:.10g} to {stamps[sample]:.10g}, but "
-        f"the usual step is {usual:.6g}: {advice}"
+        f"the usual step is {usual:.6g}{others}: {advice}"
     )

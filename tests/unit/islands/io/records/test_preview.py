@@ -313,6 +313,20 @@ def test_a_file_without_a_sampling_time_is_a_warning(tmp_path):
     assert (seen.time, seen.dt, seen.warnings) == (None, None, (refusal(file, ["u_V"], "y_um"),))
 
 
+def test_a_first_column_in_a_unit_of_time_that_increases_is_the_time(tmp_path):
+    """Oscilloscopes write the source of the channels above the time: ``Source,CH1,CH2``."""
+    rows = [f"{t - 0.1:+.7f},{u:.5f},{y:.5f}" for t, u, y in zip(T, U, Y, strict=True)]
+    file = tmp_path / "scope.csv"
+    file.write_text("\n".join(["Source,CH1,CH2", "Second,Volt,Volt", *rows]))
+    seen = preview(file)
+    assert (seen.time, seen.dt) == ("Source [s]", pytest.approx(T[1] - T[0]))
+    record = read_record(file, ["CH1"], "CH2")
+    assert (record.dt, record.start) == (pytest.approx(T[1] - T[0]), pytest.approx(-0.1))
+    for other in ("Source,CH1,CH2\nVolt,Volt,Volt", "Source,CH1,CH2\nSecond,Volt,Volt\n5,0,0"):
+        file.write_text("\n".join([other, *rows]))
+        assert preview(file).time is None
+
+
 def test_two_possible_time_columns_are_a_warning(tmp_path):
     file = table(tmp_path, time_ms=T * 1000)
     seen = preview(file)

@@ -109,7 +109,7 @@ def test_jitter_is_resampled_or_ignored(tmp_path):
     assert "dt=0.01" in message
     resampled = read(tmp_path, table, resample=DT)
     assert np.abs(resampled.u[:, 0] - np.sin(2 * np.pi * 2.0 * resampled.time)).max() < 5e-3
-    assert resampled.reading[0].endswith("s to 0.01 s by linear interpolation")
+    assert resampled.reading[0] == "resampled to uniform steps of 0.01 s by linear interpolation"
     trusted = read(tmp_path, table, dt=DT)
     assert (trusted.samples, trusted.dt) == (400, DT)
 
@@ -153,6 +153,20 @@ def test_a_coarser_grid_is_filtered_against_folding(tmp_path):
     assert record.samples == 100
     assert np.abs(record.u[inner, 0] - kept[inner]).max() < 0.01
     assert record.reading[0].startswith("resampled from 0.01 s to 0.04 s by a linear-phase low-pass filter")
+
+
+def test_rows_between_the_samples_of_a_uniform_record_are_named_where_they_are(tmp_path):
+    """A battery cycler writes a further row at the end of each step."""
+    table = rows()
+    for place in (300, 200, 100):
+        time, _, rest = table[place].partition(",")
+        table.insert(place, f"{float(time) - 2e-6:.6f},{rest}")
+    message = refusal(tmp_path, table)
+    assert "line 102, column t_s is off the uniform grid" in message
+    assert "(3 of 402 steps differ)" in message
+    assert read(tmp_path, table, resample=0.01).reading == (
+        "resampled to uniform steps of 0.01 s by linear interpolation",
+    )
 
 
 def test_resampling_does_not_cross_a_gap_unless_it_is_to_be_interpolated(tmp_path):
